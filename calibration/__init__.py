@@ -1,0 +1,1 @@
+"""Counts to SI units, and the records that say how. Imports estimation only."""

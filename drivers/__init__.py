@@ -1,0 +1,1 @@
+"""Devices and the transports they speak over. Imports no other room."""

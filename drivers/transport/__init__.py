@@ -1,0 +1,1 @@
+"""Byte transports opened by URL."""

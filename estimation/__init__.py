@@ -1,0 +1,1 @@
+"""Pure functions on arrays: recordings, filters, effects, models. Imports no other room."""

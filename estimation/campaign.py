@@ -1,0 +1,259 @@
+"""A campaign: many runs of one rig, walked run by run, split by run, on one clock.
+
+A campaign holds run *handles*. A handle knows the run's name and conditions and loads the recording
+when asked, so a campaign may be larger than memory: iterate over it and keep only what you need.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.errors import EstimationError
+from estimation.recording import FloatArray, Recording
+
+
+class CampaignError(EstimationError):
+    """Runs do not make a campaign, or a split of it is not possible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A handle on one run: what is known without reading its samples, and how to read them.
+
+    Attributes:
+        name: Name of the run.
+        load: Reads the recording. Called anew each time; nothing is kept.
+        source: File the run is read from, or None for a run in memory.
+        excluded: Why the run is left out of evidence, or None.
+    """
+
+    name: str
+    load: Callable[[], Recording]
+    source: Path | None = None
+    excluded: str | None = None
+
+    def recording(self) -> Recording:
+        """Read the recording; the handle's reason of exclusion goes with it."""
+        recording = self.load()
+        return recording.exclude(self.excluded) if self.excluded else recording
+
+
+@dataclass(frozen=True)
+class Clock:
+    """One clock over all runs of a campaign.
+
+    Attributes:
+        start_s: Campaign time of each run's first sample, shape (runs,).
+        gap_known: Whether the gap before each run was recorded, shape (runs,). A run with False
+            is placed back to back with its predecessor: the gap's true length is unknown.
+    """
+
+    start_s: FloatArray
+    gap_known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Split:
+    """Two disjoint sets of runs: one to fit on, one to report on."""
+
+    name: str
+    train: "Campaign"
+    test: "Campaign"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Chosen channels of many runs, concatenated.
+
+    Attributes:
+        columns: Channel name to values, shape (n,).
+        run: Index of each sample's run in `names`, shape (n,).
+        names: Names of the runs.
+    """
+
+    columns: Mapping[str, FloatArray]
+    run: NDArray[np.intp]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Runs in the order they were taken."""
+
+    runs: tuple[Run, ...]
+
+    def __post_init__(self) -> None:
+        names = [run.name for run in self.runs]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise CampaignError(
+                f"Two runs of the campaign share a name: {', '.join(twice)}.",
+                "A run is the unit of evidence and is told apart by its name.",
+            )
+
+    @classmethod
+    def of(cls, recordings: Iterable[Recording]) -> "Campaign":
+        """Make a campaign of recordings held in memory."""
+        return cls(
+            tuple(
+                Run(r.name, load=lambda r=r: r, excluded=r.excluded)  # type: ignore[misc]
+                for r in recordings
+            )
+        )
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __iter__(self) -> Iterator[Recording]:
+        """Walk the campaign run by run, excluded runs too; one recording is held at a time."""
+        return (run.recording() for run in self.runs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs, in order."""
+        return tuple(run.name for run in self.runs)
+
+    @property
+    def evidence(self) -> "Campaign":
+        """The runs that are not excluded."""
+        return Campaign(tuple(run for run in self.runs if run.excluded is None))
+
+    def exclude(self, name: str, reason: str) -> "Campaign":
+        """Return a campaign in which one run is excluded, with the reason.
+
+        Raises:
+            CampaignError: There is no such run.
+        """
+        if name not in self.names:
+            raise CampaignError(
+                f"The campaign has no run {name!r}.", f"It has: {', '.join(self.names)}."
+            )
+        return Campaign(
+            tuple(replace(r, excluded=reason) if r.name == name else r for r in self.runs)
+        )
+
+    def select(self, names: Iterable[str]) -> "Campaign":
+        """Return the campaign of the named runs, in this campaign's order."""
+        wanted = set(names)
+        return Campaign(tuple(run for run in self.runs if run.name in wanted))
+
+    def clock(self) -> Clock:
+        """Place all runs on one clock.
+
+        A run with a recorded start keeps it, relative to the first recorded start; a run without
+        one follows its predecessor back to back, one sample period later. Walks the campaign.
+
+        Raises:
+            CampaignError: Recorded starts make runs overlap or run backwards.
+        """
+        start_s: list[float] = []
+        gap_known: list[bool] = []
+        end_s = 0.0
+        # an absolute start is usable once a first one has tied it to campaign time
+        epoch_s: float | None = None
+        for index, recording in enumerate(self):
+            known = False
+            start = end_s
+            if recording.started_at_ns is not None:
+                absolute_s = recording.started_at_ns * 1e-9
+                if epoch_s is None:
+                    epoch_s = absolute_s - end_s
+                else:
+                    start = absolute_s - epoch_s
+                    known = True
+                known = known or index == 0
+            if start < end_s - 1e-3:
+                raise CampaignError(
+                    f"Run {recording.name!r} starts {end_s - start:.3f} s before its predecessor"
+                    " ends.",
+                    "The recorded starts are out of order or the runs overlap.",
+                )
+            start_s.append(start)
+            gap_known.append(known)
+            period_s = 1.0 / recording.sample_rate_hz if len(recording) > 1 else 0.0
+            end_s = start + recording.duration_s + period_s
+        return Clock(np.array(start_s), np.array(gap_known, dtype=bool))
+
+    def folds(self, count: int, seed: int = 0) -> list[Split]:
+        """Split by run into folds: each run is tested exactly once.
+
+        Args:
+            count: Number of folds, 2 to the number of runs that are not excluded.
+            seed: Seed of the shuffle.
+
+        Raises:
+            CampaignError: More folds than runs, or fewer than two.
+        """
+        evidence = self.evidence
+        if not 2 <= count <= len(evidence):
+            raise CampaignError(
+                f"{len(evidence)} runs cannot be split into {count} folds.",
+                "Each fold needs at least one run to test and one to fit.",
+            )
+        order = np.random.default_rng(seed).permutation(len(evidence))
+        return [
+            _split(evidence, f"fold {k + 1}/{count}", {evidence.names[i] for i in order[k::count]})
+            for k in range(count)
+        ]
+
+    def leave_one_condition_out(self, condition: str) -> list[Split]:
+        """Split so that each test set holds all runs of one value of a condition.
+
+        Args:
+            condition: Name of a condition, such as `load_command_a`.
+
+        Raises:
+            CampaignError: A run lacks the condition, or it has one value only.
+        """
+        evidence = self.evidence
+        values: dict[str, float | str] = {}
+        for recording in evidence:
+            if condition not in recording.conditions:
+                raise CampaignError(
+                    f"Run {recording.name!r} does not state the condition {condition!r}.",
+                    f"It states: {', '.join(recording.conditions) or 'none'}.",
+                )
+            values[recording.name] = recording.conditions[condition]
+        levels = sorted(set(values.values()), key=str)
+        if len(levels) < 2:
+            raise CampaignError(
+                f"Every run has {condition} = {levels[0] if levels else 'nothing'}.",
+                "Leaving the only value out leaves nothing to fit.",
+            )
+        return [
+            _split(evidence, f"{condition} = {v}", {n for n, w in values.items() if w == v})
+            for v in levels
+        ]
+
+    def concatenate(self, channels: Sequence[str], valid_only: bool = True) -> Table:
+        """Concatenate channels of all runs that are not excluded.
+
+        Args:
+            channels: Channel names; `time_s` is each run's own clock.
+            valid_only: Leave out flagged samples.
+
+        Raises:
+            MissingChannelError: A run lacks one of the channels.
+        """
+        parts: dict[str, list[FloatArray]] = {name: [] for name in channels}
+        run: list[NDArray[np.intp]] = []
+        names: list[str] = []
+        for index, recording in enumerate(self.evidence):
+            keep = recording.valid if valid_only else np.ones(len(recording), bool)
+            for name in channels:
+                parts[name].append(recording[name][keep])
+            run.append(np.full(int(keep.sum()), index, dtype=np.intp))
+            names.append(recording.name)
+        empty: FloatArray = np.empty(0)
+        return Table(
+            {name: np.concatenate(part) if part else empty for name, part in parts.items()},
+            np.concatenate(run) if run else np.empty(0, np.intp),
+            tuple(names),
+        )
+
+
+def _split(campaign: Campaign, name: str, test: set[str]) -> Split:
+    return Split(name, campaign.select(set(campaign.names) - test), campaign.select(test))

@@ -1,0 +1,101 @@
+"""The channel registry: every column of a recording, its unit and which way is positive.
+
+Column names carry their SI unit as a suffix (`spindle_angle_rad`). Closing motion of the jaw and
+the torque that closes it are positive in every channel, so that torque constant, stiffness and
+transmission ratio come out positive.
+"""
+
+from dataclasses import dataclass
+
+from estimation.errors import EstimationError
+
+UNIT_BY_SUFFIX: dict[str, str] = {
+    "n_m_s_rad": "N m s/rad",
+    "n_m_rad": "N m/rad",
+    "rad_s2": "rad/s^2",
+    "m_s2": "m/s^2",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "n_m_a": "N m/A",
+    "n_m": "N m",
+    "hz": "Hz",
+    "rad": "rad",
+    "ratio": "1",
+    "n": "N",
+    "m": "m",
+    "s": "s",
+    "a": "A",
+    "v": "V",
+    "k": "K",
+}
+"""Unit symbol of each name suffix; the longest suffix that matches wins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One column of a recording.
+
+    Attributes:
+        name: Column name, ends in the unit's suffix.
+        unit: SI unit symbol.
+        description: What is measured and where.
+    """
+
+    name: str
+    unit: str
+    description: str
+
+
+class UnknownUnitError(EstimationError):
+    """A column name ends in no known unit suffix."""
+
+
+def unit_of(name: str) -> str:
+    """Return the SI unit symbol a channel name ends in.
+
+    Args:
+        name: Channel, parameter or condition name such as `motor_current_a`.
+
+    Raises:
+        UnknownUnitError: The name has no known unit suffix.
+    """
+    parts = name.split("_")
+    for start in range(1, len(parts)):
+        suffix = "_".join(parts[start:])
+        if suffix in UNIT_BY_SUFFIX:
+            return UNIT_BY_SUFFIX[suffix]
+    raise UnknownUnitError(
+        f"The channel name {name!r} carries no unit.",
+        "Every column is in SI units and its name ends in the unit.",
+        "Rename it, for example `spindle_angle_rad` or `motor_current_a`.",
+    )
+
+
+def _channel(name: str, description: str) -> tuple[str, Channel]:
+    return name, Channel(name, unit_of(name), description)
+
+
+CHANNELS: dict[str, Channel] = dict(
+    [
+        _channel("time_s", "device clock, starts near zero in each run"),
+        _channel("motor_angle_rad", "drive motor shaft, before the gearhead"),
+        _channel("spindle_angle_rad", "instrument spindle, after the gearhead"),
+        _channel("jaw_angle_rad", "jaw, from the encoder of the load motor"),
+        _channel("target_angle_rad", "commanded trajectory of the spindle"),
+        _channel("motor_current_a", "measured current of the drive motor"),
+        _channel("motor_command_ratio", "command to the current controller, 1 is full scale"),
+        _channel("load_command_a", "current commanded to the load motor at the jaw"),
+        _channel("proximal_torque_n_m", "torque sensor at the spindle"),
+        _channel("distal_torque_n_m", "torque sensor at the jaw"),
+        _channel("fsr_v", "amplified force-sensing resistor"),
+        _channel("wrist_pitch_rad", "wrist pitch of the instrument"),
+        _channel("wrist_roll_rad", "roll of the instrument shaft"),
+        _channel("motor_temperature_k", "drive motor housing"),
+    ]
+)
+"""Registered channels of the grasper rig by name. Other names are allowed if they carry a unit."""
+
+
+def describe(name: str) -> Channel:
+    """Return the registered channel of that name, or one derived from the name's unit suffix."""
+    return CHANNELS.get(name) or Channel(name, unit_of(name), name.replace("_", " "))

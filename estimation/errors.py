@@ -1,0 +1,17 @@
+"""Errors of the `estimation` room: what an estimate or a recording cannot do."""
+
+
+class EstimationError(Exception):
+    """Base of every error this room raises on purpose.
+
+    Attributes:
+        what: What happened, in one sentence.
+        why: The cause as far as it is known; may be empty.
+        fix: What to do or to type next; may be empty.
+    """
+
+    def __init__(self, what: str, why: str = "", fix: str = "") -> None:
+        self.what = what
+        self.why = why
+        self.fix = fix
+        super().__init__(" ".join(part for part in (what, why, fix) if part))

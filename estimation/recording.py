@@ -1,0 +1,236 @@
+"""A recording: one run as columns of float64 in SI units, with flags and what was known about it.
+
+The run is the unit of evidence everywhere in this project, so a recording is immutable: columns are
+read-only arrays, and every change makes a new recording that shares the columns it did not touch.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntFlag
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.channels import unit_of
+from estimation.errors import EstimationError
+
+FloatArray = NDArray[np.float64]
+
+
+class Flag(IntFlag):
+    """What is wrong with one sample; 0 is a valid sample."""
+
+    VALID = 0
+    SATURATED = 1  # a sensor or converter at its limit
+    STALE = 2  # a value held over from an earlier tick
+    MISSING = 4  # nothing was received for this tick
+    SUSPECT = 8  # measured, but not by a rig working as intended (runaway, re-index)
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A flagged stretch of a run.
+
+    Attributes:
+        start_s: Time of the first flagged sample, s.
+        stop_s: Time of the last flagged sample, s.
+        flag: What is wrong.
+        reason: Why, in words a person can act on.
+        channel: The channel it was seen in, or None for all of them.
+    """
+
+    start_s: float
+    stop_s: float
+    flag: Flag
+    reason: str
+    channel: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """An operator's mark: a time in the run (s) and what happened."""
+
+    time_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Instrument:
+    """Identity of the instrument under test. What is not known is None."""
+
+    model: str | None = None
+    serial: str | None = None
+    lot: str | None = None
+    side: str | None = None
+    uses: int | None = None
+
+
+class MissingChannelError(EstimationError):
+    """A recording lacks a channel that the work needs."""
+
+
+class RecordingError(EstimationError):
+    """Columns, flags or times do not make one recording."""
+
+
+def read_only(values: ArrayLike) -> FloatArray:
+    """Return values as a contiguous float64 array that cannot be written to.
+
+    A writable array is copied, since its owner could change it later; hand over an array whose
+    `flags.writeable` is already False to share it.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.flags.writeable or not array.flags.c_contiguous:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One run of the rig.
+
+    Attributes:
+        name: Name of the run, unique in its campaign.
+        time_s: Device clock, shape (n,), strictly increasing.
+        columns: Channel name to values, each of shape (n,), SI units.
+        flags: Per-sample `Flag` bits, shape (n,), uint8.
+        conditions: What was held constant, numbers in SI with the unit in the name
+            (`load_command_a`, `frequency_hz`) or words.
+        rig: Name of the rig.
+        instrument: Identity of the instrument.
+        notes: Operator's notes.
+        marks: Operator's marks.
+        stretches: Flagged stretches with their reasons.
+        started_at_ns: Start of the run, ns since the Unix epoch, or None when not recorded.
+        calibrations: Calibration name to content hash.
+        source: Where it was read from.
+        excluded: Why the run is left out of evidence, or None when it counts.
+    """
+
+    name: str
+    time_s: FloatArray
+    columns: Mapping[str, FloatArray]
+    flags: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    rig: str = ""
+    instrument: Instrument = field(default_factory=Instrument)
+    notes: str = ""
+    marks: tuple[Mark, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
+    started_at_ns: int | None = None
+    calibrations: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+    excluded: str | None = None
+
+    def __post_init__(self) -> None:
+        time_s = read_only(self.time_s)
+        if time_s.ndim != 1:
+            raise RecordingError(f"Run {self.name!r}: time_s has shape {time_s.shape}, not (n,).")
+        if not np.all(np.isfinite(time_s)) or np.any(np.diff(time_s) <= 0):
+            raise RecordingError(
+                f"Run {self.name!r}: time does not increase at every sample.",
+                "A device clock that repeats or runs backwards cannot be differentiated.",
+                "Repair the clock (wrap, reset) where the data is imported.",
+            )
+        columns = {name: read_only(values) for name, values in self.columns.items()}
+        for name, values in columns.items():
+            unit_of(name)
+            if values.shape != time_s.shape:
+                raise RecordingError(
+                    f"Run {self.name!r}: {name} has shape {values.shape}, time {time_s.shape}."
+                )
+        flags = np.ascontiguousarray(self.flags, dtype=np.uint8)
+        if flags.size == 0:
+            flags = np.zeros(time_s.size, np.uint8)
+        if flags.shape != time_s.shape:
+            raise RecordingError(
+                f"Run {self.name!r}: flags have shape {flags.shape}, time {time_s.shape}."
+            )
+        flags = flags.copy()
+        flags.flags.writeable = False
+        for attribute, value in (
+            ("time_s", time_s),
+            ("columns", MappingProxyType(columns)),
+            ("flags", flags),
+            ("conditions", MappingProxyType(dict(self.conditions))),
+            ("calibrations", MappingProxyType(dict(self.calibrations))),
+        ):
+            object.__setattr__(self, attribute, value)
+
+    def __len__(self) -> int:
+        return int(self.time_s.size)
+
+    def __contains__(self, name: object) -> bool:
+        return name == "time_s" or name in self.columns
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return one channel, shape (n,).
+
+        Raises:
+            MissingChannelError: The recording has no such channel.
+        """
+        if name == "time_s":
+            return self.time_s
+        try:
+            return self.columns[name]
+        except KeyError:
+            near = difflib.get_close_matches(name, self.columns, n=1)
+            raise MissingChannelError(
+                f"Run {self.name!r} has no channel {name!r}.",
+                f"It has: {', '.join(self.columns) or 'none'}.",
+                f"Did you mean {near[0]!r}?" if near else "",
+            ) from None
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Samples with no flag set, shape (n,)."""
+        return np.equal(self.flags, 0)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first sample to the last, s; 0 for fewer than two samples."""
+        return float(self.time_s[-1] - self.time_s[0]) if len(self) > 1 else 0.0
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Median sample rate, Hz.
+
+        Raises:
+            RecordingError: Fewer than two samples.
+        """
+        if len(self) < 2:
+            raise RecordingError(f"Run {self.name!r} has {len(self)} samples: no sample rate.")
+        return 1.0 / float(np.median(np.diff(self.time_s)))
+
+    def slice_time(self, start_s: float, stop_s: float) -> "Recording":
+        """Return the samples with start_s <= time < stop_s; columns are views, not copies."""
+        first, last = np.searchsorted(self.time_s, [start_s, stop_s], side="left")
+        part = slice(int(first), int(last))
+        return replace(
+            self,
+            time_s=self.time_s[part],
+            columns={name: values[part] for name, values in self.columns.items()},
+            flags=self.flags[part],
+            marks=tuple(m for m in self.marks if start_s <= m.time_s < stop_s),
+            stretches=tuple(
+                s for s in self.stretches if s.stop_s >= start_s and s.start_s < stop_s
+            ),
+        )
+
+    def with_columns(self, **columns: ArrayLike) -> "Recording":
+        """Return a recording with these columns added or replaced."""
+        added = {name: np.array(values, dtype=np.float64) for name, values in columns.items()}
+        return replace(self, columns={**self.columns, **added})
+
+    def with_stretch(self, stretch: Stretch) -> "Recording":
+        """Return a recording with one more flagged stretch, its samples flagged."""
+        inside = (self.time_s >= stretch.start_s) & (self.time_s <= stretch.stop_s)
+        flags = np.where(inside, self.flags | np.uint8(stretch.flag), self.flags)
+        return replace(self, flags=flags.astype(np.uint8), stretches=(*self.stretches, stretch))
+
+    def exclude(self, reason: str) -> "Recording":
+        """Return the recording marked as left out of evidence, with the reason."""
+        return replace(self, excluded=reason)

@@ -1,0 +1,90 @@
+"""The `rig` command: collects the verbs and turns errors into three lines and an exit code."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from rig import __version__
+
+app = typer.Typer(
+    name="rig",
+    help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help keeps the start instant
+    epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
+    "70 bug, 130 interrupted.",
+)
+
+
+USAGE_ERROR = typer.BadParameter.__mro__[2]
+"""The base of typer's own errors, which typer does not export by name."""
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rig {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    debug: Annotated[bool, typer.Option(help="Show the traceback of an error.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Take the options that stand before the verb; `main` reads them from the command line."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        arguments: Words after `rig`; the process' own when None.
+    """
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        result = app(args=words, standalone_mode=False)
+    except typer.Exit as stop:
+        return stop.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write("Interrupted.\n")
+        return 130
+    except Exception as error:
+        return _report(error, words)
+    return int(result) if isinstance(result, int) else 0
+
+
+def _report(error: Exception, words: list[str]) -> int:
+    """Write an error for people to stderr, for machines to stdout, and return its exit code."""
+    from rig.cli.output import emit_json
+    from rig.errors import KNOWN_ERRORS, exit_code_of
+
+    if isinstance(error, typer.Abort):
+        sys.stderr.write("Interrupted.\n")
+        return 130
+    if isinstance(error, USAGE_ERROR):
+        error.show(file=sys.stderr)
+        return error.exit_code
+    if "--debug" in words or not isinstance(error, KNOWN_ERRORS):
+        import traceback
+
+        traceback.print_exception(error)
+    code = exit_code_of(error)
+    what = getattr(error, "what", None) or f"{type(error).__name__}: {error}"
+    why, fix = getattr(error, "why", ""), getattr(error, "fix", "")
+    lines = [f"error: {what}"]
+    lines += [f"  why: {why}"] if why else []
+    lines += [f"  fix: {fix}"] if fix else []
+    sys.stderr.write("\n".join(lines) + "\n")
+    if "--json" in words:
+        emit_json({"error": {"what": what, "why": why, "fix": fix, "exit_code": int(code)}})
+    return code
+
+
+def run() -> None:
+    """Run the command line as the console script does: leave with its exit code."""
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""Errors of the application, and the exit code of every error of every room.
+
+Exit codes: 0 done, 1 the result is bad (a check failed), 2 usage or configuration, 3 device or
+link, 4 safety trip, 5 data damaged or unreadable, 70 a bug in rig, 130 interrupted.
+"""
+
+from enum import IntEnum
+
+from calibration.errors import CalibrationError
+from drivers.errors import DriverError
+from estimation.errors import EstimationError
+
+
+class ExitCode(IntEnum):
+    """Exit codes of the command line."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    DEVICE = 3
+    SAFETY = 4
+    DATA = 5
+    BUG = 70
+    INTERRUPTED = 130
+
+
+class RigError(Exception):
+    """Base of every error the application raises on purpose.
+
+    Attributes:
+        what: What happened, in one sentence.
+        why: The cause as far as it is known; may be empty.
+        fix: What to do or to type next; may be empty.
+    """
+
+    exit_code = ExitCode.FAILED
+
+    def __init__(self, what: str, why: str = "", fix: str = "") -> None:
+        self.what = what
+        self.why = why
+        self.fix = fix
+        super().__init__(" ".join(part for part in (what, why, fix) if part))
+
+
+class UsageError(RigError):
+    """The command line or the configuration asks for something that cannot be."""
+
+    exit_code = ExitCode.USAGE
+
+
+class DataError(RigError):
+    """A file is damaged, truncated or not what it claims to be."""
+
+    exit_code = ExitCode.DATA
+
+
+class SafetyTripError(RigError):
+    """A limit was crossed and the rig was brought to its safe state."""
+
+    exit_code = ExitCode.SAFETY
+
+
+ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
+    EstimationError: ExitCode.DATA,
+    CalibrationError: ExitCode.DATA,
+    DriverError: ExitCode.DEVICE,
+}
+"""Exit code of each other room's error base."""
+
+KNOWN_ERRORS: tuple[type[Exception], ...] = (RigError, *ROOM_EXIT_CODES)
+
+
+def exit_code_of(error: Exception) -> ExitCode:
+    """Return the documented exit code of an error raised on purpose."""
+    if isinstance(error, RigError):
+        return error.exit_code
+    for base, code in ROOM_EXIT_CODES.items():
+        if isinstance(error, base):
+            return code
+    return ExitCode.BUG

@@ -1,0 +1,69 @@
+"""Open recordings of any known format: a file, a folder or an archive becomes a campaign.
+
+An importer is an object in the entry point group `rig.importers`. It says whether a path looks like
+its format without reading the samples, and opens it as a campaign of run handles.
+"""
+
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from estimation.campaign import Campaign
+from rig.errors import DataError, UsageError
+
+
+@runtime_checkable
+class Importer(Protocol):
+    """What a format's importer offers."""
+
+    name: str
+    """Short name of the format, as typed on the command line."""
+
+    description: str
+    """One line on the format."""
+
+    def recognises(self, path: Path) -> bool:
+        """Say whether the path looks like this format, from names and first lines only."""
+
+    def open(self, path: Path) -> Campaign:
+        """Open a file, folder or archive as a campaign whose runs load when asked.
+
+        Raises:
+            DataError: The path is not of this format or damaged; names file, line and what was
+                expected.
+        """
+
+
+def importers() -> dict[str, Importer]:
+    """Return every installed importer by name; a third party adds one by entry point."""
+    return {entry.name: entry.load() for entry in sorted(entry_points(group="rig.importers"))}
+
+
+def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
+    """Open recordings of any known format.
+
+    Args:
+        path: File, folder or archive.
+        format_name: Importer to use; guessed from the path when None.
+
+    Raises:
+        UsageError: The path does not exist, or the format is not known.
+        DataError: No importer recognises the path, or the one that does finds damage.
+    """
+    if not path.exists():
+        raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
+    known = importers()
+    if format_name is not None:
+        if format_name not in known:
+            raise UsageError(
+                f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
+            )
+        return known[format_name].open(path)
+    for importer in known.values():
+        if importer.recognises(path):
+            return importer.open(path)
+    raise DataError(
+        f"No importer recognises {path}.",
+        f"Tried: {', '.join(known)}.",
+        "Name the format with --format if the file is one of these.",
+    )
