@@ -4,6 +4,7 @@ import sys
 from typing import Annotated
 
 import typer
+from typer.exceptions import TyperException
 
 from rig import __version__
 
@@ -17,10 +18,6 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
     "70 bug, 130 interrupted.",
 )
-
-
-USAGE_ERROR = typer.BadParameter.__mro__[2]
-"""The base of typer's own errors, which typer does not export by name."""
 
 
 def _version(wanted: bool) -> None:
@@ -61,14 +58,15 @@ def main(arguments: list[str] | None = None) -> int:
 def _report(error: Exception, words: list[str]) -> int:
     """Write an error for people to stderr, for machines to stdout, and return its exit code."""
     from rig.cli.output import emit_json
-    from rig.errors import KNOWN_ERRORS, exit_code_of
+    from rig.errors import KNOWN_ERRORS, ExitCode, exit_code_of
 
     if isinstance(error, typer.Abort):
         sys.stderr.write("Interrupted.\n")
         return 130
-    if isinstance(error, USAGE_ERROR):
-        error.show(file=sys.stderr)
-        return error.exit_code
+    if isinstance(error, TyperException):
+        # a word on the command line that typer itself refused
+        getattr(error, "show", lambda **_: None)(file=sys.stderr)
+        return int(ExitCode.USAGE)
     if "--debug" in words or not isinstance(error, KNOWN_ERRORS):
         import traceback
 
