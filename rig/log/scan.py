@@ -1,14 +1,14 @@
 """Walking the records of an MCAP file without unpacking its chunks, past any damage.
 
-A record is taken only if its body is consumed exactly by its own inner lengths. Where that fails, the
-walk looks for the next place where it succeeds, so one damaged length does not hide what follows.
+A record is taken only if its body is consumed exactly by its own inner lengths. Where that fails,
+the walk looks for the next place where it succeeds, so one damaged length does not hide the rest.
 """
 
 import struct
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -18,7 +18,6 @@ from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -35,12 +34,11 @@ from rig.log.container import MAGIC
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
 
-_READERS = {
+_READERS: dict[Opcode, Any] = {
     Opcode.HEADER: Header,
     Opcode.FOOTER: Footer,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
-    Opcode.CHUNK_INDEX: ChunkIndex,
     Opcode.ATTACHMENT: Attachment,
     Opcode.ATTACHMENT_INDEX: AttachmentIndex,
     Opcode.STATISTICS: Statistics,
@@ -81,6 +79,7 @@ class ChunkRef:
         unpacked_bytes: Size once unpacked.
         crc: CRC-32 of the unpacked bytes; 0 for none.
         torn: Whether the file ends inside it.
+        indexed: Channel to the number of its messages, as the index records behind it state.
     """
 
     offset: int
@@ -89,6 +88,15 @@ class ChunkRef:
     unpacked_bytes: int
     crc: int
     torn: bool = False
+    indexed: dict[int, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Indexed:
+    """What a message index states: how many messages of a channel the chunk before it holds."""
+
+    channel: int
+    messages: int
 
 
 @dataclass
@@ -105,10 +113,6 @@ class Skeleton:
     statistics: Statistics | None = None
     finished: bool = False
     damage: list[Damage] = field(default_factory=list)
-
-
-class _Record(Protocol):
-    """What `_parse` returns; the kinds are told apart by class."""
 
 
 def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
@@ -151,7 +155,7 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
     return skeleton
 
 
-def _parse(buffer: memoryview, start: int) -> tuple[_Record | None, int] | None:
+def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
     """Return the record at a place and where the next begins; None if there is no whole one."""
     if start + _HEAD.size > len(buffer):
         return None
@@ -164,14 +168,19 @@ def _parse(buffer: memoryview, start: int) -> tuple[_Record | None, int] | None:
         chunk = _parse_chunk(buffer, start)
         return (chunk, stop) if chunk is not None and chunk.data.stop == stop else None
     if opcode == Opcode.MESSAGE_INDEX:
-        # the chunk itself says where its messages are, so the index is not needed
-        whole = length >= 6 and struct.unpack_from("<I", buffer, first + 2)[0] == length - 6
-        return (None, stop) if whole and (length - 6) % 16 == 0 else None
+        if length < 6:
+            return None
+        channel, size = struct.unpack_from("<HI", buffer, first)
+        whole = size == length - 6 and size % 16 == 0
+        return (Indexed(channel, size // 16), stop) if whole else None
+    if opcode == Opcode.CHUNK_INDEX:
+        # the chunks were met already; the summary's checksum covers this
+        return (None, stop) if length >= 64 else None
     if opcode not in _READERS:
         return None
     stream = ReadDataStream(_View(buffer[first:stop]))  # type: ignore[arg-type]
     try:
-        record: _Record = _READERS[Opcode(opcode)].read(stream)
+        record = _READERS[Opcode(opcode)].read(stream)
     except (struct.error, UnicodeDecodeError, EndOfFile, ValueError, OverflowError):
         return None
     return (record, stop) if stream.count == length else None
@@ -246,7 +255,7 @@ def _is_hollow(buffer: memoryview, start: int) -> bool:
 
 def _take(
     skeleton: Skeleton,
-    record: _Record | None,
+    record: Any,
     position: int,
     buffer: memoryview,
     checksums: bool,
@@ -261,6 +270,8 @@ def _take(
             _keep(skeleton, skeleton.channels, record, position)
         case ChunkRef():
             skeleton.chunks.append(record)
+        case Indexed() if skeleton.chunks:
+            skeleton.chunks[-1].indexed[record.channel] = record.messages
         case Metadata():
             skeleton.metadata.append((record.name, record.metadata))
         case Attachment():
