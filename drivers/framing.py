@@ -1,7 +1,7 @@
 """Frames on a byte link: COBS, a CRC-16/CCITT-FALSE at the end, 0x00 between frames.
 
-A frame on the wire is `COBS(payload + CRC little-endian) + 0x00`. The delimiter never occurs inside a
-frame, so a reader that has lost its place discards up to the next 0x00 and is in step again.
+A frame on the wire is `COBS(payload + CRC little-endian) + 0x00`. The delimiter never occurs inside
+a frame, so a reader that has lost its place discards up to the next 0x00 and is in step again.
 
 Two ways in: one frame at a time (`encode_frame`, `decode_frame`) for commands and replies, and a
 compiled bulk path (`encode_frames`, `decode_frames`, `FrameStream`) for the stream of equal-sized
@@ -129,7 +129,7 @@ def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
 
     Args:
         data: Bytes as received, starting at a frame's start.
-        payload_size: Size of the frequent frames' payload, bytes, 1 to `MAX_BULK_PAYLOAD`.
+        payload_size: Size of the frequent frames' payload, bytes, 0 to `MAX_BULK_PAYLOAD`.
     """
     tables, start = _crc_tables(payload_size)
     stream = np.frombuffer(data, np.uint8)
@@ -197,12 +197,12 @@ class FrameStream:
 def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
     """Return the CRC's share of each byte value at each place, and the share of the start value.
 
-    The CRC is linear over GF(2): that of a message of fixed length is the XOR of what each byte adds
-    at its place. The look-ups do not wait for one another, as a byte-wise CRC's do. Shape
+    The CRC is linear over GF(2): that of a message of fixed length is the XOR of what each byte
+    adds at its place. The look-ups do not wait for one another, as a byte-wise CRC's do. Shape
     (payload_size, 256).
     """
-    if not 1 <= payload_size <= MAX_BULK_PAYLOAD:
-        raise ValueError(f"bulk payloads have 1 to {MAX_BULK_PAYLOAD} bytes, not {payload_size}")
+    if not 0 <= payload_size <= MAX_BULK_PAYLOAD:
+        raise ValueError(f"bulk payloads have 0 to {MAX_BULK_PAYLOAD} bytes, not {payload_size}")
     tables = np.empty((payload_size, 256), np.uint16)
     for place in range(payload_size):
         zeros_behind = bytes(payload_size - 1 - place)
@@ -257,7 +257,7 @@ def _holds_zero(data: NDArray[np.uint8], first: int, count: int) -> bool:
     zero = np.uint8(0)
     for offset in range(count):
         zero |= np.uint8(data[np.uintp(first + offset)] == 0)
-    return zero != 0
+    return bool(zero)
 
 
 @numba.njit(cache=True)
@@ -276,7 +276,7 @@ def _decode_row(
     low = data[first + payload_size + 1]
     high = data[first + payload_size + 2]
     wire = payload_size + 3
-    position = np.intp(data[first])
+    position = int(data[first])
     while position < wire:  # every later code byte stands where a zero was
         place = position - 1
         if place < payload_size:
@@ -285,13 +285,13 @@ def _decode_row(
             low = np.uint8(0)
         else:
             high = np.uint8(0)
-        position += np.intp(data[np.uintp(first + position)])
+        position += int(data[np.uintp(first + position)])
     if position != wire:
         return False
     crc = np.uint16(start)
     for place in range(payload_size):
         crc ^= tables[place, payloads[row, place]]
-    return crc == np.uint16(low) | (np.uint16(high) << np.uint16(8))
+    return bool(crc == np.uint16(low) | (np.uint16(high) << np.uint16(8)))
 
 
 @numba.njit(cache=True)

@@ -7,6 +7,7 @@ two steal each other's bytes.
 import errno
 import os
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
 
@@ -182,7 +183,7 @@ def _explain(url: str, name: str, error: Exception) -> LinkError:
     return LinkError(f"{url} cannot be opened.", str(error))
 
 
-def _present(ports: list[ListPortInfo]) -> str:
+def _present(ports: Sequence[ListPortInfo]) -> str:
     if not ports:
         return "No serial port is present."
     names = (

@@ -1,7 +1,7 @@
 """A board inside this process, in virtual time.
 
-Time passes only while someone reads: `read` advances the board. Nothing sleeps unless a pace is asked
-for, so a session is repeatable and as fast as the board computes.
+Time passes only while someone reads: `read` advances the board. Nothing sleeps unless a pace is
+asked for, so a session is repeatable and as fast as the board computes.
 
 Not modelled: the time bytes take on the wire, and a host that is late (see the faults of a board's
 own tests for lost and damaged bytes).

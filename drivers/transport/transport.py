@@ -65,8 +65,8 @@ def known_schemes() -> list[str]:
 def open_transport(url: str) -> Transport:
     """Open the transport a URL names.
 
-    `/dev/...`, `COM3`, `usb:VID:PID:SERIAL` and pyserial's own URLs (`socket://host:port`) are serial
-    ports; further schemes are added by `register_scheme`.
+    `/dev/...`, `COM3`, `usb:VID:PID:SERIAL` and pyserial's own URLs (`socket://host:port`) are
+    serial ports; further schemes are added by `register_scheme`.
 
     Raises:
         UnknownSchemeError: No opener for the URL's scheme.
