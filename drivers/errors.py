@@ -15,3 +15,55 @@ class DriverError(Exception):
         self.why = why
         self.fix = fix
         super().__init__(" ".join(part for part in (what, why, fix) if part))
+
+
+class FrameError(DriverError):
+    """Bytes between two delimiters are not a frame."""
+
+
+class LinkError(DriverError):
+    """Base of what can be wrong with the way to a device."""
+
+
+class LinkLostError(LinkError):
+    """The link was open and is gone: unplugged, closed at the other end, or taken away."""
+
+
+class LinkTimeoutError(LinkError):
+    """The device did not answer, or did not take bytes, in time."""
+
+
+class PortNotFoundError(LinkError):
+    """No such port, or no device with that USB identity."""
+
+
+class PortBusyError(LinkError):
+    """Another program holds the port."""
+
+
+class PortPermissionError(LinkError):
+    """The user may not open the port."""
+
+
+class UnknownSchemeError(LinkError):
+    """No transport is registered for the scheme of a URL."""
+
+
+class ProtocolMismatchError(DriverError):
+    """The board's firmware and this program speak different protocols."""
+
+
+class CommandRefusedError(DriverError):
+    """The board understood a command and refused it.
+
+    Attributes:
+        result: The board's reason, a `drivers.teensy.protocol.Result`.
+    """
+
+    def __init__(self, what: str, why: str = "", fix: str = "", result: int = 0) -> None:
+        self.result = result
+        super().__init__(what, why, fix)
+
+
+class DisarmUnconfirmedError(DriverError):
+    """The board was told to disarm and has not said that it did: its state is unknown."""

@@ -85,12 +85,14 @@ class SimulationSection(_Section):
         seed: Seed of noise, offsets and drift.
         spread: Relative spread of the plant's parameters drawn by the seed.
         hidden: Hidden effect to strength; effects that no declared model is told of.
+        draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
         firmware: Put the compiled firmware core in the loop where it is built.
     """
 
     seed: int = 0
     spread: float = Field(default=0.0, ge=0, lt=0.5)
     hidden: dict[str, Number] = Field(default_factory=dict)
+    draw_hidden: int | None = None
     firmware: bool = True
 
 
@@ -106,11 +108,20 @@ class Config(_Section):
     simulation: SimulationSection = SimulationSection()
     calibration: str = "reference"
     lever_arm_m: Positive = 0.012
+    model: str | None = None
 
     @property
     def is_simulated(self) -> bool:
         """Whether the logger is the simulated one."""
         return self.logger.url.startswith("sim:")
+
+    @property
+    def model_path(self) -> Path | None:
+        """The fitted model `rig live` estimates with: a file, or a shipped one by name."""
+        if self.model is None:
+            return None
+        path = Path(self.model)
+        return path if path.suffix == ".toml" else SHIPPED / f"{self.model}.model.toml"
 
     def calibration_set(self) -> CalibrationSet:
         """Return the calibrations in use: a TOML file's, or a shipped set's by name."""

@@ -8,7 +8,7 @@ first, and the disarming is confirmed by the logger itself.
 import signal
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
+from calibration.zero import SensorZero, measure_zeros
 from drivers.errors import DriverError
-from drivers.teensy import protocol as frames
-from drivers.teensy.driver import Identity, SampleBatch, TeensyLogger
+from drivers.teensy.driver import SampleBatch, TeensyLogger
+from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Limits, Status
 from drivers.transport.transport import Transport
 from estimation.recording import Flag
 from rig.config import Config
@@ -27,8 +28,7 @@ from rig.errors import RigError, SafetyTripError
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
 
-BLOCK = 64
-"""Setpoints sent in one frame."""
+TICKS_A_SECOND = 1_000_000 // TICK_US
 
 READ_TIMEOUT_S = 0.05
 
@@ -50,6 +50,7 @@ class Reading:
         time_s: Device clock since the session's first sample, s, shape (n,).
         columns: SI channels, closing-positive, each of shape (n,).
         flags: `Flag` bits, shape (n,).
+        setpoint: Index of the setpoint played in each sample, -1 where none was, shape (n,).
         lost: Samples lost since the session began.
     """
 
@@ -58,7 +59,28 @@ class Reading:
     time_s: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.float64]]
     flags: NDArray[np.uint8]
+    setpoint: NDArray[np.int64]
     lost: int
+
+    @property
+    def armed(self) -> bool:
+        """Whether the logger was armed in the newest sample."""
+        return bool(_has(self.counts["status"], Status.ARMED)[-1])
+
+    def __len__(self) -> int:
+        return int(self.time_s.size)
+
+    def where(self, keep: NDArray[np.bool_]) -> "Reading":
+        """Return the samples a mask keeps."""
+        return Reading(
+            self.counts[keep],
+            self.tick_us[keep],
+            self.time_s[keep],
+            {name: values[keep] for name, values in self.columns.items()},
+            self.flags[keep],
+            self.setpoint[keep],
+            self.lost,
+        )
 
 
 class Session:
@@ -77,6 +99,7 @@ class Session:
         self._transport = transport
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
+        self._spindle_angle_rad = 0.0
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
@@ -101,6 +124,11 @@ class Session:
         """The link's counters: frames, CRC errors, gaps, lost samples, discarded bytes, retries."""
         return self._logger.counters.as_dict()
 
+    @property
+    def spindle_angle_rad(self) -> float:
+        """Where the spindle stood in the newest sample, rad."""
+        return self._spindle_angle_rad
+
     def safe(self) -> None:
         """Disarm: command 0, load 0, confirmed by the logger.
 
@@ -112,11 +140,22 @@ class Session:
     def rest(self, duration_s: float) -> Iterator[Reading]:
         """Read the disarmed rig for a while."""
         self.safe()
-        remaining = round(duration_s * frames.SAMPLE_RATE_HZ)
+        remaining = round(duration_s * TICKS_A_SECOND)
         while remaining > 0:
             reading = self._read()
             remaining -= len(reading.time_s)
             yield reading
+
+    def take_zeros(self, duration_s: float) -> dict[str, SensorZero]:
+        """Measure the zeros of the disarmed rig and use them from now on.
+
+        Raises:
+            CalibrationError: Too few samples came.
+        """
+        counts = np.concatenate([reading.counts for reading in self.rest(duration_s)])
+        zeros = measure_zeros(counts, self.calibrations)
+        self.zeros = {name: zero.mean_counts for name, zero in zeros.items()}
+        return zeros
 
     def watch(self) -> Iterator[Reading]:
         """Read the rig as it is, without arming or moving it, until the caller stops."""
@@ -126,7 +165,7 @@ class Session:
     def play(
         self, target_angle_rad: NDArray[np.float64], load_command_a: NDArray[np.float64]
     ) -> Iterator[Reading]:
-        """Arm the rig and play a trajectory; readings begin with the first setpoint played.
+        """Arm the rig and play a trajectory; each sample says which setpoint it played.
 
         Args:
             target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
@@ -139,26 +178,19 @@ class Session:
         targets = self._to_counts("target_angle_rad", target_angle_rad)
         loads_ma = self._to_counts("load_command_a", load_command_a)
         self._check_setpoints(target_angle_rad, load_command_a)
-        lead = round(LEAD_S * frames.SAMPLE_RATE_HZ)
+        lead = round(LEAD_S * TICKS_A_SECOND)
         self._logger.arm(self.config.controller.gains(), self._board_limits())
         queued = played = 0
         while played < targets.size:
             while queued < min(played + lead, targets.size):
-                block = slice(queued, min(queued + BLOCK, targets.size))
+                block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
                 self._logger.queue(targets[block], loads_ma[block])
                 queued = block.stop
             reading = self._read()
             self._check_board(reading)
-            playing = (reading.counts["status"] & frames.STATUS_QUEUE_DRY) == 0
-            if played == 0:
-                reading = _from(reading, int(np.argmax(playing)) if playing.any() else len(playing))
-                playing = playing[len(playing) - len(reading.time_s) :]
-            left = targets.size - played
-            ends = np.searchsorted(np.cumsum(playing), left)
-            reading = _until(reading, int(ends) + 1)
-            played += int(np.sum(playing[: len(reading.time_s)]))
-            if len(reading.time_s):
-                yield reading
+            reading = _number(reading, played)
+            played = max(played, int(reading.setpoint.max()) + 1)
+            yield reading
 
     def _read(self) -> Reading:
         give_up_s = self._transport.now_s + STALL_S
@@ -173,6 +205,7 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         reading = self._convert(batch)
+        self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
         self._check_limits(reading)
         return reading
 
@@ -181,17 +214,16 @@ class Session:
             self._first_tick_us = int(batch.tick_us[0])
         status = batch.samples["status"]
         flags = np.zeros(len(status), np.uint8)
-        flags[(status & frames.STATUS_SATURATED) != 0] |= Flag.SATURATED
-        tripped = frames.STATUS_WATCHDOG_TRIPPED | frames.STATUS_LIMIT_TRIPPED
-        flags[(status & tripped) != 0] |= Flag.SUSPECT
-        armed = (status & frames.STATUS_ARMED) != 0
-        flags[armed & ((status & frames.STATUS_QUEUE_DRY) != 0)] |= Flag.STALE
+        flags[_has(status, Status.SATURATED)] |= Flag.SATURATED
+        flags[_has(status, Status.WATCHDOG | Status.LIMIT)] |= Flag.SUSPECT
+        flags[_has(status, Status.ARMED) & _has(status, Status.QUEUE_DRY)] |= Flag.STALE
         return Reading(
             batch.samples,
             batch.tick_us,
             (batch.tick_us - self._first_tick_us) * 1e-6,
             self.calibrations.apply(batch.samples, self.zeros),
             flags,
+            np.full(len(flags), -1),
             batch.lost,
         )
 
@@ -199,13 +231,24 @@ class Session:
         line = self.calibrations.channels[channel]
         return np.round(values / line.slope + line.zero_counts).astype(np.int32)
 
-    def _board_limits(self) -> dict[str, int]:
+    def _board_limits(self) -> Limits:
         """Return the limits the board checks itself, in its own counts."""
-        lines, limits = self.calibrations.channels, self.config.limits
-        return {
-            lines[name].counts: int(abs(getattr(limits, name) / lines[name].slope))
-            for name in ("proximal_torque_n_m", "distal_torque_n_m", "motor_current_a")
-        }
+        limits = self.config.limits
+        low, high = sorted(
+            self._to_counts("spindle_angle_rad", np.array([-1.0, 1.0]) * limits.spindle_angle_rad)
+        )
+        return Limits(
+            max_current=self._size("motor_current_a", limits.motor_current_a),
+            max_load_ma=self._size("load_command_a", limits.load_command_a),
+            max_proximal=self._size("proximal_torque_n_m", limits.proximal_torque_n_m),
+            max_distal=self._size("distal_torque_n_m", limits.distal_torque_n_m),
+            min_spindle=int(low),
+            max_spindle=int(high),
+        )
+
+    def _size(self, channel: str, value: float) -> int:
+        """Return a size in SI as counts, zeros left aside."""
+        return round(abs(value / self.calibrations.channels[channel].slope))
 
     def _check_setpoints(
         self, target_angle_rad: NDArray[np.float64], load_command_a: NDArray[np.float64]
@@ -240,9 +283,9 @@ class Session:
     def _check_board(self, reading: Reading) -> None:
         status = int(np.bitwise_or.reduce(reading.counts["status"]))
         for bit, what, why in (
-            (frames.STATUS_LIMIT_TRIPPED, "The logger tripped one of its own limits.", ""),
+            (Status.LIMIT, "The logger tripped one of its own limits.", ""),
             (
-                frames.STATUS_WATCHDOG_TRIPPED,
+                Status.WATCHDOG,
                 "The logger's watchdog tripped.",
                 "It heard nothing from this computer for 250 ms while armed.",
             ),
@@ -263,23 +306,21 @@ class Session:
             self._logger.stop()
 
 
-def _until(reading: Reading, stop: int) -> Reading:
-    return _cut(reading, slice(None, stop))
+def _has(status: NDArray[np.uint16], bits: Status) -> NDArray[np.bool_]:
+    return np.not_equal(status & np.uint16(bits), 0)
 
 
-def _from(reading: Reading, start: int) -> Reading:
-    return _cut(reading, slice(start, None))
+def _number(reading: Reading, played: int) -> Reading:
+    """Number the setpoints of a reading, `played` being the first one not played yet.
 
-
-def _cut(reading: Reading, part: slice) -> Reading:
-    return Reading(
-        reading.counts[part],
-        reading.tick_us[part],
-        reading.time_s[part],
-        {name: values[part] for name, values in reading.columns.items()},
-        reading.flags[part],
-        reading.lost,
-    )
+    The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
+    are taken to have played theirs: the sequence numbers say how many there were.
+    """
+    dry = _has(reading.counts["status"], Status.QUEUE_DRY)
+    step = np.diff(reading.counts["sequence"].astype(np.int64), prepend=0)
+    step[0] = 1
+    setpoint = played - 1 + np.cumsum(np.where(dry, 0, step))
+    return replace(reading, setpoint=np.where(dry, -1, setpoint))
 
 
 @contextmanager

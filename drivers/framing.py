@@ -1,0 +1,319 @@
+"""Frames on a byte link: COBS, a CRC-16/CCITT-FALSE at the end, 0x00 between frames.
+
+A frame on the wire is `COBS(payload + CRC little-endian) + 0x00`. The delimiter never occurs inside
+a frame, so a reader that has lost its place discards up to the next 0x00 and is in step again.
+
+Two ways in: one frame at a time (`encode_frame`, `decode_frame`) for commands and replies, and a
+compiled bulk path (`encode_frames`, `decode_frames`, `FrameStream`) for the stream of equal-sized
+sample frames.
+
+Source: S. Cheshire and M. Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on
+Networking 7(2), 1999. CRC: polynomial 0x1021, start 0xFFFF, not reflected, no final XOR
+(check value of "123456789": 0x29B1).
+"""
+
+from binascii import crc_hqx
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import FrameError
+
+DELIMITER = b"\x00"
+CRC_START = 0xFFFF
+CRC_SIZE = 2
+MAX_BLOCK = 254
+"""Most bytes COBS carries behind one code byte."""
+MAX_PAYLOAD = 1024
+"""Longest payload a board takes or sends; longer frames are noise."""
+MAX_BULK_PAYLOAD = MAX_BLOCK - CRC_SIZE
+"""Longest payload of the bulk path: one code byte of overhead, whatever the content."""
+MAX_WIRE = MAX_PAYLOAD + CRC_SIZE + (MAX_PAYLOAD + CRC_SIZE) // MAX_BLOCK + 1
+"""Longest frame on the wire, without its delimiter."""
+
+
+def crc16(data: bytes) -> int:
+    """Return the CRC-16/CCITT-FALSE of `data`."""
+    return crc_hqx(data, CRC_START)
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Return `data` stuffed so that it holds no zero byte, without a delimiter."""
+    encoded = bytearray()
+    runs = data.split(b"\x00")
+    last = len(runs) - 1
+    for index, run in enumerate(runs):
+        start = 0
+        while len(run) - start > MAX_BLOCK:
+            encoded.append(MAX_BLOCK + 1)
+            encoded += run[start : start + MAX_BLOCK]
+            start += MAX_BLOCK
+        rest = run[start:]
+        if len(rest) == MAX_BLOCK:
+            encoded.append(MAX_BLOCK + 1)
+            encoded += rest
+            if index == last:  # a full block implies no zero, so nothing need follow it
+                break
+            rest = b""
+        encoded.append(len(rest) + 1)
+        encoded += rest
+    return bytes(encoded)
+
+
+def cobs_decode(encoded: bytes) -> bytes:
+    """Return the bytes that `cobs_encode` stuffed.
+
+    Raises:
+        FrameError: A zero byte inside, or a block that runs past the end.
+    """
+    if 0 in encoded:
+        raise FrameError("The frame holds a zero byte.", "Bytes were lost or changed on the link.")
+    data = bytearray()
+    position = 0
+    while position < len(encoded):
+        code = encoded[position]
+        following = position + code
+        if following > len(encoded):
+            raise FrameError("The frame ends early.", "Bytes were lost or changed on the link.")
+        data += encoded[position + 1 : following]
+        if code <= MAX_BLOCK and following < len(encoded):
+            data.append(0)
+        position = following
+    return bytes(data)
+
+
+def encode_frame(payload: bytes) -> bytes:
+    """Return one frame as it goes on the wire, delimiter included."""
+    return cobs_encode(payload + crc16(payload).to_bytes(CRC_SIZE, "little")) + DELIMITER
+
+
+def decode_frame(encoded: bytes) -> bytes:
+    """Return the payload of one frame, given without its delimiter.
+
+    Raises:
+        FrameError: Not COBS, too short to hold a CRC, or the CRC does not fit.
+    """
+    body = cobs_decode(encoded)
+    if len(body) < CRC_SIZE:
+        raise FrameError("The frame is too short to hold a CRC.")
+    payload, expected = body[:-CRC_SIZE], int.from_bytes(body[-CRC_SIZE:], "little")
+    if crc16(payload) != expected:
+        raise FrameError("The CRC of a frame does not fit.", "Bytes changed on the link.")
+    return payload
+
+
+@dataclass(frozen=True, slots=True)
+class DecodedFrames:
+    """What a stretch of a byte stream held.
+
+    Attributes:
+        payloads: Good frames of the expected size, shape (n, payload_size), uint8, in order.
+        others: Payloads of good frames of any other size, in order.
+        bad: Frames dropped: not COBS, wrong CRC, or too long.
+        bad_bytes: Bytes in those frames, delimiters included.
+        tail: Bytes behind the last delimiter: the start of the next frame.
+    """
+
+    payloads: NDArray[np.uint8]
+    others: list[bytes]
+    bad: int
+    bad_bytes: int
+    tail: bytes
+
+
+def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
+    """Decode every whole frame in `data`, those of `payload_size` bytes by compiled code.
+
+    Args:
+        data: Bytes as received, starting at a frame's start.
+        payload_size: Size of the frequent frames' payload, bytes, 0 to `MAX_BULK_PAYLOAD`.
+    """
+    tables, start = _crc_tables(payload_size)
+    stream = np.frombuffer(data, np.uint8)
+    room = len(data) // (payload_size + CRC_SIZE + 2)
+    payloads = np.empty((room, payload_size), np.uint8)
+    spans = np.empty((len(data) // 2, 2), np.int64)
+    good, bad, bad_bytes, found, consumed = _decode(
+        stream, tables, start, MAX_WIRE, payloads, spans
+    )
+    others = []
+    for first, end in spans[:found].tolist():
+        try:
+            others.append(decode_frame(data[first:end]))
+        except FrameError:
+            bad += 1
+            bad_bytes += end - first + 1
+    return DecodedFrames(payloads[:good], others, bad, bad_bytes, data[consumed:])
+
+
+def encode_frames(payloads: NDArray[np.uint8]) -> bytes:
+    """Encode equal-sized payloads, shape (n, payload_size), as one run of frames."""
+    tables, start = _crc_tables(payloads.shape[1])
+    wire = np.empty((len(payloads), payloads.shape[1] + CRC_SIZE + 2), np.uint8)
+    _encode(np.ascontiguousarray(payloads), tables, start, wire)
+    return wire.tobytes()
+
+
+class FrameStream:
+    """Decodes a byte stream that arrives in pieces, however it is cut.
+
+    Args:
+        payload_size: Size of the frequent frames' payload, bytes.
+    """
+
+    def __init__(self, payload_size: int) -> None:
+        self._payload_size = payload_size
+        self._tail = b""
+        self._overlong_bytes = 0
+
+    def feed(self, data: bytes) -> DecodedFrames:
+        """Take the next bytes and return the frames they complete; `tail` stays inside."""
+        bad = bad_bytes = 0
+        if self._overlong_bytes:
+            end = data.find(DELIMITER)
+            if end < 0:
+                self._overlong_bytes += len(data)
+                return self._nothing(0, 0)
+            bad, bad_bytes = 1, self._overlong_bytes + end + 1
+            self._overlong_bytes = 0
+            data = data[end + 1 :]
+        frames = decode_frames(self._tail + data, self._payload_size)
+        self._tail = frames.tail
+        if len(self._tail) > MAX_WIRE:
+            self._overlong_bytes = len(self._tail)
+            self._tail = b""
+        return DecodedFrames(
+            frames.payloads, frames.others, frames.bad + bad, frames.bad_bytes + bad_bytes, b""
+        )
+
+    def _nothing(self, bad: int, bad_bytes: int) -> DecodedFrames:
+        return DecodedFrames(np.empty((0, self._payload_size), np.uint8), [], bad, bad_bytes, b"")
+
+
+@lru_cache
+def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
+    """Return the CRC's share of each byte value at each place, and the share of the start value.
+
+    The CRC is linear over GF(2): that of a message of fixed length is the XOR of what each byte
+    adds at its place. The look-ups do not wait for one another, as a byte-wise CRC's do. Shape
+    (payload_size, 256).
+    """
+    if not 0 <= payload_size <= MAX_BULK_PAYLOAD:
+        raise ValueError(f"bulk payloads have 0 to {MAX_BULK_PAYLOAD} bytes, not {payload_size}")
+    tables = np.empty((payload_size, 256), np.uint16)
+    for place in range(payload_size):
+        zeros_behind = bytes(payload_size - 1 - place)
+        tables[place] = [crc_hqx(bytes([value]) + zeros_behind, 0) for value in range(256)]
+    return tables, crc_hqx(bytes(payload_size), CRC_START)
+
+
+# The loops below index rather than slice: an array slice costs these kernels more than the copy.
+
+
+@numba.njit(cache=True)
+def _decode(
+    data: NDArray[np.uint8],
+    tables: NDArray[np.uint16],
+    start: int,
+    max_wire: int,
+    payloads: NDArray[np.uint8],
+    spans: NDArray[np.int64],
+) -> tuple[int, int, int, int, int]:
+    """Fill `payloads` and the spans of other frames; return counts and the bytes consumed."""
+    size = data.size
+    wire = tables.shape[0] + 3  # code byte, payload, CRC
+    position = good = bad = bad_bytes = found = 0
+    while position < size:
+        end = position + wire
+        if end >= size or data[end] != 0 or _holds_zero(data, position, wire):
+            end = position
+            while end < size and data[end] != 0:
+                end += 1
+            if end == size:
+                break
+        length = end - position
+        if length == wire:
+            if _decode_row(data, position, tables, start, payloads, good):
+                good += 1
+            else:
+                bad += 1
+                bad_bytes += length + 1
+        elif length > max_wire:
+            bad += 1
+            bad_bytes += length + 1
+        elif length > 0:  # two delimiters in a row are a legal idle
+            spans[found, 0] = position
+            spans[found, 1] = end
+            found += 1
+        position = end + 1
+    return good, bad, bad_bytes, found, position
+
+
+@numba.njit(cache=True)
+def _holds_zero(data: NDArray[np.uint8], first: int, count: int) -> bool:
+    zero = np.uint8(0)
+    for offset in range(count):
+        zero |= np.uint8(data[np.uintp(first + offset)] == 0)
+    return bool(zero)
+
+
+@numba.njit(cache=True)
+def _decode_row(
+    data: NDArray[np.uint8],
+    first: int,
+    tables: NDArray[np.uint16],
+    start: int,
+    payloads: NDArray[np.uint8],
+    row: int,
+) -> bool:
+    """Decode the frame at `first` into `payloads[row]`; False when its COBS or its CRC is wrong."""
+    payload_size = payloads.shape[1]
+    for place in range(payload_size):
+        payloads[row, place] = data[np.uintp(first + 1 + place)]
+    low = data[first + payload_size + 1]
+    high = data[first + payload_size + 2]
+    wire = payload_size + 3
+    position = int(data[first])
+    while position < wire:  # every later code byte stands where a zero was
+        place = position - 1
+        if place < payload_size:
+            payloads[row, place] = 0
+        elif place == payload_size:
+            low = np.uint8(0)
+        else:
+            high = np.uint8(0)
+        position += int(data[np.uintp(first + position)])
+    if position != wire:
+        return False
+    crc = np.uint16(start)
+    for place in range(payload_size):
+        crc ^= tables[place, payloads[row, place]]
+    return bool(crc == np.uint16(low) | (np.uint16(high) << np.uint16(8)))
+
+
+@numba.njit(cache=True)
+def _encode(
+    payloads: NDArray[np.uint8],
+    tables: NDArray[np.uint16],
+    start: int,
+    wire: NDArray[np.uint8],
+) -> None:
+    """Fill `wire`, shape (n, payload_size + 4), with one frame a row."""
+    payload_size = payloads.shape[1]
+    for row in range(payloads.shape[0]):
+        crc = np.uint16(start)
+        for place in range(payload_size):
+            crc ^= tables[place, payloads[row, place]]
+            wire[row, place + 1] = payloads[row, place]
+        wire[row, payload_size + 1] = np.uint8(crc & np.uint16(0xFF))
+        wire[row, payload_size + 2] = np.uint8(crc >> np.uint16(8))
+        wire[row, payload_size + 3] = 0
+        following = payload_size + 3
+        for place in range(payload_size + 2, 0, -1):
+            if wire[row, place] == 0:
+                wire[row, place] = np.uint8(following - place)
+                following = place
+        wire[row, 0] = np.uint8(following)

@@ -1,0 +1,145 @@
+"""Frames over a transport: the one place where frames are counted and commands retried."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import LinkTimeoutError
+from drivers.framing import DELIMITER, FrameStream, encode_frame
+from drivers.transport.transport import Transport
+
+TRIES = 3
+REPLY_TIMEOUT_S = 0.1
+"""Time for one answer. A full queue of a USB port is emptied in a fraction of it."""
+
+
+@dataclass(slots=True)
+class LinkCounters:
+    """What happened on a link since it was opened.
+
+    Attributes:
+        frames: Good frames received.
+        crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
+        discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
+        unknown_frames: Good frames of a kind or version that nobody expected.
+        gaps: Places where samples are missing.
+        lost: Samples missing in those places.
+        duplicates: Samples dropped because they had come before.
+        retries: Commands sent again because no answer came.
+    """
+
+    frames: int = 0
+    crc_errors: int = 0
+    discarded_bytes: int = 0
+    unknown_frames: int = 0
+    gaps: int = 0
+    lost: int = 0
+    duplicates: int = 0
+    retries: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """Return the counters by name."""
+        return asdict(self)
+
+
+class FramedLink:
+    """Frames to and from one device.
+
+    Frames of `payload_size` are the device's stream and wait in bulk; all others wait one by one.
+
+    Args:
+        transport: The way to the device.
+        payload_size: Size of a stream frame's payload, bytes.
+    """
+
+    def __init__(self, transport: Transport, payload_size: int) -> None:
+        self.transport = transport
+        self.counters = LinkCounters()
+        self._payload_size = payload_size
+        self._stream = FrameStream(payload_size)
+        self._in_step = False
+        self._bulk: list[NDArray[np.uint8]] = []
+        self._others: deque[bytes] = deque()
+
+    def poll(self, timeout_s: float) -> bool:
+        """Take in what the device sent, waiting at most `timeout_s`; return whether bytes came."""
+        data = self.transport.read(timeout_s)
+        if not data:
+            return False
+        frames = self._stream.feed(data)
+        good = len(frames.payloads) + len(frames.others)
+        bad = frames.bad
+        if not self._in_step and good + bad:
+            self._in_step = True
+            bad -= min(bad, 1)  # the first frame may have begun before anyone listened
+        self.counters.frames += good
+        self.counters.crc_errors += bad
+        self.counters.discarded_bytes += frames.bad_bytes
+        if len(frames.payloads):
+            self._bulk.append(frames.payloads)
+        self._others.extend(frames.others)
+        return True
+
+    @property
+    def stream_waits(self) -> bool:
+        """Whether stream frames have been received and not been taken."""
+        return bool(self._bulk)
+
+    def take_stream(self) -> NDArray[np.uint8]:
+        """Return the stream frames received since the last call, shape (n, payload_size)."""
+        if len(self._bulk) == 1:
+            return self._bulk.pop()
+        taken, self._bulk = self._bulk, []
+        if not taken:
+            return np.empty((0, self._payload_size), np.uint8)
+        return np.concatenate(taken)
+
+    def take_others(self) -> list[bytes]:
+        """Return the other frames' payloads received since the last call."""
+        taken = list(self._others)
+        self._others.clear()
+        return taken
+
+    def send(self, payload: bytes) -> None:
+        """Send one frame and wait for nothing."""
+        self.transport.write(encode_frame(payload))
+
+    def break_frame(self) -> None:
+        """End whatever half frame the device may still hold from an earlier program."""
+        self.transport.write(DELIMITER)
+
+    def request(self, payload: bytes, answers: Callable[[bytes], bool]) -> bytes:
+        """Send a frame until another that `answers` accepts comes back; others stay waiting.
+
+        Raises:
+            LinkTimeoutError: No answer to `TRIES` frames in `REPLY_TIMEOUT_S` each.
+            LinkLostError: The link is gone.
+        """
+        for attempt in range(TRIES):
+            if attempt:
+                self.counters.retries += 1
+            self.send(payload)
+            give_up_s = self.transport.now_s + REPLY_TIMEOUT_S
+            while True:
+                answer = self._take_first(answers)
+                if answer is not None:
+                    return answer
+                remaining_s = give_up_s - self.transport.now_s
+                if remaining_s <= 0:
+                    break
+                self.poll(remaining_s)
+        raise LinkTimeoutError(
+            f"The device at {self.transport.url} does not answer.",
+            f"{TRIES} commands had {REPLY_TIMEOUT_S:g} s each.",
+            "Check that it is powered and runs the rig's firmware.",
+        )
+
+    def _take_first(self, answers: Callable[[bytes], bool]) -> bytes | None:
+        for index, payload in enumerate(self._others):
+            if answers(payload):
+                del self._others[index]
+                return payload
+        return None

@@ -1,0 +1,350 @@
+"""The driver of the Teensy logger: the same for the board on the bench and for its fakes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import (
+    CommandRefusedError,
+    DisarmUnconfirmedError,
+    DriverError,
+    FrameError,
+    ProtocolMismatchError,
+)
+from drivers.link import FramedLink, LinkCounters
+from drivers.teensy import protocol
+from drivers.teensy.continuity import Continuity
+from drivers.teensy.protocol import SAMPLE_DTYPE, Ack, Identity, Kind, Limits, Result
+from drivers.transport.transport import Transport
+
+_REASONS: dict[int, tuple[str, str]] = {
+    Result.UNKNOWN_KIND: ("It does not know the command.", "Flash the matching firmware."),
+    Result.WRONG_SIZE: ("The command has the wrong size.", "Flash the matching firmware."),
+    Result.WRONG_VERSION: ("It speaks another frame version.", "Flash the matching firmware."),
+    Result.BAD_VALUE: (
+        "A value is not finite, out of its range, or beyond the limits it was armed with.",
+        "Check gains, limits and setpoints.",
+    ),
+    Result.QUEUE_FULL: (
+        f"Its queue holds {protocol.QUEUE_CAPACITY} setpoints and is full.",
+        "Read samples, then queue on.",
+    ),
+    Result.NOT_ARMED: (
+        "It is not armed: it never was, was disarmed, or its watchdog or a limit tripped.",
+        "Look at the status of its samples, then arm it.",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampleBatch:
+    """Samples in device order.
+
+    Attributes:
+        samples: `SAMPLE_DTYPE`, shape (n,); raw counts.
+        tick_us: Device clock without its wrap, microseconds since its last zero, shape (n,), int64.
+        lost: Samples lost since `start`, up to the end of this batch. None is made up for.
+    """
+
+    samples: NDArray[np.void]
+    tick_us: NDArray[np.int64]
+    lost: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClockExchange:
+    """One look at the board's clock.
+
+    Attributes:
+        sent_s: Host clock when the ping left.
+        received_s: Host clock when the pong was read.
+        tick_us: Board clock in between, modulo 2^32.
+    """
+
+    sent_s: float
+    received_s: float
+    tick_us: int
+
+
+class TeensyLogger:
+    """The logger on the other end of a transport. Nothing runs in the background.
+
+    While armed, the board wants to hear something every 250 ms: a block of setpoints or a
+    `heartbeat`; otherwise it makes itself safe.
+
+    Args:
+        transport: The way to the board; the logger closes it.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self._link = FramedLink(transport, SAMPLE_DTYPE.itemsize)
+        self._continuity = Continuity(self._link.counters)
+        self._identity: Identity | None = None
+        self._command_number = 0
+        self._may_be_armed = False
+        self._pings: dict[int, float] = {}
+        self.last_exchange: ClockExchange | None = None
+        self.queue_free = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def counters(self) -> LinkCounters:
+        """What happened on the link."""
+        return self._link.counters
+
+    def identify(self) -> Identity:
+        """Ask who is there and whether it speaks this program's protocol.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            ProtocolMismatchError: It speaks another protocol; names both.
+        """
+        self._link.break_frame()
+        hello = protocol.encode_command(Kind.HELLO, self._number())
+        try:
+            identity = protocol.decode_identity(self._request(Kind.HELLO_REPLY, hello))
+        except FrameError as error:
+            raise self._mismatch("a protocol of another layout", str(error)) from error
+        if identity.protocol_hash != protocol.PROTOCOL_HASH:
+            raise self._mismatch(
+                f"protocol {identity.protocol_hash:08x}",
+                f"The board {identity.serial} has firmware {identity.firmware_version},"
+                f" this program goes with"
+                f" {protocol.version_text(protocol.FIRMWARE_VERSION)}.",
+            )
+        self._identity = identity
+        return identity
+
+    def arm(self, gains: Sequence[float] | NDArray[np.float64], limits: Limits) -> None:
+        """Put the controller in force. The motor stays currentless until the first setpoint.
+
+        Clears the queue, the watchdog's and the limits' latches.
+
+        Args:
+            gains: `drivers.teensy.control`'s gains, shape (5,).
+            limits: What the board holds against every sample.
+
+        Raises:
+            CommandRefusedError: A gain or a limit is not finite or out of range.
+        """
+        self._require_identity()
+        values = np.asarray(gains, np.float64)
+        if values.shape != (len(protocol.GAIN_NAMES),):
+            raise DriverError(f"The controller has 5 gains, not {values.shape}.")
+        self._may_be_armed = True
+        self._command(Kind.ARM, protocol.encode_arm(self._number(), values, limits))
+
+    def start(self) -> None:
+        """Start the stream of samples; their sequence numbers begin at 0."""
+        self._require_identity()
+        self.stop()  # what an earlier program left running
+        self._link.take_stream()
+        self._continuity.restart()
+        self._simple(Kind.START)
+
+    def stop(self) -> None:
+        """Stop the stream of samples; those already sent can still be read."""
+        self._simple(Kind.STOP)
+
+    def queue(self, targets: NDArray[np.integer], loads_ma: NDArray[np.integer]) -> int:
+        """Queue setpoints behind those the board has; it plays one a tick and holds the last.
+
+        Args:
+            targets: Spindle targets, encoder counts, shape (n,), whole numbers.
+            loads_ma: Load motor current, mA, shape (n,), whole numbers.
+
+        Returns:
+            How many more setpoints the board had room for.
+
+        Raises:
+            CommandRefusedError: Not armed, the queue is full, or a setpoint is beyond the limits.
+                Blocks of `protocol.MAX_SETPOINTS` before the refused one were taken.
+            DriverError: The arrays do not fit each other or the board's number range.
+        """
+        self._require_identity()
+        whole_targets = _whole(targets, np.int32, "target")
+        whole_loads = _whole(loads_ma, np.int16, "load")
+        if whole_targets.shape != whole_loads.shape:
+            raise DriverError(f"{whole_targets.size} targets have {whole_loads.size} loads.")
+        for first in range(0, whole_targets.size, protocol.MAX_SETPOINTS):
+            block = slice(first, first + protocol.MAX_SETPOINTS)
+            self._command(
+                Kind.SETPOINTS,
+                protocol.encode_setpoints(self._number(), whole_targets[block], whole_loads[block]),
+            )
+        return self.queue_free
+
+    def read(self, timeout_s: float) -> SampleBatch:
+        """Return the samples that have come, waiting at most `timeout_s` for the first.
+
+        Raises:
+            LinkLostError: The link is gone.
+        """
+        give_up_s = self._link.transport.now_s + timeout_s
+        while True:
+            remaining_s = max(0.0, give_up_s - self._link.transport.now_s)
+            if self._link.stream_waits:
+                remaining_s = 0.0
+            came = self._link.poll(remaining_s)
+            self._take_replies()
+            samples = self._known(self._link.take_stream().view(SAMPLE_DTYPE)[:, 0])
+            if len(samples) or not came or self._link.transport.now_s >= give_up_s:
+                return SampleBatch(*self._continuity.follow(samples), self._continuity.lost)
+
+    def heartbeat(self) -> None:
+        """Tell the board that the host is there, and ask for its clock without waiting.
+
+        The answer, once read, is `last_exchange`.
+        """
+        number = self._number()
+        self._pings = dict(list(self._pings.items())[-7:])  # a lost pong is not waited for
+        self._pings[number] = self._link.transport.now_s
+        self._link.send(protocol.encode_ping(number, number))
+
+    def disarm(self) -> None:
+        """Take the motors out of force: command 0, load 0, the queue cleared.
+
+        Works without `identify`. Returns only when the board has said that it is disarmed.
+
+        Raises:
+            DisarmUnconfirmedError: It has not said so; its state is unknown.
+        """
+        try:
+            ack = self._simple(Kind.DISARM)
+        except DriverError as error:
+            raise self._unconfirmed(str(error)) from error
+        if ack.status & protocol.STATUS_ARMED:
+            raise self._unconfirmed("It answered that it is still armed.")
+        self._may_be_armed = False
+
+    def close(self) -> None:
+        """Disarm where the board may be armed, and let go of the link.
+
+        Raises:
+            DisarmUnconfirmedError: The link is closed, but the board's state is unknown.
+        """
+        try:
+            if self._may_be_armed:
+                self.disarm()
+        finally:
+            self._link.transport.close()
+
+    def _mismatch(self, theirs: str, why: str) -> ProtocolMismatchError:
+        return ProtocolMismatchError(
+            f"The board at {self._link.transport.url} speaks {theirs}, this program"
+            f" protocol {protocol.PROTOCOL_HASH:08x}.",
+            why,
+            "Flash the firmware of this program's version.",
+        )
+
+    def _unconfirmed(self, why: str) -> DisarmUnconfirmedError:
+        return DisarmUnconfirmedError(
+            f"The board at {self._link.transport.url} has not confirmed that it is disarmed.",
+            why,
+            "Take the motor for live and cut its supply. A working board makes itself safe"
+            f" {protocol.WATCHDOG_US // 1000} ms after the last command it heard.",
+        )
+
+    def _require_identity(self) -> None:
+        if self._identity is None:
+            self.identify()
+
+    def _number(self) -> int:
+        self._command_number = (self._command_number + 1) % 2**16
+        return self._command_number
+
+    def _simple(self, kind: Kind) -> Ack:
+        return self._command(kind, protocol.encode_command(kind, self._number()))
+
+    def _command(self, kind: Kind, payload: bytes) -> Ack:
+        """Send a command and return its acknowledgement.
+
+        Raises:
+            CommandRefusedError: The board refused it.
+        """
+        ack = protocol.decode_ack(self._request(Kind.ACK, payload))
+        self.queue_free = ack.queue_free
+        if ack.result != Result.OK:
+            why, fix = _REASONS.get(ack.result, (f"Its reason has number {ack.result}.", ""))
+            what = f"The board at {self._link.transport.url} refused {kind.name.lower()}."
+            raise CommandRefusedError(what, why, fix, ack.result)
+        return ack
+
+    def _request(self, expected: Kind, payload: bytes) -> np.void:
+        """Send a command and return the fields of the answer with its number.
+
+        Raises:
+            FrameError: The answer is not laid out as this program knows it.
+        """
+        number = payload[2:4]
+        answer = self._link.request(
+            payload, lambda reply: reply[1:2] in (bytes([expected]), _ACK) and reply[2:4] == number
+        )
+        kind, _, fields = protocol.decode(answer)
+        if kind is not expected:
+            raise FrameError(f"The answer is {kind.name}, not {expected.name}.")
+        return fields
+
+    def _take_replies(self) -> None:
+        """Note the pongs; count what nobody expected. Late acknowledgements are of no use."""
+        received_s = self._link.transport.now_s
+        for payload in self._link.take_others():
+            try:
+                kind, number, fields = protocol.decode(payload)
+            except FrameError:
+                self.counters.unknown_frames += 1
+                continue
+            if kind is Kind.PONG and number in self._pings:
+                self.last_exchange = ClockExchange(
+                    self._pings.pop(number), received_s, int(fields["tick_us"])
+                )
+            elif kind >= Kind.HELLO:
+                self.counters.unknown_frames += 1
+
+    def _known(self, samples: NDArray[np.void]) -> NDArray[np.void]:
+        """Drop frames of a sample's size that are no samples."""
+        known = (samples["version"] == protocol.VERSION) & (samples["kind"] == Kind.SAMPLE)
+        if known.all():
+            return samples
+        self.counters.unknown_frames += int(np.count_nonzero(~known))
+        kept: NDArray[np.void] = samples[known]
+        return kept
+
+
+_ACK = bytes([Kind.ACK])
+
+
+def _whole(values: NDArray[np.integer], kind: type[np.signedinteger], name: str) -> NDArray[Any]:
+    """Return setpoints in the board's number type.
+
+    Raises:
+        DriverError: Not whole numbers in one dimension, or outside the type's range.
+    """
+    array = np.atleast_1d(np.asarray(values))
+    bounds = np.iinfo(kind)
+    if not np.issubdtype(array.dtype, np.integer) or array.ndim != 1:
+        raise DriverError(
+            f"A {name} setpoint is a whole number, not {array.dtype} of {array.ndim} dimensions.",
+            fix="Round to counts first.",
+        )
+    if array.size and not (bounds.min <= array.min() and array.max() <= bounds.max):
+        raise DriverError(
+            f"A {name} setpoint lies outside {bounds.min}..{bounds.max}.",
+            f"The setpoints reach from {array.min()} to {array.max()}.",
+        )
+    whole: NDArray[Any] = array.astype(kind)
+    return whole

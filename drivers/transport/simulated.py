@@ -1,0 +1,111 @@
+"""A board inside this process, in virtual time.
+
+Time passes only while someone reads: `read` advances the board. Nothing sleeps unless a pace is
+asked for, so a session is repeatable and as fast as the board computes.
+
+Not modelled: the time bytes take on the wire, and a host that is late (see the faults of a board's
+own tests for lost and damaged bytes).
+"""
+
+from collections.abc import Callable
+from time import monotonic, sleep
+from typing import Protocol
+
+from drivers.errors import LinkLostError
+
+TICK_S = 1e-3
+
+
+class Board(Protocol):
+    """What speaks bytes and lives by ticks of 1 ms: a fake or the firmware itself."""
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host."""
+        ...
+
+    def advance(self, ticks: int) -> None:
+        """Let `ticks` milliseconds of board time pass."""
+        ...
+
+    def transmit(self) -> bytes:
+        """Give the bytes that wait for the host."""
+        ...
+
+
+class SimulatedTransport:
+    """A transport to a board in this process.
+
+    Args:
+        board: The board.
+        url: Name for messages.
+        step_s: Longest virtual time between looks at the board's output.
+        pace: Virtual seconds a real second, None for as fast as possible.
+        wait: Waits real seconds; for tests of the pace.
+        clock: Real clock, seconds; for tests of the pace.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        url: str = "sim://",
+        step_s: float = 0.05,
+        pace: float | None = None,
+        wait: Callable[[float], None] = sleep,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        self.board = board
+        self._url = url
+        self._step_ticks = max(1, round(step_s / TICK_S))
+        self._pace = pace
+        self._wait = wait
+        self._clock = clock
+        self._ticks = 0
+        self._closed = False
+        self._paced_from: tuple[float, int] | None = None
+
+    @property
+    def url(self) -> str:
+        """The URL the transport was opened by."""
+        return self._url
+
+    @property
+    def now_s(self) -> float:
+        """Virtual seconds since the board was made."""
+        return self._ticks * TICK_S
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the board's bytes, advancing it until there are some or `timeout_s` has passed."""
+        self._require_link()
+        remaining = round(timeout_s / TICK_S)
+        data = self.board.transmit()
+        while not data and remaining > 0:
+            ticks = min(self._step_ticks, remaining)
+            self.board.advance(ticks)
+            self._ticks += ticks
+            remaining -= ticks
+            self._keep_pace()
+            data = self.board.transmit()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand `data` to the board."""
+        self._require_link()
+        self.board.receive(data)
+
+    def close(self) -> None:
+        """Let go of the board; its time stands still."""
+        self._closed = True
+
+    def _require_link(self) -> None:
+        if self._closed:
+            raise LinkLostError(f"{self._url} is closed.")
+
+    def _keep_pace(self) -> None:
+        if self._pace is None:
+            return
+        if self._paced_from is None:
+            self._paced_from = (self._clock(), self._ticks)
+        began_s, ticks = self._paced_from
+        late_s = self._clock() - began_s - (self._ticks - ticks) * TICK_S / self._pace
+        if late_s < 0:
+            self._wait(-late_s)

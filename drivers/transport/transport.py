@@ -1,0 +1,83 @@
+"""The way bytes travel to a device, opened by URL, and the registry of URL schemes."""
+
+import re
+from collections.abc import Callable
+from typing import Protocol
+
+from drivers.errors import UnknownSchemeError
+
+_SCHEME = re.compile(r"([a-z][a-z0-9+.-]*):", re.IGNORECASE)
+
+
+class Transport(Protocol):
+    """Bytes to and from one device. Not for use by two threads at once."""
+
+    @property
+    def url(self) -> str:
+        """The URL the transport was opened by."""
+        ...
+
+    @property
+    def now_s(self) -> float:
+        """The transport's clock, seconds from an arbitrary zero; virtual where time is."""
+        ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the bytes that are there, waiting at most `timeout_s` for the first.
+
+        Returns no bytes when none came in time.
+
+        Raises:
+            LinkLostError: The link is gone; every later call says so again.
+        """
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`.
+
+        Raises:
+            LinkLostError: The link is gone.
+            LinkTimeoutError: The device does not take the bytes.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the link. Closing twice does nothing."""
+        ...
+
+
+Opener = Callable[[str], Transport]
+"""Opens the transport a URL names."""
+
+_openers: dict[str, Opener] = {}
+
+
+def register_scheme(scheme: str, opener: Opener) -> None:
+    """Let `open_transport` open URLs that start with `scheme:` by `opener`."""
+    _openers[scheme.lower()] = opener
+
+
+def known_schemes() -> list[str]:
+    """Return the schemes `open_transport` knows, sorted."""
+    return sorted(_openers)
+
+
+def open_transport(url: str) -> Transport:
+    """Open the transport a URL names.
+
+    `/dev/...`, `COM3`, `usb:VID:PID:SERIAL` and pyserial's own URLs (`socket://host:port`) are
+    serial ports; further schemes are added by `register_scheme`.
+
+    Raises:
+        UnknownSchemeError: No opener for the URL's scheme.
+        LinkError: The link cannot be opened.
+    """
+    found = _SCHEME.match(url)
+    scheme = found[1].lower() if found else "serial"
+    if scheme not in _openers:
+        raise UnknownSchemeError(
+            f"No transport opens {url!r}.",
+            f"The scheme {scheme!r} is not one of {', '.join(known_schemes())}.",
+            "Give a port such as /dev/ttyACM0 or usb:16c0:0483:SERIAL.",
+        )
+    return _openers[scheme](url)

@@ -1,0 +1,145 @@
+// What the board and the host say to each other. The text below is the contract: both sides compare
+// its CRC-32 before anything moves. Its twin is drivers/teensy/protocol.py, which spells the same
+// text out of its layouts.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace rig {
+
+constexpr std::uint8_t kVersion = 1;
+constexpr std::uint32_t kFirmwareVersion = 0x000100;
+constexpr std::size_t kMaxSetpoints = 100;
+constexpr std::size_t kQueueCapacity = 2000;
+constexpr std::uint32_t kWatchdogUs = 250000;
+
+constexpr char kLayout[] =
+    "rig teensy protocol 1\n"
+    "COBS(payload, CRC-16/CCITT-FALSE u2) 00\n"
+    "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor i4, spindle i4, "
+    "jaw i4, target i4, proximal i2, distal i2, current i2, fsr u2, command_e4 i2, load_ma i2, "
+    "dropped u2\n"
+    "2 HELLO_REPLY: version u1, kind u1, sequence u2, protocol_hash u4, firmware_version u4, "
+    "serial S24\n"
+    "3 ACK: version u1, kind u1, sequence u2, command u1, result u1, status u2, queue_free u2\n"
+    "4 PONG: version u1, kind u1, sequence u2, token u8, tick_us u4\n"
+    "16 HELLO: version u1, kind u1, sequence u2\n"
+    "17 ARM: version u1, kind u1, sequence u2, kp f8, ki f8, kd f8, velocity_filter f8, limit f8, "
+    "max_current i4, max_load_ma i4, max_proximal i4, max_distal i4, min_spindle i4, "
+    "max_spindle i4\n"
+    "18 START: version u1, kind u1, sequence u2\n"
+    "19 SETPOINTS: version u1, kind u1, sequence u2, 100 x (target i4, load_ma i2)\n"
+    "20 STOP: version u1, kind u1, sequence u2\n"
+    "21 DISARM: version u1, kind u1, sequence u2\n"
+    "22 PING: version u1, kind u1, sequence u2, token u8\n"
+    "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED\n"
+    "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, "
+    "6 WRONG_VERSION\n";
+
+enum Kind : std::uint8_t {
+    kSample = 1,
+    kHelloReply = 2,
+    kAck = 3,
+    kPong = 4,
+    kHello = 16,
+    kArm = 17,
+    kStart = 18,
+    kSetpoints = 19,
+    kStop = 20,
+    kDisarm = 21,
+    kPing = 22,
+};
+
+enum Status : std::uint16_t {
+    kArmed = 1,
+    kSaturated = 2,
+    kQueueDry = 4,
+    kWatchdogTripped = 8,
+    kLimitTripped = 16,
+};
+
+enum Result : std::uint8_t {
+    kOk = 0,
+    kUnknownKind = 1,
+    kWrongSize = 2,
+    kBadValue = 3,
+    kQueueFull = 4,
+    kNotArmed = 5,
+    kWrongVersion = 6,
+};
+
+constexpr std::size_t kHeaderSize = 4;
+constexpr std::size_t kSetpointSize = 6;
+constexpr std::size_t kSerialSize = 24;
+constexpr std::size_t kGains = 5;
+constexpr std::size_t kLimits = 6;
+constexpr std::size_t kArmSize = kHeaderSize + 8 * kGains + 4 * kLimits;
+constexpr std::size_t kPingSize = kHeaderSize + 8;
+
+constexpr std::uint32_t crc32(const char* text, std::size_t size) {
+    std::uint32_t crc = 0xFFFFFFFFU;
+    for (std::size_t i = 0; i < size; ++i) {
+        crc ^= static_cast<std::uint8_t>(text[i]);
+        for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
+    }
+    return ~crc;
+}
+
+constexpr std::uint32_t kProtocolHash = crc32(kLayout, sizeof(kLayout) - 1);
+
+// Writes little-endian fields one after another.
+class Writer {
+  public:
+    Writer& u8(std::uint8_t value) {
+        bytes_[size_++] = value;
+        return *this;
+    }
+    Writer& u16(std::uint16_t value) { return put(value, 2); }
+    Writer& i16(std::int16_t value) { return u16(static_cast<std::uint16_t>(value)); }
+    Writer& u32(std::uint32_t value) { return put(value, 4); }
+    Writer& i32(std::int32_t value) { return u32(static_cast<std::uint32_t>(value)); }
+    Writer& u64(std::uint64_t value) { return put(value, 8); }
+
+    const std::uint8_t* bytes() const { return bytes_; }
+    std::size_t size() const { return size_; }
+
+  private:
+    Writer& put(std::uint64_t value, int count) {
+        for (int i = 0; i < count; ++i) bytes_[size_++] = static_cast<std::uint8_t>(value >> 8 * i);
+        return *this;
+    }
+
+    std::uint8_t bytes_[64];  // more than the longest frame a board sends
+    std::size_t size_ = 0;
+};
+
+// Reads little-endian fields one after another; the caller has checked the size.
+class Reader {
+  public:
+    explicit Reader(const std::uint8_t* bytes) : bytes_(bytes) {}
+
+    std::uint16_t u16() { return static_cast<std::uint16_t>(take(2)); }
+    std::int16_t i16() { return static_cast<std::int16_t>(u16()); }
+    std::int32_t i32() { return static_cast<std::int32_t>(take(4)); }
+    std::uint64_t u64() { return take(8); }
+    double f64() {
+        const std::uint64_t bits = take(8);
+        double value = 0;
+        static_assert(sizeof value == sizeof bits, "a double has 64 bits");
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+
+  private:
+    std::uint64_t take(int count) {
+        std::uint64_t value = 0;
+        for (int i = 0; i < count; ++i) value |= static_cast<std::uint64_t>(*bytes_++) << 8 * i;
+        return value;
+    }
+
+    const std::uint8_t* bytes_;
+};
+
+}  // namespace rig

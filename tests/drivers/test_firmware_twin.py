@@ -1,0 +1,193 @@
+"""The C++ core and the Python fake answer the same commands with the same bytes."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drivers.framing import FrameStream, encode_frame
+from drivers.teensy import protocol
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError, firmware_library
+from drivers.teensy.protocol import Kind, Limits
+from tests.drivers.bench_physics import PlainBench
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+GAINS = np.array([20.0, 0.05, -1.0, 0.2, 10000.0])
+WIDEST = Limits.widest()
+TIGHT = Limits(1500, 900, 5800, 30000, -4000, 4000)
+
+Action = bytes | int
+"""Bytes for the board, or ticks to advance."""
+
+
+@pytest.fixture(scope="session")
+def library() -> Path:
+    """The firmware library, built from the present source."""
+    if shutil.which("make") is None or shutil.which("g++") is None:
+        found = firmware_library()
+        if found is None:
+            pytest.skip("the firmware library is not built and there is no g++ and make to build it")
+        return found
+    subprocess.run(["make", "-C", str(FIRMWARE)], check=True, capture_output=True)
+    found = firmware_library()
+    assert found is not None
+    return found
+
+
+def command(kind: Kind, sequence: int) -> bytes:
+    return encode_frame(protocol.encode_command(kind, sequence))
+
+
+def arm(sequence: int, limits: Limits = WIDEST, gains: np.ndarray = GAINS) -> bytes:
+    return encode_frame(protocol.encode_arm(sequence, gains, limits))
+
+
+def setpoints(sequence: int, targets: list[int], load_ma: int = 0) -> bytes:
+    loads = np.full(len(targets), load_ma)
+    return encode_frame(protocol.encode_setpoints(sequence, np.array(targets), loads))
+
+
+def ping(sequence: int, token: int) -> bytes:
+    return encode_frame(protocol.encode_ping(sequence, token))
+
+
+def sweep(start: int, count: int = 100) -> list[int]:
+    return [round(1366 - 500 * np.sin((start + k) / 80)) for k in range(count)]
+
+
+def answers(board: TeensyFake | FirmwareBoard, script: list[Action]) -> list[bytes]:
+    """Run a script and return the bytes the board gave after each action."""
+    given_bytes = []
+    for action in script:
+        if isinstance(action, bytes):
+            board.receive(action)
+        else:
+            board.advance(action)
+        given_bytes.append(board.transmit())
+    return given_bytes
+
+
+def assert_twins(script: list[Action], library: Path, start_tick_us: int = 0) -> bytes:
+    """Run a script on both and return the bytes they agree on."""
+    fake = answers(TeensyFake(PlainBench(), start_tick_us=start_tick_us), script)
+    core = answers(
+        FirmwareBoard(PlainBench(), start_tick_us=start_tick_us, library=library), script
+    )
+    for index, (ours, theirs) in enumerate(zip(fake, core, strict=True)):
+        assert ours == theirs, f"action {index}: {script[index]!r}"
+    return b"".join(fake)
+
+
+def statuses(data: bytes) -> set[int]:
+    frames = FrameStream(protocol.SAMPLE_DTYPE.itemsize).feed(data)
+    assert frames.bad == 0
+    return set(np.unique(frames.payloads.view(protocol.SAMPLE_DTYPE)["status"]).tolist())
+
+
+def test_a_whole_session(library: Path) -> None:
+    script: list[Action] = [command(Kind.HELLO, 1), command(Kind.START, 2), 30, arm(3), 5]
+    script += [setpoints(4, sweep(0)), setpoints(5, sweep(100), 300), 150, ping(6, 2**63 + 5), 100]
+    script += [setpoints(7, sweep(200)), 40, command(Kind.DISARM, 8), 20, command(Kind.STOP, 9), 10]
+    seen = statuses(assert_twins(script, library, start_tick_us=2**32 - 100_000))
+    assert seen == {0, protocol.STATUS_ARMED, protocol.STATUS_ARMED | protocol.STATUS_QUEUE_DRY}
+
+
+def test_the_watchdog(library: Path) -> None:
+    script: list[Action] = [command(Kind.HELLO, 1), command(Kind.START, 2), arm(3)]
+    script += [setpoints(4, sweep(0)), 249, ping(5, 0), 250, 1, 1, 10, setpoints(6, sweep(0))]
+    script += [arm(7), 5]
+    assert protocol.STATUS_WATCHDOG_TRIPPED in statuses(assert_twins(script, library))
+
+
+@pytest.mark.parametrize("limits", [TIGHT, Limits(2**31 - 1, 900, 2**31 - 1, 2**31 - 1, 0, 1400)])
+def test_a_limit(library: Path, limits: Limits) -> None:
+    far = [limits.min_spindle] * 100
+    script: list[Action] = [command(Kind.HELLO, 1), command(Kind.START, 2), arm(3, limits)]
+    script += [setpoints(4, far), 100, setpoints(5, far), 30, arm(6, limits), 3]
+    assert protocol.STATUS_LIMIT_TRIPPED in statuses(assert_twins(script, library))
+
+
+def test_saturation_and_a_host_that_does_not_read(library: Path) -> None:
+    script: list[Action] = [command(Kind.START, 2), arm(3), setpoints(4, [-5000] * 100, 20000)]
+    script += [ping(5, 0), 240, ping(6, 0), 240]
+    seen = statuses(assert_twins(script, library))
+    assert any(status & protocol.STATUS_SATURATED for status in seen)
+    data = assert_twins([command(Kind.START, 2), 3000, 5, 1500, 1], library)
+    last = FrameStream(42).feed(data).payloads[-1:].view(protocol.SAMPLE_DTYPE)[0, 0]
+    assert last["dropped"] > 1000
+    assert last["sequence"] == 4505
+
+
+def test_refusals(library: Path) -> None:
+    nan = GAINS.copy()
+    nan[0] = np.nan
+    for gains in (nan, GAINS * np.inf, GAINS * 1e5, GAINS * [1, 1, 1, -1, 1], -GAINS):
+        assert_twins([arm(1, gains=gains)], library)
+    for limits in (Limits(-1, 0, 0, 0, 0, 0), Limits(0, 0, 0, 0, 1, 0)):
+        assert_twins([arm(1, limits)], library)
+    full: list[Action] = [setpoints(10 + k, [k] * 100) for k in range(21)]
+    assert_twins([arm(1), *full, 7, setpoints(40, [0] * 8), setpoints(41, [0] * 7)], library)
+    assert_twins([setpoints(1, [0]), arm(2, TIGHT), setpoints(3, [4001])], library)
+    assert_twins([arm(2, TIGHT), setpoints(3, [0], 901), setpoints(4, [0], -900)], library)
+    header = protocol.encode_command(Kind.HELLO, 7)
+    for payload in (b"\x02" + header[1:], b"\x01\x63\x00\x00", header + b"x", header[:3], b""):
+        assert_twins([encode_frame(payload)], library)
+    for kind in range(30):
+        assert_twins([encode_frame(bytes([1, kind, 0, 0, 0]))], library)
+
+
+def test_a_repeated_command_is_answered_again_and_not_carried_out_again(library: Path) -> None:
+    script: list[Action] = [command(Kind.START, 1), arm(2), setpoints(3, sweep(0)), 10]
+    script += [setpoints(3, sweep(0)), 10, command(Kind.START, 1), 5, command(Kind.HELLO, 3)]
+    script += [setpoints(3, sweep(0)), 120, command(Kind.DISARM, 9), command(Kind.DISARM, 9)]
+    assert_twins(script, library)
+
+
+sequences = st.integers(0, 5)
+targets = st.lists(st.integers(-6000, 6000), min_size=0, max_size=101)
+commands = st.one_of(
+    st.builds(command, st.sampled_from(list(Kind)), sequences),
+    st.builds(arm, sequences, st.sampled_from([WIDEST, TIGHT])),
+    st.builds(setpoints, sequences, targets, st.integers(-1000, 1000)),
+    st.builds(lambda s, n: setpoints(s, sweep(n)), sequences, st.integers(0, 500)),
+    st.builds(ping, sequences, st.integers(0, 2**64 - 1)),
+    st.binary(max_size=60).map(encode_frame),
+    st.binary(max_size=60),
+    st.just(b"\x07" * 1100 + b"\x00"),
+)
+scripts = st.lists(
+    st.one_of(commands, commands, st.integers(1, 300), st.integers(1, 40)), max_size=25
+)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(scripts, st.integers(0, 2**32 - 1))
+def test_any_script(library: Path, script: list[Action], start_tick_us: int) -> None:
+    preamble: list[Action] = [command(Kind.START, 60000), arm(60001, TIGHT)]
+    assert_twins(preamble + script, library, start_tick_us)
+
+
+@settings(max_examples=30, deadline=None)
+@given(scripts, st.integers(1, 50))
+def test_the_fake_does_not_depend_on_how_time_is_cut(script: list[Action], cut: int) -> None:
+    script = [command(Kind.START, 60000), arm(60001, TIGHT), *script]
+    whole = answers(TeensyFake(PlainBench()), script)
+    pieces: list[Action] = []
+    for action in script:
+        if isinstance(action, int):
+            pieces += [cut] * (action // cut) + [action % cut]
+        else:
+            pieces.append(action)
+    assert b"".join(answers(TeensyFake(PlainBench()), pieces)) == b"".join(whole)
+
+
+def test_a_missing_library_says_what_to_type(tmp_path: Path) -> None:
+    with pytest.raises(FirmwareMissingError, match="make -C firmware"):
+        FirmwareBoard(PlainBench(), library=tmp_path / "none.so")
