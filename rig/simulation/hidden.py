@@ -84,7 +84,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "gear_backlash",
         "lost motion in the gear, contact with damping that grows with penetration",
-        (Shape("half_gap_rad", 5e-3, 10e-3), Shape("contact_damping_s_rad", 0.5, 2.0)),
+        (Shape("half_gap_rad", 5e-3, 10e-3), Shape("contact_damping_s_rad", 0.01, 0.05)),
     ),
     Kind(
         "gear_eccentricity",
@@ -212,9 +212,9 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
 
 @numba.njit
 def motor_ripple_n_m(row: NDArray[np.float64], motor_angle_rad: float) -> float:
-    """Ripple at the motor shaft: A sin(k q + p) (1 + 0.35 sin q), A = 0.15 mN m at strength 1."""
+    """Ripple at the motor shaft: A sin(k q + p) (1 + 0.35 sin q), A = 0.08 mN m at strength 1."""
     carrier = math.sin(row[FIRST] * motor_angle_rad + row[SECOND])
-    return row[STRENGTH] * 0.15e-3 * carrier * (1.0 + 0.35 * math.sin(motor_angle_rad))
+    return row[STRENGTH] * 0.08e-3 * carrier * (1.0 + 0.35 * math.sin(motor_angle_rad))
 
 
 @numba.njit
@@ -246,9 +246,9 @@ def gear_backlash_n_m(
 
 @numba.njit
 def gear_eccentricity_rad(row: NDArray[np.float64], spindle_angle_rad: float) -> float:
-    """Position error of the gear: e (sin(n q + p) + 0.3 sin(2 n q)), e = 3 mrad at strength 1."""
+    """Position error of the gear: e (sin(n q + p) + 0.3 sin(2 n q)), e = 2 mrad at strength 1."""
     angle = row[FIRST] * spindle_angle_rad
-    return row[STRENGTH] * 3e-3 * (math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle))
+    return row[STRENGTH] * 2e-3 * (math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle))
 
 
 @numba.njit
@@ -256,7 +256,7 @@ def gear_eccentricity_slope(row: NDArray[np.float64], spindle_angle_rad: float) 
     """Derivative of the position error with the spindle angle: what keeps it free of energy."""
     angle = row[FIRST] * spindle_angle_rad
     wave = math.cos(angle + row[SECOND]) + 0.6 * math.cos(2.0 * angle)
-    return row[STRENGTH] * 3e-3 * row[FIRST] * wave
+    return row[STRENGTH] * 2e-3 * row[FIRST] * wave
 
 
 @numba.njit
@@ -308,15 +308,15 @@ def cable_creep_rate(row: NDArray[np.float64], strain_rad: float) -> float:
 
 @numba.njit
 def jaw_spring_n_m(row: NDArray[np.float64], jaw_angle_rad: float) -> float:
-    """Torque that opposes closing: k x / (1 + |x| / x0), x = q - rest, k = 0.06 N m/rad."""
+    """Torque that opposes closing: k x / (1 + |x| / x0), x = q - rest, k = 0.04 N m/rad."""
     x = jaw_angle_rad - row[FIRST]
-    return row[STRENGTH] * 0.06 * x / (1.0 + abs(x) / row[SECOND])
+    return row[STRENGTH] * 0.04 * x / (1.0 + abs(x) / row[SECOND])
 
 
 @numba.njit
 def end_stop_spring_n_m(row: NDArray[np.float64], jaw_angle_rad: float) -> float:
-    """Torque that opposes closing: k p^1.5, p = q - contact, k = 0.2 N m at strength 1."""
+    """Torque that opposes closing: k p^1.5, p = q - contact, k = 0.15 N m at strength 1."""
     penetration = jaw_angle_rad - row[FIRST]
     if penetration <= 0.0:
         return 0.0
-    return row[STRENGTH] * 0.2 * penetration * math.sqrt(penetration)
+    return row[STRENGTH] * 0.15 * penetration * math.sqrt(penetration)

@@ -122,7 +122,8 @@ class SensorParameters:
         proximal_noise_n_m: White noise, standard deviation. Measured: 0.277 mN m above 50 Hz of
             500 Hz, over 0.95.
         distal_noise_n_m: The same, 0.207 mN m above 50 Hz.
-        proximal_offset_n_m: Zero offset at power-up. Assumed.
+        proximal_offset_n_m: Zero offset at power-up. Measured: c of the regression of
+            `PlantParameters.spindle_friction_n_m` with r held at the cable ratio.
         distal_offset_n_m: Zero offset at power-up. Assumed.
         proximal_ramp_n_m_s: Steady drift of the zero. Assumed.
         distal_ramp_n_m_s: Steady drift of the zero. Assumed.
@@ -148,7 +149,7 @@ class SensorParameters:
     torque_limit_count: float = _fixed(32766.0)
     proximal_noise_n_m: float = 0.29e-3
     distal_noise_n_m: float = 0.22e-3
-    proximal_offset_n_m: float = 4e-3
+    proximal_offset_n_m: float = -7e-3
     distal_offset_n_m: float = 2e-3
     proximal_ramp_n_m_s: float = 2e-6
     distal_ramp_n_m_s: float = -1e-6
@@ -176,9 +177,9 @@ class ControllerGains:
         limit: Largest command, in ticks of 1e-4 of full scale.
     """
 
-    kp: float = 10.0
-    ki: float = 0.05
-    kd: float = 2.0
+    kp: float = 20.0
+    ki: float = 0.2
+    kd: float = 4.0
     velocity_filter: float = 0.3
     limit: float = 2700.0
 
