@@ -33,7 +33,7 @@ def _fingerprint() -> str:
 
     Numba's cache looks only at the file a function is written in. The loops hold this hash as a
     closure variable, which is part of the cache's key, so a change in any of the files recompiles.
-    (The hash is the only closure variable: a function held that way would change the key each time.)
+    It is the only closure variable: a function held that way would change the key in each process.
     """
     digest = hashlib.sha256()
     for module in (control, hidden, noise, parameters, plant, sensors):
@@ -41,8 +41,7 @@ def _fingerprint() -> str:
     return digest.hexdigest()
 
 
-@intrinsic
-def _call_board_tick(
+def _board_call(
     typing_context: Any, function: Any, board: Any, tick_us: Any, inputs: Any, outputs: Any
 ) -> Any:
     """Call `void tick(void *board, uint32_t us, const int32_t *inputs, int32_t *outputs)`."""
@@ -68,8 +67,12 @@ def _call_board_tick(
     return signature, build
 
 
+_call_board_tick: Any = intrinsic(_board_call)
+
+
 def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]:
     """Return the compiled loops: with the controller inside, and with a board called by pointer."""
+
     @numba.njit(cache=True)
     def with_controller(  # type: ignore[no-untyped-def]
         state, p, s, effects, seed, first_tick, target, load_ma, armed, control_state, gains, rows
@@ -204,8 +207,8 @@ class SimulatedBench:
 
         Args:
             ticks: Number of ticks of 1 ms.
-            tick_address: Address of `void tick(void *board, uint32_t tick_us, const int32_t *inputs,
-                int32_t *outputs)`: seven counts in, command_e4 and load_ma out.
+            tick_address: Address of `void tick(void *board, uint32_t tick_us, const int32_t
+                *inputs, int32_t *outputs)`: seven counts in, command_e4 and load_ma out.
             board_address: First argument of that function; may be 0 if the function takes that.
             tick_us: Device clock at the first tick; 1000 is added each tick, wrapping at 2^32.
 

@@ -1,6 +1,6 @@
 """Counter-based random numbers: a function of seed, tick and stream, so no generator has state.
 
-The numbers do not depend on how a run is cut into calls, and, being made of integer arithmetic only,
+The numbers do not depend on how a run is cut into calls, and, being made by integer arithmetic,
 they are the same on every machine. The mixer is the finaliser of SplitMix64 (Steele, Lea and Flood,
 "Fast splittable pseudorandom number generators", OOPSLA 2014).
 """
@@ -21,7 +21,7 @@ _MEAN = 4 * 65535.0
 _SCALE = 1.0 / float(np.sqrt(8 * (65536.0**2 - 1) / 12.0))
 
 
-@numba.njit
+@numba.njit()
 def mix(word: np.uint64) -> np.uint64:
     """Scramble 64 bits so that neighbouring inputs give unrelated outputs."""
     word = (word ^ (word >> _SHIFT_30)) * _MIX_1
@@ -29,7 +29,7 @@ def mix(word: np.uint64) -> np.uint64:
     return word ^ (word >> _SHIFT_31)
 
 
-@numba.njit
+@numba.njit()
 def _lanes(word: np.uint64) -> float:
     return float(
         (word & _LANE)
@@ -39,7 +39,7 @@ def _lanes(word: np.uint64) -> float:
     )
 
 
-@numba.njit
+@numba.njit()
 def normal(seed: np.uint64, tick: int, stream: int) -> float:
     """Return a number of mean 0 and variance 1, nearly normal: the sum of eight uniform ones.
 

@@ -15,11 +15,10 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 
 def _fixed(value: float) -> Any:
-    """Return a field that `vary` leaves alone: geometry, scales and limits known by construction."""
+    """Return a field that `vary` leaves alone: geometry, scales, limits known by construction."""
     return field(default=value, metadata={"varies": False})
 
 
@@ -165,27 +164,13 @@ class SensorParameters:
     lever_arm_m: float = _fixed(0.012)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerGains:
-    """Gains of `drivers.teensy.control`, in its units.
+REFERENCE_GAINS = (20.0, 0.2, 4.0, 0.3, 2700.0)
+"""Gains of `drivers.teensy.control` in its order and units (kp, ki, kd, velocity filter, limit).
 
-    Attributes:
-        kp: Command ticks a spindle count.
-        ki: Command ticks a spindle count and tick of 1 ms.
-        kd: Command ticks a motor count and tick.
-        velocity_filter: Weight of the newest velocity, 0..1.
-        limit: Largest command, in ticks of 1e-4 of full scale.
-    """
-
-    kp: float = 20.0
-    ki: float = 0.2
-    kd: float = 4.0
-    velocity_filter: float = 0.3
-    limit: float = 2700.0
-
-    def as_array(self) -> NDArray[np.float64]:
-        """Return the gains in the order of `drivers.teensy.control`, shape (5,)."""
-        return np.array([self.kp, self.ki, self.kd, self.velocity_filter, self.limit])
+On the default plant they follow the reference sinusoid of 30 degrees amplitude at 0.1 to 0.5 Hz
+against loads 0.1 to 1.0 with 0.1 to 0.6 degrees rms (the reference rig: 0.7 to 3.0). Twice kp, ki
+and kd, a spread of 25 % in every parameter and each hidden effect at strength 1.5 stay stable. The
+limit is the drive's: 2700 ticks are 0.556 A."""
 
 
 Parameters = TypeVar("Parameters", PlantParameters, SensorParameters)

@@ -9,15 +9,16 @@ Motor shaft, spindle and jaw, all closing-positive:
     C = kc (r s + q0 - q) + cc (r s' - q')                          cable, torque at the jaw
 
 Both currents follow their commands with a first-order lag. Velocities are stepped first and
-positions with the new velocities (semi-implicit Euler). Coulomb friction is solved, not smoothed: in
-each step it takes the velocity the other torques would give towards zero by at most F dt / J, so a
-body sticks exactly while the rest of the torques stay below F, and cannot chatter (time stepping for
-dry friction; J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics", 1988).
-Nothing in the loop allocates and floating point is strict, so results repeat to the bit.
+positions with the new velocities (semi-implicit Euler). Coulomb friction is solved, not smoothed:
+in each step it takes the velocity the other torques would give towards zero by at most F dt / J, so
+a body sticks exactly while the rest of the torques stay below F, and cannot chatter (time stepping
+for dry friction; J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics",
+1988). Nothing in the loop allocates and floating point is strict, so results repeat to the bit.
 """
 
 from collections import namedtuple
 from dataclasses import astuple, fields
+from typing import Any
 
 import numba
 import numpy as np
@@ -49,13 +50,12 @@ TICK_S = 1e-3
 """Places in the state, SI units: motion, currents, what the torque sensors see, the states of two
 hidden effects and the drift of the two torque zeros."""
 
-Constants = namedtuple("Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]  # noqa: PYI024
-"""The parameters as the compiled code takes them."""
+_Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
 
 
-def constants_of(parameters: PlantParameters) -> Constants:
-    """Return the parameters as the compiled code takes them."""
-    return Constants(*(float(value) for value in astuple(parameters)))
+def constants_of(parameters: PlantParameters) -> Any:
+    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
+    return _Constants(*(float(value) for value in astuple(parameters)))
 
 
 def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray[np.float64]:
@@ -72,16 +72,16 @@ def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray
     return state
 
 
-@numba.njit
+@numba.njit()
 def clip(value: float, limit: float) -> float:
     """Return the value brought into plus and minus the limit."""
     return min(max(value, -limit), limit)
 
 
-@numba.njit
+@numba.njit()
 def step_tick(
     state: NDArray[np.float64],
-    p: Constants,
+    p: Any,
     effects: NDArray[np.float64],
     current_target_a: float,
     load_target_a: float,
@@ -89,8 +89,8 @@ def step_tick(
     """Move the plant by one tick under constant commands.
 
     The proximal sensor carries the drive unit: it sees the gear's output torque and the reaction to
-    the rotor's acceleration. The distal sensor carries the load motor: it sees the motor's torque and
-    its friction. Both are left in the state as of the last substep.
+    the rotor's acceleration. The distal sensor carries the load motor: it sees that motor's torque
+    and its friction. Both are left in the state as of the last substep.
 
     Args:
         state: Shape (`STATE_SIZE`,), changed in place.

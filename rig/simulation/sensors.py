@@ -9,6 +9,7 @@ the next row.
 
 from collections import namedtuple
 from dataclasses import astuple, fields
+from typing import Any
 
 import numba
 import numpy as np
@@ -21,27 +22,26 @@ from rig.simulation.parameters import SensorParameters
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
 """Columns of a row of counts; the board is given the first seven."""
 
-Scales = namedtuple("Scales", [item.name for item in fields(SensorParameters)])  # type: ignore[misc]  # noqa: PYI024
-"""The sensors' parameters as the compiled code takes them."""
+_Scales = namedtuple("_Scales", [item.name for item in fields(SensorParameters)])  # type: ignore[misc]
 
 TURN_RAD = 2.0 * np.pi
 
 
-def scales_of(parameters: SensorParameters) -> Scales:
-    """Return the parameters as the compiled code takes them."""
-    return Scales(*(float(value) for value in astuple(parameters)))
+def scales_of(parameters: SensorParameters) -> Any:
+    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
+    return _Scales(*(float(value) for value in astuple(parameters)))
 
 
-@numba.njit
+@numba.njit()
 def _converted(value: float, quantum: float, low: float, high: float) -> int:
     """Return the count a converter gives: rounded to its quantum, held at its limits."""
     return int(min(max(np.floor(value / quantum + 0.5) * quantum, low), high))
 
 
-@numba.njit
+@numba.njit()
 def sample(
     state: NDArray[np.float64],
-    s: Scales,
+    s: Any,
     effects: NDArray[np.float64],
     seed: np.uint64,
     tick: int,
