@@ -13,13 +13,13 @@ from types import FrameType, TracebackType
 from typing import Self
 
 import numpy as np
+from drivers.teensy.driver import Identity, SampleBatch, TeensyLogger
+from drivers.transport.transport import Transport
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.errors import DriverError
 from drivers.teensy import protocol as frames
-from drivers.teensy.driver import Identity, SampleBatch, TeensyLogger
-from drivers.transport.transport import Transport
 from estimation.recording import Flag
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError

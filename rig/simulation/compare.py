@@ -12,13 +12,12 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from drivers.teensy import control
 from estimation.recording import Recording
 from rig.cli.output import JsonFlag, console, emit_json
 from rig.errors import DataError, UsageError
 from rig.simulation.bench import SimulatedBench
-from rig.simulation.parameters import REFERENCE_GAINS
-from rig.simulation.sensors import columns_of, spindle_count_of
+from rig.simulation.play import play
+from rig.simulation.sensors import spindle_count_of
 
 FloatArray = NDArray[np.float64]
 
@@ -103,13 +102,7 @@ def simulate_like(
     if bench is None:
         bench = SimulatedBench()
         bench = SimulatedBench(start_count=spindle_count_of(start_rad, bench.sensors))
-    sensors = bench.sensors
-    target = np.round(-target_rad * sensors.spindle_count_per_turn / (2.0 * np.pi)).astype(np.int32)
-    load_ma = np.round(1e3 * recording["load_command_a"]).astype(np.int32)
-    counts = bench.advance(
-        target.size, target, load_ma, True, control.new_state(), np.array(REFERENCE_GAINS)
-    )
-    return columns_of(counts, target, sensors)
+    return play(bench, target_rad, recording["load_command_a"])
 
 
 def compare(recording: Recording) -> list[Row]:
