@@ -3,6 +3,7 @@
 python -m rig.simulation.compare --data Tool_4_Maryland_L_4.tar.xz --run 24
 """
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -172,4 +173,9 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    from rig.cli.main import app
+    from rig.cli.main import main as command_line
+
+    # as a verb of `rig`, for its errors and exit codes
+    app.command("compare")(main)
+    sys.exit(command_line(["compare", *sys.argv[1:]]))

@@ -46,9 +46,10 @@ def test_the_figure_is_written_whole(tmp_path: Path) -> None:
 def test_a_simulated_run_looks_like_the_measured_one(measured_data: Path) -> None:
     """0.3 Hz against load 0.5: the spread of each channel within 30 % of the measured run's.
 
-    Two channels are held to less. Distal torque varies along the stroke on the reference rig and
-    not in the simulation, so its level is compared; and the simulated controller follows more
-    closely than the reference rig's, so its error is only bounded.
+    Three channels are held to less. Distal torque varies along the stroke on the reference rig and
+    not in the simulation, so its level is compared. The twist of the gear lacks the measured lost
+    motion and wave: 40 %. The simulated controller follows more closely than the reference rig's,
+    so its error is only bounded.
     """
     campaign = open_campaign(measured_data / "mrdlab-Tool_4_Maryland_L_4.tar.xz")
     recording = campaign.select(["24"]).runs[0].recording()
@@ -59,12 +60,13 @@ def test_a_simulated_run_looks_like_the_measured_one(measured_data: Path) -> Non
         "proximal_torque_n_m",
         "spindle_angle_rad",
         "jaw_angle_rad",
-        "gear_twist_rad",
     )
     for name in spread:
         assert rows[name].simulated.span == pytest.approx(rows[name].measured.span, rel=0.3), name
     for name in ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"):
         assert rows[name].simulated.high == pytest.approx(rows[name].measured.high, rel=0.3), name
+    twist = rows["gear_twist_rad"]
+    assert twist.simulated.span == pytest.approx(twist.measured.span, rel=0.4)
     distal = rows["distal_torque_n_m"]
     assert distal.simulated.middle == pytest.approx(distal.measured.middle, rel=0.3)
     assert rows["tracking_error_rad"].simulated.span < rows["tracking_error_rad"].measured.span

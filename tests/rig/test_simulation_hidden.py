@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivers.teensy import control
 from rig import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
@@ -180,8 +181,6 @@ def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
 def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
     idle = np.zeros(2000, np.int32)
-    from drivers.teensy import control
-
     bench._state[plant.JAW_ANGLE] -= 0.1
     bench.advance(2000, idle, idle, False, control.new_state(), np.zeros(5))
     speeds = bench.state[[plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]]

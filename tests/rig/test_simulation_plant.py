@@ -10,6 +10,7 @@ from drivers.teensy import control
 from rig import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
+from rig.simulation.hidden import HiddenEffect
 from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, SensorParameters, vary
 from rig.simulation.play import play
 
@@ -28,9 +29,9 @@ FREE = PlantParameters(
 """A rig that loses nothing."""
 
 
-def energy_j(state: NDArray[np.float64], p: PlantParameters) -> float:
+def energy_j(state: NDArray[np.float64], p: PlantParameters, gear_error_rad: float = 0.0) -> float:
     """Kinetic energy of the three bodies and elastic energy of gear and cable."""
-    twist = state[plant.MOTOR_ANGLE] / p.gear_ratio - state[plant.SPINDLE_ANGLE]
+    twist = state[plant.MOTOR_ANGLE] / p.gear_ratio - state[plant.SPINDLE_ANGLE] + gear_error_rad
     stretch = p.cable_ratio * state[plant.SPINDLE_ANGLE] + p.jaw_zero_rad - state[plant.JAW_ANGLE]
     return 0.5 * float(
         p.rotor_inertia_kg_m2 * state[plant.MOTOR_SPEED] ** 2
@@ -57,6 +58,39 @@ def test_energy_is_kept_when_nothing_dissipates() -> None:
     energies = energies_after_a_pluck(FREE, 2000)
     assert energies[0] == pytest.approx(0.5 * 0.751 * 0.1**2)
     np.testing.assert_allclose(energies, energies[0], rtol=0.03)
+
+
+def test_an_eccentric_gear_keeps_energy_too() -> None:
+    effect = HiddenEffect("gear_eccentricity", 5.0, (16.0, 0.4))
+    bench = SimulatedBench(FREE, effects=[effect], start_count=683)
+    bench._state[plant.JAW_ANGLE] -= 0.1
+    bench._state[plant.MOTOR_SPEED] = 60.0
+    bench._state[plant.SPINDLE_SPEED] = 60.0 / 35.0
+    none, state, gains = np.zeros(1, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
+    energies = []
+    for _ in range(300):  # before the jaw meets its stop
+        angle = 16.0 * float(bench.state[plant.SPINDLE_ANGLE])
+        error = 5.0 * 2e-3 * (np.sin(angle + 0.4) + 0.3 * np.sin(2.0 * angle))
+        energies.append(energy_j(bench.state, FREE, error))
+        bench.advance(1, none, none, False, state, gains)
+    np.testing.assert_allclose(energies, energies[0], rtol=0.02)
+
+
+def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
+    """With the spindle clamped a swinging rotor gives T / N of the gear's torque T back."""
+    clamped = replace(FREE, spindle_friction_n_m=10.0)
+    bench = SimulatedBench(clamped, start_count=683)
+    bench._state[plant.MOTOR_ANGLE] += 0.5
+    none, state, gains = np.zeros(1, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
+    seen, gear = [], []
+    for _ in range(1000):
+        bench.advance(1, none, none, False, state, gains)
+        now = bench.state
+        twist = now[plant.MOTOR_ANGLE] / 35.0 - now[plant.SPINDLE_ANGLE]
+        seen.append(now[plant.PROXIMAL_TORQUE])
+        gear.append(clamped.gear_stiffness_n_m_rad * twist)
+    assert np.std(gear) > 0.04
+    assert np.std(seen) / np.std(gear) == pytest.approx(1.0 - 1.0 / 35.0, abs=0.004)
 
 
 def test_energy_only_falls_with_the_motor_off() -> None:
