@@ -16,12 +16,16 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from drivers.teensy import control
+from drivers.teensy import limits as board_limits
 from rig.errors import UsageError
 from rig.simulation import hidden, noise, parameters, plant, sensors
 from rig.simulation.parameters import PlantParameters, SensorParameters
 
 REFERENCE_START_COUNT = 1366
 """Spindle count at which the reference campaign's runs start: 60 degrees open."""
+
+UNBOUNDED = np.array([2**31 - 1] * 4 + [-(2**31), 2**31 - 1], np.int32)
+"""Limits that no count is beyond, in the order of `drivers.teensy.limits`."""
 
 
 class BenchInputError(UsageError):
@@ -36,7 +40,7 @@ def _fingerprint() -> str:
     It is the only closure variable: a function held that way would change the key in each process.
     """
     digest = hashlib.sha256()
-    for module in (control, hidden, noise, parameters, plant, sensors):
+    for module in (control, board_limits, hidden, noise, parameters, plant, sensors):
         digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 
@@ -75,13 +79,33 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
 
     @numba.njit(cache=True)
     def with_controller(  # type: ignore[no-untyped-def]
-        state, p, s, effects, seed, first_tick, target, load_ma, armed, control_state, gains, rows
+        state,
+        p,
+        s,
+        effects,
+        seed,
+        first_tick,
+        target,
+        load_ma,
+        armed,
+        control_state,
+        gains,
+        bounds,
+        rows,
     ):
         _ = source
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
             command, load = 0, 0
+            if armed:
+                armed = not board_limits.beyond_limits(
+                    bounds,
+                    row[sensors.SPINDLE],
+                    row[sensors.PROXIMAL],
+                    row[sensors.DISTAL],
+                    row[sensors.CURRENT],
+                )
             if armed:
                 command = control.control_tick(
                     control_state, gains, target[k], row[sensors.SPINDLE], row[sensors.MOTOR]
@@ -160,6 +184,7 @@ class SimulatedBench:
         armed: bool,
         control_state: NDArray[np.float64],
         gains: NDArray[np.float64],
+        limits: NDArray[np.int32] | None = None,
     ) -> NDArray[np.int32]:
         """Run closed-loop ticks with the controller of `drivers.teensy.control`.
 
@@ -170,6 +195,8 @@ class SimulatedBench:
             armed: When false, command and load are 0 and the controller does not run.
             control_state: State of the controller, changed in place.
             gains: Gains of the controller, shape (5,).
+            limits: Limits as in `drivers.teensy.limits`, shape (6,); none when None. From the first
+                tick on whose counts are beyond them, command and load are 0.
 
         Returns:
             Counts with raw signs, shape (ticks, 9), int32, columns as in `rig.simulation.sensors`.
@@ -195,6 +222,7 @@ class SimulatedBench:
             armed,
             control_state,
             np.ascontiguousarray(gains, np.float64),
+            UNBOUNDED if limits is None else np.ascontiguousarray(limits, np.int32),
             rows,
         )
         self.ticks_done += ticks

@@ -117,7 +117,8 @@ class SensorParameters:
         jaw_count_per_turn: Jaw encoder. Datasheet.
         torque_n_m_per_count: Both torque channels. Stated in the data set's description.
         torque_quantum_count: Torque counts come in multiples of this. Measured.
-        torque_limit_count: Torque counts saturate at plus and minus this. Assumed: 16 bit.
+        torque_limit_count: Largest torque count; the smallest is one beyond its negative. Assumed:
+            16 bit.
         proximal_noise_n_m: White noise, standard deviation. Measured: 0.277 mN m above 50 Hz of
             500 Hz, over 0.95.
         distal_noise_n_m: The same, 0.207 mN m above 50 Hz.
@@ -132,7 +133,8 @@ class SensorParameters:
         current_noise_a: White noise. Measured: 4.75 mA above 50 Hz, over 0.95.
         current_offset_a: Measured: see `PlantParameters.command_full_scale_a`; assumed to be the
             converter's, so that it is there with the motor off too.
-        current_limit_count: Current counts saturate at plus and minus this. Assumed.
+        current_limit_count: Largest current count; the smallest is one beyond its negative.
+            Assumed: 16 bit, so that the drive's limit comes first.
         fsr_n_per_count: Grip force a count: 20 N at full scale. Assumed.
         fsr_offset_count: Output of the amplifier with no force. Assumed.
         fsr_noise_count: White noise. Assumed.
@@ -145,7 +147,7 @@ class SensorParameters:
     jaw_count_per_turn: float = _fixed(4000.0)
     torque_n_m_per_count: float = _fixed(0.000039811)
     torque_quantum_count: float = _fixed(2.0)
-    torque_limit_count: float = _fixed(32766.0)
+    torque_limit_count: float = _fixed(32767.0)
     proximal_noise_n_m: float = 0.29e-3
     distal_noise_n_m: float = 0.22e-3
     proximal_offset_n_m: float = -7e-3
@@ -156,7 +158,7 @@ class SensorParameters:
     current_a_per_count: float = _fixed(1e-3)
     current_noise_a: float = 5e-3
     current_offset_a: float = -0.019
-    current_limit_count: float = _fixed(1000.0)
+    current_limit_count: float = _fixed(32767.0)
     fsr_n_per_count: float = _fixed(20.0 / 4095.0)
     fsr_offset_count: float = 40.0
     fsr_noise_count: float = 4.0

@@ -83,15 +83,15 @@ def sample(
         + state[plant.DISTAL_DRIFT]
         + s.distal_noise_n_m * normal(seed, tick, 3)
     )
-    counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit, limit)
-    counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit, limit)
+    counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
+    counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
 
     current = state[plant.CURRENT]
     if effects[hidden.CURRENT_SENSOR_BEND, hidden.STRENGTH] != 0.0:
         current *= hidden.current_sensor_bend_ratio(effects[hidden.CURRENT_SENSOR_BEND], current)
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
     counts[CURRENT] = _converted(
-        current / s.current_a_per_count, 1.0, -s.current_limit_count, s.current_limit_count
+        current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count
     )
 
     grip = max(state[plant.DISTAL_TORQUE], 0.0) / s.lever_arm_m

