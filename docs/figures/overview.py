@@ -51,9 +51,7 @@ def draw(path: Path) -> None:
         )
         axes.text(x + width / 2, y + 0.5, text, ha="center", va="center", fontsize=9, color=INK)
     for start, stop in ARROWS:
-        axes.add_patch(
-            FancyArrowPatch(start, stop, arrowstyle="-|>", mutation_scale=12, color=INK)
-        )
+        axes.add_patch(FancyArrowPatch(start, stop, arrowstyle="-|>", mutation_scale=12, color=INK))
     back = FancyArrowPatch(
         (8.05, 0.0),
         (5.55, 0.0),
@@ -63,9 +61,7 @@ def draw(path: Path) -> None:
         color="#b44d12",
     )
     axes.add_patch(back)
-    axes.text(
-        6.8, -0.62, "the effect that was missing", ha="center", fontsize=9, color="#b44d12"
-    )
+    axes.text(6.8, -0.62, "the effect that was missing", ha="center", fontsize=9, color="#b44d12")
     axes.text(0.0, 3.15, "the rig", fontsize=10, weight="bold", color=INK)
     axes.text(2.3, 1.15, "the software", fontsize=10, weight="bold", color=INK)
     figure.savefig(path, metadata={"Date": None})
