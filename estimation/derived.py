@@ -67,6 +67,29 @@ def _derive(
     return channels
 
 
+def settled(channels: Recording, low_pass: LowPass, step: int = 1) -> Recording:
+    """Return every n-th sample that is valid and away from the ends of its run.
+
+    At the ends the filter works on a reflection of the run, and a second derivative shows it.
+
+    Args:
+        channels: Filtered channels of one whole run.
+        low_pass: The filter they went through.
+        step: Keep every n-th sample.
+    """
+    edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
+    inner = channels.valid.copy()
+    inner[:edge] = False
+    inner[max(len(inner) - edge, 0) :] = False
+    kept = np.flatnonzero(inner)[::step]
+    return replace(
+        channels,
+        time_s=channels.time_s[kept],
+        columns={name: values[kept] for name, values in channels.columns.items()},
+        flags=channels.flags[kept],
+    )
+
+
 def zero_phase_channels(
     recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
 ) -> Recording:

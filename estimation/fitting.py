@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from estimation.campaign import Campaign
+from estimation.derived import settled
 from estimation.errors import EstimationError
 from estimation.model import (
     Estimate,
@@ -109,16 +110,9 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recor
     runs = []
     for recording in campaign.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
-        channels = balance_channels(model, recording)
-        kept = np.flatnonzero(channels.valid)[::step]
-        if kept.size:
-            runs.append(
-                Recording(
-                    name=channels.name,
-                    time_s=channels.time_s[kept],
-                    columns={name: values[kept] for name, values in channels.columns.items()},
-                )
-            )
+        run = settled(balance_channels(model, recording), model.low_pass, step)
+        if len(run):
+            runs.append(run)
     if not runs:
         raise FitError(
             f"There is no valid sample to fit the model {model.name!r} on.",

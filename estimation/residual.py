@@ -16,7 +16,7 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
-from estimation.derived import measured_channels, zero_phase_channels
+from estimation.derived import measured_channels, settled, zero_phase_channels
 from estimation.errors import EstimationError
 from estimation.model import Model, estimate
 from estimation.recording import FloatArray, Recording
@@ -128,13 +128,7 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
             recording, [*model.channels, model.target, *there], model.low_pass
         )
         step = max(1, int(recording.sample_rate_hz / rate_hz))
-        kept = np.flatnonzero(channels.valid)[::step]
-        run = Recording(
-            name=channels.name,
-            time_s=channels.time_s[kept],
-            columns={name: values[kept] for name, values in channels.columns.items()},
-            conditions=channels.conditions,
-        )
+        run = settled(channels, model.low_pass, step)
         estimated = estimate(model, run)
         found.append(RunResidual(run, estimated, run[model.target] - estimated))
     return found

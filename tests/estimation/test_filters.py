@@ -103,7 +103,9 @@ def test_causal_filter_starts_settled_and_looks_only_back():
     assert CausalFilter(RATE_HZ).step(rows) == pytest.approx(rows)
     changed = rows.copy()
     changed[30:] = 9.0
-    assert np.array_equal(CausalFilter(RATE_HZ).step(changed)[:30], CausalFilter(RATE_HZ).step(rows)[:30])
+    assert np.array_equal(
+        CausalFilter(RATE_HZ).step(changed)[:30], CausalFilter(RATE_HZ).step(rows)[:30]
+    )
 
 
 def run_of(n: int = 3000, keep: np.ndarray | None = None, **flags: object) -> Recording:
@@ -160,7 +162,9 @@ def test_a_clock_that_jumps_is_named():
 WANTED = ["motor_velocity_rad_s", "spindle_acceleration_rad_s2", "gearbox_differential_rad"]
 
 
-@pytest.mark.parametrize(("source", "tolerance"), [(zero_phase_channels, 1e-3), (causal_channels, 0.07)])
+@pytest.mark.parametrize(
+    ("source", "tolerance"), [(zero_phase_channels, 1e-3), (causal_channels, 0.07)]
+)
 def test_derived_channels_are_the_derivatives(source, tolerance):
     run = run_of()
     found = source(run, WANTED)
@@ -168,7 +172,9 @@ def test_derived_channels_are_the_derivatives(source, tolerance):
     speed = 35 * 0.5 * w * np.cos(w * t)
     acceleration = -0.5 * w**2 * np.sin(w * t)
     assert np.abs(found["motor_velocity_rad_s"] - speed)[middle].max() < tolerance * 110
-    assert np.abs(found["spindle_acceleration_rad_s2"] - acceleration)[middle].max() < tolerance * 20
+    assert (
+        np.abs(found["spindle_acceleration_rad_s2"] - acceleration)[middle].max() < tolerance * 20
+    )
     assert found["gearbox_differential_rad"] == pytest.approx(np.zeros(3000), abs=1e-9)
 
 
@@ -176,7 +182,9 @@ def test_derived_channels_are_the_derivatives(source, tolerance):
 @given(cuts=st.lists(st.integers(0, 500), max_size=8), seed=st.integers(0, 5))
 def test_causal_channels_do_not_care_how_samples_are_cut(cuts, seed):
     random = np.random.default_rng(seed)
-    time_s = np.cumsum(random.choice([1, 2, 7, 400], size=500, p=[0.9, 0.05, 0.04, 0.01])) * PERIOD_S
+    time_s = (
+        np.cumsum(random.choice([1, 2, 7, 400], size=500, p=[0.9, 0.05, 0.04, 0.01])) * PERIOD_S
+    )
     angle = np.cumsum(random.normal(size=500))
     angle[random.integers(0, 500, 10)] = np.nan
     run = {"motor_angle_rad": angle, "spindle_angle_rad": angle / 7}
