@@ -31,10 +31,6 @@ class CurrentTimesConstant:
 
     target_channel = "distal_torque_n_m"
 
-    def stream(self) -> "CurrentTimesConstant":
-        """Begin a stream; this estimate has no memory."""
-        return self
-
     def push(
         self, columns: Mapping[str, NDArray[np.float64]], time_s: NDArray[np.float64]
     ) -> NDArray[np.float64]:
@@ -80,9 +76,9 @@ def with_devices(blocks: Iterator[SampleBlock]) -> Iterator[SampleBlock]:
 
 def draw() -> str:
     """Return the display of the last moment as SVG."""
-    recording, model = synthetic_recording(), CurrentTimesConstant()
-    state = LiveState((model.target_channel,))
-    for block in with_devices(replay_blocks(recording, model, speed=None)):
+    recording, estimator = synthetic_recording(), CurrentTimesConstant()
+    state = LiveState((estimator.target_channel,))
+    for block in with_devices(replay_blocks(recording, estimator, speed=None)):
         state.feed(block)
     console = Console(
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,

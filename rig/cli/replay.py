@@ -11,7 +11,7 @@ from rig.cli.output import JsonFlag, console
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
-    from rig.live.replay import StreamingModel
+    from rig.live.replay import EstimateStream
 
 
 def replay(
@@ -47,7 +47,7 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_campaign(log, format_), run, quiet=json_)
-    estimator = _load(model) if model else None
+    estimator = _estimator(model, recording) if model else None
     target = estimator.target_channel if estimator else "distal_torque_n_m"
     options = ShowOptions(
         title=f"rig replay {recording.name}",
@@ -94,8 +94,8 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _load(path: Path) -> "StreamingModel":
-    """Read a model file."""
+def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
+    """Read a model file and begin a stream of its estimates."""
     from estimation.model import load_model
 
-    return load_model(path)
+    return load_model(path).stream()

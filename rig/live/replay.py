@@ -1,4 +1,4 @@
-"""A recording as the stream of blocks it once was, with any model's estimate beside it."""
+"""A recording as the stream of blocks it once was, with any estimate beside it."""
 
 import itertools
 import time
@@ -18,24 +18,17 @@ ESTIMATED = "estimated_"
 class EstimateStream(Protocol):
     """A causal estimator in the middle of a stream."""
 
-    def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
-        """Return the estimate of the next samples, shape (n,), and keep the state they leave."""
-
-
-class StreamingModel(Protocol):
-    """What a model must offer to be shown live."""
-
     @property
     def target_channel(self) -> str:
         """The channel it estimates."""
 
-    def stream(self) -> EstimateStream:
-        """Begin a stream with no past."""
+    def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
+        """Return the estimate of the next samples, shape (n,), and keep the state they leave."""
 
 
 def replay_blocks(
     recording: Recording,
-    model: StreamingModel | None,
+    estimator: EstimateStream | None,
     speed: float | None,
     block_s: float = 0.05,
     sleep: Callable[[float], None] = time.sleep,
@@ -43,12 +36,12 @@ def replay_blocks(
 ) -> Iterator[SampleBlock]:
     """Yield a recording block by block, at the pace of its own clock or faster.
 
-    Estimates are the model's, and those recorded in `estimated_*` columns for other channels.
+    Estimates are the estimator's, and those recorded in `estimated_*` columns for other channels.
     Samples flagged missing and gaps in the clock count as lost.
 
     Args:
         recording: The run.
-        model: Estimates its target from the columns; None for none.
+        estimator: A stream that has seen nothing yet; None for none.
         speed: Times real time; None for as fast as it can be read.
         block_s: Time a block covers, s.
         sleep: Waits, s.
@@ -62,19 +55,18 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, model, speed, block_s, sleep, clock)
+    return _blocks(recording, estimator, speed, block_s, sleep, clock)
 
 
 def _blocks(
     recording: Recording,
-    model: StreamingModel | None,
+    estimator: EstimateStream | None,
     speed: float | None,
     block_s: float,
     sleep: Callable[[float], None],
     clock: Callable[[], float],
 ) -> Iterator[SampleBlock]:
     lost = lost_samples(recording)
-    stream = model.stream() if model else None
     start_s, began_s = float(recording.time_s[0]), clock()
     block_of = np.floor((recording.time_s - start_s) / block_s)
     edges = [0, *(np.flatnonzero(np.diff(block_of)) + 1).tolist(), len(recording)]
@@ -87,8 +79,8 @@ def _blocks(
             for name, values in columns.items()
             if name.startswith(ESTIMATED)
         }
-        if model is not None and stream is not None:
-            estimates[model.target_channel] = stream.push(columns, time_s)
+        if estimator is not None:
+            estimates[estimator.target_channel] = estimator.push(columns, time_s)
         if speed is not None:
             # against the clock and not from block to block, so that small delays do not add up
             wait_s = (float(time_s[-1]) - start_s) / speed - (clock() - began_s)

@@ -7,7 +7,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, Protocol
 
 from rich.console import Console
+from rich.control import Control
 from rich.live import Live
+from rich.segment import Segment
 
 from estimation.channels import unit_of
 from rig.cli.output import emit_json
@@ -16,6 +18,19 @@ from rig.live.plain import json_frame, plain_line
 from rig.live.state import Snapshot, Summary
 from rig.live.text import summary_lines
 from rig.live.view import View
+
+
+def _sequence(code: str) -> Control:
+    """Return an escape sequence that rich passes on as it is."""
+    control = Control()
+    control.segment = Segment(code, None, [])
+    return control
+
+
+# synchronised update (DEC private mode 2026): the terminal shows the frame whole, with no moment
+# in which the old one is wiped and the new one not yet there; terminals without it ignore it
+BEGIN_FRAME = _sequence("\x1b[?2026h")
+END_FRAME = _sequence("\x1b[?2026l")
 
 
 class OutputClosedError(Exception):
@@ -146,7 +161,12 @@ class DisplayWriter:
             # lines of another width have wrapped and cannot be drawn over
             self._size = self._console.size
             self._console.clear()
-        self._live.update(self._view(snapshot), refresh=True)
+        with self._console:  # one write a frame
+            self._console.control(BEGIN_FRAME)
+            try:
+                self._live.update(self._view(snapshot), refresh=True)
+            finally:
+                self._console.control(END_FRAME)
 
     def _view(self, snapshot: Snapshot) -> View:
         return View(snapshot, self._options.title, self._options.lever_m)

@@ -32,21 +32,14 @@ def recording(name="07", seconds=2.0, **changes):
 
 
 class Smoothed:
-    """A model with a memory: current times a constant through a first-order low-pass."""
+    """An estimator with a memory: current times a constant through a first-order low-pass."""
 
     target_channel = GRIP
 
-    def stream(self):
-        """Begin with the filter at zero."""
-        return SmoothedStream()
-
-
-class SmoothedStream:
     def __init__(self):
         self._state = 0.0
 
     def push(self, columns, time_s):
-        """Return the filtered estimate."""
         out = np.empty(time_s.size)
         for i, current_a in enumerate(columns["motor_current_a"]):
             self._state += 0.1 * (0.4 * current_a - self._state)
@@ -100,18 +93,18 @@ def test_a_slow_reader_is_caught_up_with_and_not_waited_for():
 
 def test_the_model_sees_one_stream_whatever_the_blocks():
     source = recording()
-    whole = SmoothedStream().push(source.columns, source.time_s)
+    whole = Smoothed().push(source.columns, source.time_s)
     blocks = replay_blocks(source, Smoothed(), None, block_s=0.013)
     cut = np.concatenate([b.estimates[GRIP] for b in blocks])
     np.testing.assert_array_equal(cut, whole)
 
 
-def test_recorded_estimates_are_shown_unless_a_model_replaces_them():
+def test_recorded_estimates_are_shown_unless_an_estimator_replaces_them():
     source = recording().with_columns(**{ESTIMATED: np.full(2000, 0.5)})
     first = next(replay_blocks(source, None, None))
     assert set(first.estimates[GRIP]) == {0.5}
-    with_model = next(replay_blocks(source, Smoothed(), None))
-    assert with_model.estimates[GRIP][0] < 0.1
+    estimated = next(replay_blocks(source, Smoothed(), None))
+    assert estimated.estimates[GRIP][0] < 0.1
 
 
 def test_gaps_and_missing_samples_count_as_lost():
@@ -193,7 +186,7 @@ def test_command_shows_the_run_asked_for_and_why_it_does_not_count(logs, capsys)
 
 
 def test_command_runs_a_model(logs, capsys, monkeypatch):
-    monkeypatch.setattr("rig.cli.replay._load", lambda path: Smoothed())
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Smoothed())
     path = logs(recording())
     assert command(path, "--json", "--speed", "0", "--model", "model.json") == 0
     frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -203,17 +196,13 @@ def test_command_runs_a_model(logs, capsys, monkeypatch):
 
 
 def test_command_interrupted_leaves_with_130(logs, capsys, monkeypatch):
-    class Interrupting(Smoothed, SmoothedStream):
-        def stream(self):
-            self._state = 0.0
-            return self
-
+    class Interrupting(Smoothed):
         def push(self, columns, time_s):
             if time_s[0] > 0.5:
                 raise KeyboardInterrupt
             return super().push(columns, time_s)
 
-    monkeypatch.setattr("rig.cli.replay._load", lambda path: Interrupting())
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Interrupting())
     assert command(logs(recording()), "--json", "--speed", "0", "--model", "m.json") == 130
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert last["summary"]["ended"] == "interrupted"
