@@ -141,7 +141,7 @@ def _traces(reading: Reading, width: int, free: int) -> Iterator[Text]:
     factor, unit, _ = words.in_shown_unit(reading.unit)
     traces = {"estimate": reading.estimate_trace * factor, "sensor": reading.sensor_trace * factor}
     shown = {name: trace for name, trace in traces.items() if not np.all(np.isnan(trace))}
-    height = min((free - 1) // max(len(shown), 1), 6)
+    height = min(free - 1, 12) // max(len(shown), 1)
     if not shown or height < 1:
         return
     scale = round_scale(
