@@ -95,7 +95,7 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
 
 
 def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
-    """Read a model file and begin a stream of its estimates."""
-    from estimation.model import load_model
+    """Read a model file and begin a stream of its estimates at the recording's rate."""
+    from rig.live.estimator import ModelEstimator
 
-    return load_model(path).stream()
+    return ModelEstimator(path, recording.sample_rate_hz)

@@ -21,6 +21,8 @@ VALUE_S = 0.1
 RATE_S = 2.0
 ERROR_S = 5.0
 TRACE_S = 10.0
+SILENT_BLOCKS = 2
+"""From so many blocks without samples in a row on, the last value is no longer that of now."""
 
 FLAGS = tuple(flag for flag in Flag if flag)
 RECEIVED, ROWS, FIRST_FLAG = 0, 1, 2
@@ -133,6 +135,7 @@ class LiveState:
         self._last: SampleBlock | None = None
         self._estimated: frozenset[str] = frozenset()
         self._sensed: frozenset[str] = frozenset()
+        self._silent = 0
         self._duration_s = 0.0
         self._samples = 0
         self._flagged = np.zeros(len(FLAGS), np.int64)
@@ -147,7 +150,8 @@ class LiveState:
     def feed(self, block: SampleBlock) -> None:
         """Take in one block; where time runs backwards, a device restarted and so do the traces."""
         self._last = block
-        if len(block) == 0:
+        self._silent = self._silent + 1 if len(block) == 0 else 0
+        if self._silent:
             return
         self._estimated, self._sensed = frozenset(block.estimates), frozenset(block.columns)
         first_s, last_s = float(block.time_s[0]), float(block.time_s[-1])
@@ -240,7 +244,7 @@ class LiveState:
         A mean over less than half of the samples would stand for the time when all was well, not
         for now, so it is not shown.
         """
-        if self._last is None or len(self._last) == 0:
+        if self._time_s is None or self._silent >= SILENT_BLOCKS:
             return Value(None, "no samples arriving")
         if absent:
             return Value(None, absent)

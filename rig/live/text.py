@@ -120,7 +120,7 @@ def limit_words(limit: LimitStatus) -> str:
 
 def summary_lines(summary: Summary, unit: str) -> list[str]:
     """Return what a whole stream came to, in lines."""
-    how = {"finished": "Finished", "interrupted": "Stopped by Ctrl-C"}.get(summary.ended, "Ended")
+    how = {"finished": "Finished", "interrupted": "Stopped"}.get(summary.ended, "Ended")
     lines = [
         f"{how} after {summary.duration_s:.1f} s: {summary.samples} samples, "
         f"{lost(summary.lost, summary.samples)}."

@@ -115,7 +115,7 @@ def test_ctrl_c_leaves_with_a_summary_and_closes_the_stream(terminal):
     assert summary.lost == 3
     assert summary.error_rms == pytest.approx(0.002)
     assert closed == [True]
-    assert "Stopped by Ctrl-C after 2.0 s" in console.file.getvalue()
+    assert "Stopped after 2.0 s" in console.file.getvalue()
 
 
 def test_ctrl_c_while_drawing_closes_the_stream():

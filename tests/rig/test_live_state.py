@@ -109,8 +109,11 @@ def test_absent_sensor_and_estimator_are_told_apart():
     assert reading.sensor.missing == "no sensor"
 
 
-def test_a_block_without_samples_means_that_nothing_arrives():
-    state = state_of(block(0, 500), block(500, 0, devices=(DeviceStatus("teensy", "stale"),)))
+def test_blocks_without_samples_mean_that_nothing_arrives():
+    silence = block(500, 0, columns={}, devices=(DeviceStatus("teensy", "stale"),))
+    state = state_of(block(0, 500), silence)
+    assert state.snapshot().readings[0].sensor.number == pytest.approx(0.1), "one may be late"
+    state.feed(silence)
     snapshot = state.snapshot()
     assert snapshot.readings[0].sensor.missing == "no samples arriving"
     assert snapshot.devices[0].state == "stale"
