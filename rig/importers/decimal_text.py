@@ -20,7 +20,7 @@ class Fault(IntEnum):
     TOO_FEW_COLUMNS = 2
     TOO_MANY_COLUMNS = 3
     TOO_MANY_DIGITS = 4  # more than 15: float64 could not hold them exactly
-    UNTERMINATED = 5  # the text ends inside a line
+    TOO_MANY_ROWS = 5  # more lines than the caller made room for
 
 
 MAX_DIGITS = 15
@@ -35,57 +35,65 @@ def parse_decimals(
     """Parse decimal text into columns, one pass over the bytes.
 
     Args:
-        text: Bytes of the lines, shape (bytes,).
-        columns: Filled in place, shape (number of columns, rows); rows is at least the number of
-            line ends in the text.
+        text: Bytes of the lines, shape (bytes,); the last one must be a line feed, which is the
+            sentinel that stops every loop.
+        columns: Filled in place, shape (number of columns, rows).
 
     Returns:
         Fault (0 when the whole text was parsed), complete rows before it, column of the fault and
         byte position of the fault.
     """
-    width, row, column = columns.shape[0], 0, 0
-    position, size = 0, text.size
+    width, room = columns.shape
+    row, column = 0, 0
+    one = np.uint64(1)  # unsigned positions: no wrap-around test at each access
+    position, size = np.uint64(0), np.uint64(text.size)
     while position < size:
-        negative = text[position] == _MINUS
-        if negative or text[position] == _PLUS:
-            position += 1
-        mantissa, digits, decimals, point = 0, 0, 0, False
-        while position < size:
+        sign = text[position]
+        position += np.uint64((sign == _MINUS) | (sign == _PLUS))
+        first = position
+        mantissa = np.int64(0)
+        digit = np.int64(text[position]) - _ZERO
+        while 0 <= digit <= 9:
+            mantissa = mantissa * 10 + digit
+            position += one
             digit = np.int64(text[position]) - _ZERO
-            if 0 <= digit <= 9:
+        digits = np.int64(position - first)
+        decimals = np.int64(0)
+        if text[position] == _POINT:
+            position += one
+            first = position
+            digit = np.int64(text[position]) - _ZERO
+            while 0 <= digit <= 9:
                 mantissa = mantissa * 10 + digit
-                digits += 1
-                decimals += point
-                if digits > MAX_DIGITS:
-                    return 4, row, column, position
-            elif text[position] == _POINT and not point:
-                point = True
-            else:
-                break
-            position += 1
-        if position == size:
-            return 5, row, column, position
+                position += one
+                digit = np.int64(text[position]) - _ZERO
+            decimals = np.int64(position - first)
+            digits += decimals
         if digits == 0:
-            return 1, row, column, position
+            return 1, row, column, int(position)
+        if digits > MAX_DIGITS:
+            return 4, row, column, int(position)
         if column == width:
-            return 3, row, column, position
-        value = mantissa / _POWERS[decimals]
-        columns[column, row] = -value if negative else value
+            return 3, row, column, int(position)
+        if row == room:
+            return 5, row, column, int(position)
+        value = np.float64(mantissa)
+        if decimals > 0:
+            value /= _POWERS[decimals]
+        columns[column, row] = -value if sign == _MINUS else value
         column += 1
-        if text[position] == _COMMA:
-            position += 1
-            if position == size:
-                return 5, row, column, position
+        end = text[position]
+        if end == _COMMA:
+            position += one
             continue
-        if text[position] == _RETURN:
-            position += 1
-            if position == size:
-                return 5, row, column, position
-        if text[position] != _NEWLINE:
-            return 1, row, column - 1, position
+        if end == _RETURN:
+            position += one
+            end = text[position]
+        if end != _NEWLINE:
+            return 1, row, column - 1, int(position)
         if column < width:
-            return 2, row, column, position
-        position += 1
+            return 2, row, column, int(position)
+        position += one
         row += 1
         column = 0
-    return 0, row, 0, position
+    return 0, row, 0, int(position)

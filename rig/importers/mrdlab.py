@@ -4,17 +4,19 @@ A path may be one `.TXT` log, a folder of logs, a folder of such folders, or a t
 these. Runs load when asked. What the columns become is described in `mrdlab_run`.
 """
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 from estimation.campaign import Campaign, Run
-from estimation.recording import Recording
 from rig.errors import DataError
 from rig.importers.archive import first_text, is_archive, unpack_text
 from rig.importers.mrdlab_run import load_run
 from rig.importers.mrdlab_text import looks_like_log
 
 FIRST_BYTES = 4096
+MAX_DEPTH = 3
+"""Folders below the one given that are looked into."""
 
 
 class MrdlabImporter:
@@ -60,42 +62,40 @@ def _campaign(path: Path, root: Path, logs: list[Path]) -> Campaign:
             "Give the folder the logs lie in.",
         )
     several = len({log.parent for log in logs}) > 1
+    inside = is_archive(path)
+    companions = {folder: _companions(folder) for folder in {log.parent for log in logs}}
     runs = []
     for log in logs:
         name = f"{log.parent.name}/{log.stem}" if several else log.stem
         # inside an archive, the archive is the file a person knows
-        inside = is_archive(path)
         source = f"{path}:{log.relative_to(root).as_posix()}" if inside else str(log)
-        runs.append(Run(name, partial(_load, log, name, source), path if inside else log))
+        runs.append(
+            Run(
+                name,
+                partial(load_run, log, name, source, companions[log.parent]),
+                path if inside else log,
+            )
+        )
     return Campaign(tuple(runs))
-
-
-def _load(log: Path, name: str, source: str) -> Recording:
-    return load_run(log, name, source, _companions(log.parent))
 
 
 def _logs(root: Path) -> list[Path]:
     """Return the logs under a folder in file order.
 
-    A log starts with `%`. A file named by digits alone is meant to be one, so it is listed even when
-    it does not, and reading it says what is wrong; other text (read-me, serial log) is no run.
+    A log starts with `%`. A file named by digits alone is meant to be one, so it is listed even
+    when it does not, and reading it says what is wrong; other text (read-me, serial log) is no run.
     """
     return [file for file in _texts(root) if file.stem.isdigit() or _first_bytes(file)[:1] == b"%"]
 
 
-def _texts(root: Path) -> list[Path]:
-    """Return the text files in a folder and in the folders directly below it, sorted by name.
-
-    An archive may wrap its folders in one more, so folders that hold only one folder are entered.
-    """
-    entries = sorted(root.iterdir())
-    while len(entries) == 1 and entries[0].is_dir():
-        entries = sorted(entries[0].iterdir())
-    files = [entry for entry in entries if _is_text(entry)]
-    for folder in entries:
-        if folder.is_dir():
-            files += [entry for entry in sorted(folder.iterdir()) if _is_text(entry)]
-    return files
+def _texts(root: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
+    """Walk the text files of a folder, then those of the folders in it, each sorted by name."""
+    entries = sorted(entry for entry in root.iterdir() if not entry.name.startswith("."))
+    yield from (entry for entry in entries if _is_text(entry))
+    if depth:
+        for entry in entries:
+            if entry.is_dir() and not entry.is_symlink():
+                yield from _texts(entry, depth - 1)
 
 
 def _is_text(path: Path) -> bool:

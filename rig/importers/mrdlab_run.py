@@ -1,16 +1,19 @@
 """Turn one MRDLab log into a recording: SI units, closing-positive signs, conditions, flags.
 
-Zeros of the encoders are left as logged. The motor's and the jaw's zero differ from folder to folder
-and step when a gear or cable slips; they are stated as the conditions `motor_zero_offset_rad` and
-`jaw_zero_offset_rad` and never taken off, because an offset taken from a whole run carries that run's
-mean load into every sample.
+Zeros of the encoders are left as logged. The motor's and the jaw's zero differ from folder to
+folder and step when a gear or cable slips. They are stated and never taken off, because an offset
+taken from a whole run carries that run's mean load into every sample:
+
+- `motor_zero_offset_rad`: median of motor angle - 35 x spindle angle, on the motor's side;
+- `jaw_zero_offset_rad`: jaw angle at spindle angle zero, from a line fitted to the run. The load
+  stretches the cable, so it falls with the load; compare runs of equal load (`jaw_steps`).
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from estimation.recording import FloatArray, Recording, Stretch
+from estimation.recording import FloatArray, Recording, Stretch, read_only
 from rig.importers import mrdlab_text as raw
 from rig.importers.mrdlab_flags import missing, runaways, saturated
 from rig.importers.mrdlab_identity import identify
@@ -33,6 +36,8 @@ QUANTA_RATIO = (1.0, 0.1, 0.01, 0.001, 1e-4)
 COARSE_COMMAND_RATIO = 0.005
 """A quantum of 0.01 is 20 mN m at the spindle; 1e-4 is far below the sensor's noise."""
 USUAL_DURATION_S = 20.0
+THINNING = 10
+"""Zeros and slopes are fitted to every tenth sample; short dot products stay off BLAS threads."""
 
 
 def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
@@ -55,7 +60,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     text = raw.read_text(path)
     identity = identify(path.parent.name, path.stem, text.header)
     remarks = list(identity.remarks)
-    time_s = text.columns[raw.TIME]
+    time_s = read_only(text.columns[raw.TIME])  # a copy: the text's block can be freed
     columns = _channels(text.columns)
     target = _target(text.columns, remarks)
     if target is not None:
@@ -66,7 +71,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
         sine = None
     if sine is None:
         remarks.append(
-            "The trajectory is not one sine: no frequency is stated and runaways are not looked for."
+            "The trajectory is not one sine: no frequency is stated, runaways are not looked for."
         )
     conditions = identity.conditions | _conditions(columns, sine, remarks)
     for values in columns.values():
@@ -109,18 +114,20 @@ def _target(columns: FloatArray, remarks: list[str]) -> FloatArray | None:
     Newer logs hold counts, older ones rad, some only zeros. Target and spindle share their zero, so
     the slope of a fit through the origin tells counts (1) from rad (2 pi / 8192).
     """
-    target, spindle = columns[raw.TARGET], columns[raw.SPINDLE]
+    target = columns[raw.TARGET]
     if not target.any():
         remarks.append("The target column holds zeros only; the channel is left out.")
         return None
+    spindle = columns[raw.SPINDLE, ::THINNING]
     energy = float(spindle @ spindle)
-    slope = float(target @ spindle) / energy if energy > 0 else 0.0
+    slope = float(target[::THINNING] @ spindle) / energy if energy > 0 else 0.0
     for unit, rad in TARGET_UNITS.items():
         expected = SPINDLE_RAD / rad
         if expected / TARGET_TOLERANCE_RATIO < slope < expected * TARGET_TOLERANCE_RATIO:
             if unit != "counts":
                 remarks.append(f"The target column is in {unit}, not in counts.")
-            return target * (CLOSING_SIGN[raw.TARGET] * rad)
+            angle_rad: FloatArray = target * (CLOSING_SIGN[raw.TARGET] * rad)
+            return angle_rad
     remarks.append(
         f"The target column fits the spindle by {slope:.3g}, neither as counts (1) nor as rad "
         f"({SPINDLE_RAD:.3g}); the channel is left out."
@@ -147,7 +154,9 @@ def _conditions(
             f"The command is quantised to {quantum:g} (0.01 is about 20 mN m at the spindle): use "
             "the measured current instead."
         )
-    spindle, motor, jaw = (columns[f"{n}_angle_rad"] for n in ("spindle", "motor", "jaw"))
+    spindle, motor, jaw = (
+        columns[f"{n}_angle_rad"][::THINNING] for n in ("spindle", "motor", "jaw")
+    )
     conditions["motor_zero_offset_rad"] = float(np.median(motor - GEAR_RATIO * spindle))
     centred = spindle - spindle.mean()
     moved = float(centred @ centred)
@@ -161,10 +170,15 @@ def _conditions(
 def _quantum(command: FloatArray) -> float:
     """Return the largest power of ten all commands are multiples of."""
     for quantum in QUANTA_RATIO:
-        ticks = command / quantum
-        if np.all(np.abs(ticks - np.rint(ticks)) < 1e-6):
+        # the first samples rule most quanta out
+        if _multiples(command[:256], quantum) and _multiples(command, quantum):
             return quantum
     return 0.0
+
+
+def _multiples(values: FloatArray, quantum: float) -> bool:
+    ticks = values / quantum
+    return bool(np.all(np.abs(ticks - np.rint(ticks)) < 1e-6))
 
 
 def _bad_stretches(

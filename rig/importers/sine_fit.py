@@ -6,9 +6,10 @@ import numpy as np
 
 from estimation.recording import FloatArray
 
-FIT_PERIOD_S = 0.02
+FIT_PERIOD_S = 0.04
 """Samples are thinned to this spacing for the fit: hand and rig trajectories stay below 5 Hz."""
 ITERATIONS = 12
+CONVERGED_HZ = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,21 +57,27 @@ def fit_sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
         return None
     padded = 8 * t.size
     spectrum = np.abs(np.fft.rfft(y - y.mean(), padded))
-    frequency = float(np.argmax(spectrum)) / (padded * period_s * step)
+    frequency = float(np.argmax(spectrum[1:]) + 1) / (padded * period_s * step)
+    # a step beyond half a spectral line would leave the peak it started from
+    limit = 0.5 / float(t[-1] - t[0])
+    a, b, c = 0.0, 0.0, float(y.mean())
+    residual = y
     for _ in range(ITERATIONS):
-        sine, cosine = np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)
-        (a, b, c), *_ = np.linalg.lstsq(
-            np.column_stack([sine, cosine, np.ones_like(t)]), y, rcond=None
-        )
-        slope = 2 * np.pi * t * (a * cosine - b * sine)
-        columns = np.column_stack([sine, cosine, np.ones_like(t), slope])
-        residual = y - (a * sine + b * cosine + c)
-        change = float(np.linalg.lstsq(columns, residual, rcond=None)[0][3])
-        # half a spectral line at most: a larger step leaves the peak it started from
-        limit = 0.5 / (t[-1] - t[0])
-        frequency = abs(frequency + min(max(change, -limit), limit))
-        if abs(change) < 1e-9:
+        phase = 2 * np.pi * frequency * t
+        rows = np.stack([np.sin(phase), np.cos(phase), np.ones_like(t)])
+        try:
+            a, b, c = np.linalg.solve(rows @ rows.T, rows @ y)
+            residual = y - (a * rows[0] + b * rows[1] + c)
+            slope = 2 * np.pi * t * (a * rows[1] - b * rows[0])
+            rows = np.concatenate([rows, slope[None, :]])
+            change = float(np.linalg.solve(rows @ rows.T, rows @ residual)[3])
+        except np.linalg.LinAlgError:
+            return None  # the amplitude vanishes, or the period is far beyond the run
+        if not np.isfinite(change):
+            return None
+        if abs(change) < CONVERGED_HZ:
             break
+        frequency = abs(frequency + min(max(change, -limit), limit))
     if frequency * (t[-1] - t[0]) < 0.9:
         return None
     return Sine(
