@@ -69,12 +69,12 @@ def parse_decimals(
                 digit = np.int64(text[position]) - _ZERO
             decimals = np.int64(position - first)
             digits += decimals
+        if column == width:
+            return 3, row, column, int(position)
         if digits == 0:
             return 1, row, column, int(position)
         if digits > MAX_DIGITS:
             return 4, row, column, int(position)
-        if column == width:
-            return 3, row, column, int(position)
         if row == room:
             return 5, row, column, int(position)
         value = np.float64(mantissa)
