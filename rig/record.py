@@ -5,33 +5,31 @@ rest. Each run's log is complete in itself, so an aborted campaign resumes at th
 has no log.
 """
 
+import itertools
 import json
 import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from calibration.zero import Drift, SensorZero, drift_verdicts, measure_zeros
-from rig import __version__, trajectory
+from calibration.zero import Drift, SensorZero, drift_verdicts
+from rig import __version__
 from rig.config import Config
 from rig.errors import UsageError
 from rig.files import write_text_atomic
+from rig.log.container import Attached
+from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
-from rig.log.streams import COUNTS, SAMPLE, counts_block, sample_block, sample_stream
-from rig.log.writer import LogWriter
+from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
+from rig.log.writer import PART_SUFFIX, LogWriter
+from rig.motion import Motion, motion_of
 from rig.protocol import Protocol, RunPlan
 from rig.session import Reading, Session
 
 MANIFEST = "campaign.json"
 
 REST_S = 0.5
-APPROACH_SPEED_RAD_S = 0.8
-LOAD_RAMP_S = 0.5
-
 BYTES_PER_SAMPLE = 400
 """Upper bound of a sample's room on disk, both streams, before compression."""
 
@@ -63,6 +61,19 @@ class RunResult:
     def complete(self) -> bool:
         """Whether every planned sample is there."""
         return self.samples == self.expected
+
+    @property
+    def remark(self) -> str:
+        """What a person should know about the run; empty when it is as planned."""
+        remarks = []
+        if not self.complete:
+            remarks.append(f"{self.samples} of {self.expected} samples, {self.lost} lost")
+        remarks += [
+            f"zero of {d.channel} moved by {d.after - d.before:+.4g} {d.unit}, limit {d.limit:g}"
+            for d in self.drift
+            if not d.passes
+        ]
+        return "; ".join(remarks)
 
     @property
     def drifted(self) -> tuple[str, ...]:
@@ -112,7 +123,9 @@ def open_campaign_folder(
                 "Record into another folder.",
             )
     elif any(folder.iterdir()):
-        raise UsageError(f"{folder} is not empty and holds no campaign.", fix="Name another folder.")
+        raise UsageError(
+            f"{folder} is not empty and holds no campaign.", fix="Name another folder."
+        )
     else:
         write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
     plans = protocol.plans()
@@ -121,7 +134,11 @@ def open_campaign_folder(
 
 
 def record_campaign(
-    session: Session, plans: Iterable[RunPlan], folder: Path, on_progress: Progress | None = None
+    session: Session,
+    plans: Iterable[RunPlan],
+    folder: Path,
+    notes: str = "",
+    on_progress: Progress | None = None,
 ) -> Iterator[RunResult]:
     """Record runs one after the other; yields each as soon as its log is complete.
 
@@ -129,11 +146,12 @@ def record_campaign(
         session: An open session.
         plans: The runs.
         folder: Where the logs go.
+        notes: Operator's notes, kept in every log.
         on_progress: Told of the samples as they come.
     """
-    clock = _session_clock(session, folder)
+    epoch_ns = _epoch_ns(session, folder)
     for plan in plans:
-        yield _record_run(session, plan, _log_path(folder, plan), clock, on_progress)
+        yield _record_run(session, plan, _log_path(folder, plan), epoch_ns, notes, on_progress)
 
 
 def _record_run(
@@ -149,16 +167,18 @@ def _record_run(
     expected = motion.last - motion.first
     lost_before = session.counters["lost"]
     samples = 0
-    with _run_log(session, plan, path, before, notes) as log:
-        for reading in session.play(motion.target_angle_rad, motion.load_command_a):
-            run = reading.where(
-                (reading.setpoint >= motion.first) & (reading.setpoint < motion.last)
-            )
+    readings = session.play(motion.target_angle_rad, motion.load_command_a)
+    first = next(r for r in readings if len(_of_run(r, motion)))
+    run_start_us = int(_of_run(first, motion).tick_us[0])
+    with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
+        for reading in itertools.chain([first], readings):
+            run = _of_run(reading, motion)
             if len(run):
-                write_reading(log, run, epoch_ns)
+                _write_reading(log, run, run_start_us, epoch_ns)
                 samples += len(run)
                 if on_progress:
                     on_progress(plan.name, samples, expected)
+            log.poll()
         after = session.take_zeros(REST_S)
         drift = drift_verdicts(
             before, after, session.calibrations, session.config.drift.model_dump()
@@ -169,29 +189,106 @@ def _record_run(
     return result
 
 
-@contextmanager
-def _run_log(
-    session: Session, plan: RunPlan, path: Path, before: Mapping[str, SensorZero]
-) -> Iterator[LogWriter]:
+def _of_run(reading: Reading, motion: Motion) -> Reading:
+    """Return the samples that belong to the run itself, not to its approach or release."""
+    return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
+
+
+def _new_log(
+    session: Session,
+    plan: RunPlan,
+    path: Path,
+    started_at_ns: int,
+    before: Mapping[str, SensorZero],
+    notes: str,
+) -> LogWriter:
     config, calibrations = session.config, session.calibrations
     info = RunInfo(
         name=plan.name,
         rig=config.name,
         instrument=config.instrument.identity(),
         conditions=plan.conditions,
+        notes=notes,
+        started_at_ns=started_at_ns,
         duration_s=plan.duration_s,
         calibrations={calibrations.name: calibrations.content_hash},
-        zeros_before={name: zero.mean_counts for name, zero in before.items()},
+        zeros_before=_mean_counts(before),
         details={
             "rig_version": __version__,
             "firmware_version": session.identity.firmware_version,
             "logger_serial": session.identity.serial,
         },
     )
-    attachments = {
-        "config.json": json.dumps(config.model_dump(), indent=1).encode(),
-        "calibrations.json": calibrations.to_json().encode(),
-    }
+    settings = json.dumps(config.model_dump(), indent=1).encode()
+    attachments = [
+        Attached("config.json", "application/json", settings),
+        Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
+    ]
+    _set_aside_part(path)
     streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
-    with LogWriter(path, streams, info, attachments) as log:
-        yield log
+    return LogWriter(path, info, streams, attachments=attachments)
+
+
+def _write_reading(log: LogWriter, reading: Reading, run_start_us: int, epoch_ns: int) -> None:
+    """Write a stretch of the run to both streams, with the run's own clock in `time_s`."""
+    log_time_ns = epoch_ns + reading.tick_us * 1000
+    sequence = reading.counts["sequence"]
+    time_s = (reading.tick_us - run_start_us) * 1e-6
+    log.write(
+        SAMPLE,
+        {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags},
+        log_time_ns,
+    )
+    counts = {field.name: reading.counts[field.name] for field in COUNTS_STREAM.fields}
+    log.write(COUNTS, counts, log_time_ns)
+
+
+def _end_of_run(
+    result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
+) -> RunEnd:
+    return RunEnd(
+        clean=result.complete,
+        reason="" if result.complete else result.remark,
+        expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
+        counters=counters,
+        zeros_after=_mean_counts(after),
+        drift={d.channel: d.after - d.before for d in result.drift},
+        drift_verdict="drifted: " + ", ".join(result.drifted) if result.drifted else "steady",
+    )
+
+
+def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
+    return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
+
+
+def _log_path(folder: Path, plan: RunPlan) -> Path:
+    return folder / f"{plan.name}.mcap"
+
+
+def _set_aside_part(path: Path) -> None:
+    """Rename what an aborted run left, so that the run can be made again and nothing is lost."""
+    part = path.with_name(path.name + PART_SUFFIX)
+    attempt = 1
+    while part.exists():
+        aside = path.with_name(f"{path.stem}.aborted-{attempt}.mcap{PART_SUFFIX}")
+        if not aside.exists():
+            part.rename(aside)
+        attempt += 1
+
+
+def _epoch_ns(session: Session, folder: Path) -> int:
+    """Return the host's time at the device's tick 0, ns since the Unix epoch.
+
+    A simulated rig is faster than real time, so a resumed campaign could begin before the last run
+    ended: it begins a second after what is there instead.
+    """
+    now_ns = time.time_ns() - session.newest_tick_us * 1000
+    return max([now_ns, *(_end_ns(path) + 1_000_000_000 for path in folder.glob("*.mcap"))])
+
+
+def _end_ns(path: Path) -> int:
+    """Return when a recorded run ended, ns since the Unix epoch; 0 when its log does not say."""
+    run = read_log(path, topics=(), checksums=False).run
+    if run is None or run.started_at_ns is None or run.duration_s is None:
+        return 0
+    return run.started_at_ns + round(run.duration_s * 1e9)

@@ -100,6 +100,7 @@ class Session:
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
+        self.newest_tick_us = 0
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
@@ -205,6 +206,7 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         reading = self._convert(batch)
+        self.newest_tick_us = int(reading.tick_us[-1])
         self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
         self._check_limits(reading)
         return reading

@@ -7,6 +7,9 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.live import live
+from rig.cli.record import record
+from rig.cli.replay import replay
 
 app = typer.Typer(
     name="rig",
@@ -18,6 +21,13 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
     "70 bug, 130 interrupted.",
 )
+
+
+app.command()(record)
+app.command()(live)
+app.command()(replay)
+# app.add_typer(log_app, name="log")
+# app.add_typer(study_app, name="study")
 
 
 def _version(wanted: bool) -> None:

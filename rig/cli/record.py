@@ -16,9 +16,7 @@ def record(
     config: Annotated[
         Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
     ] = None,
@@ -63,7 +61,9 @@ def record(
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
         raise
     bad = [result.name for result in results if result.drifted or not result.complete]
-    screen.print(f"{len(results)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}")
+    screen.print(
+        f"{len(results)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
+    )
     if json:
         emit_json({"folder": folder, "runs": results, "look_at": bad})
     return 1 if bad else 0

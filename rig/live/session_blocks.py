@@ -48,9 +48,7 @@ def _readings(session: Session, plans: Iterable[RunPlan]) -> Iterator[Reading]:
         yield from session.watch()
 
 
-def _block(
-    session: Session, reading: Reading, estimator: EstimateStream | None
-) -> SampleBlock:
+def _block(session: Session, reading: Reading, estimator: EstimateStream | None) -> SampleBlock:
     estimates = {}
     if estimator is not None:
         estimates[estimator.target_channel] = estimator.push(reading.columns, reading.time_s)

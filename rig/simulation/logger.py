@@ -24,10 +24,11 @@ def open_simulated_logger(
     effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
     if simulation.draw_hidden is not None:
         effects.append(hidden.draw(simulation.draw_hidden))
-    plant = parameters.PlantParameters()
+    plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
     if simulation.spread:
         plant = parameters.vary(plant, simulation.seed, simulation.spread)
-    bench = SimulatedBench(plant, effects=effects, seed=simulation.seed)
+        sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
+    bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     if uses_firmware(simulation):
         return SimulatedTransport(FirmwareBoard(bench), url, pace=pace)
     return SimulatedTransport(TeensyFake(bench), url, pace=pace)

@@ -31,7 +31,9 @@ def library() -> Path:
     if shutil.which("make") is None or shutil.which("g++") is None:
         found = firmware_library()
         if found is None:
-            pytest.skip("the firmware library is not built and there is no g++ and make to build it")
+            pytest.skip(
+                "the firmware library is not built and there is no g++ and make to build it"
+            )
         return found
     subprocess.run(["make", "-C", str(FIRMWARE)], check=True, capture_output=True)
     found = firmware_library()
