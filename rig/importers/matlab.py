@@ -38,6 +38,7 @@ from rig.importers.matlab_sidecar import TIME, Sidecar, carries_unit, read_sidec
 
 MAX_BYTES = 1 << 31
 HDF5_VERSION = b"MATLAB 7.3 MAT-file"
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"  # after the 512 bytes MATLAB puts before it
 
 Values = Mapping[str, Value]
 
@@ -148,7 +149,7 @@ def _variables(path: Path) -> dict[str, Value]:
         content = path.read_bytes()
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}.") from error
-    if content.startswith(HDF5_VERSION):
+    if content.startswith(HDF5_VERSION) or content[512:520] == HDF5_SIGNATURE:
         raise DataError(
             f"{path} is a MATLAB file of version 7.3 (HDF5), which is not read.",
             "Versions 5 to 7 are.",

@@ -1,12 +1,16 @@
 """MATLAB files: names that are channels, structs that are runs, sidecars that map the rest."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import scipy.io.matlab
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy.io import savemat
+from scipy.io import loadmat, savemat
 
 from rig.errors import DataError
+from rig.importers.mat5 import Mat5Error, Unread, read_mat5
 from rig.importers.matlab import IMPORTER
 
 N = 50
@@ -94,9 +98,10 @@ def test_time_that_runs_back_is_refused(save):
         IMPORTER.open(path).runs[0].recording()
 
 
-def test_version_7_3_says_how_to_save_again(tmp_path):
+@pytest.mark.parametrize("header", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"MATLAB 7.0"])
+def test_version_7_3_says_how_to_save_again(tmp_path, header):
     path = tmp_path / "run.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n")
+    path.write_bytes(header.ljust(512) + b"\x89HDF\r\n\x1a\n")
     with pytest.raises(DataError, match=r"version 7\.3.*'-v7'"):
         IMPORTER.open(path)
 
@@ -169,3 +174,44 @@ def test_damaged_files_read_or_raise(save, where, junk, cut):
             assert len(recording) == recording.time_s.size
     except DataError:
         return
+
+
+def agree(ours, theirs):
+    if isinstance(ours, dict):
+        return all(agree(value, theirs[name]) for name, value in ours.items())
+    if isinstance(ours, Unread | str):
+        return isinstance(ours, Unread) or ours == theirs
+    return np.array_equal(ours, theirs)
+
+
+WRITTEN_BY_MATLAB = [
+    path
+    for name in ("double", "matrix", "3dmatrix", "minus", "multi", "string", "unicode", "struct*")
+    for version in ("6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86")
+    for path in Path(scipy.io.matlab.__path__[0]).glob(f"tests/data/test{name}_{version}.mat")
+]
+
+
+@pytest.mark.skipif(not WRITTEN_BY_MATLAB, reason="SciPy is installed without its test data")
+def test_files_matlab_wrote_read_as_scipy_reads_them():
+    assert len(WRITTEN_BY_MATLAB) > 20  # big-endian Solaris among them
+    for path in WRITTEN_BY_MATLAB:
+        ours = read_mat5(path.read_bytes())
+        assert ours, path
+        assert agree(ours, loadmat(path, simplify_cells=True)), path
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "no MATLAB 5 header"),
+        (b"hello" * 100, "no MATLAB 5 header"),
+        (b" " * 126 + b"IM" + b"\x0e\0\0\0", "inside an element's tag"),
+        (b" " * 126 + b"IM" + b"\x0e\0\0\0\xff\0\0\0", "an element of 255 bytes where 0"),
+        (b" " * 126 + b"IM" + b"\x0f\0\0\0\x04\0\0\0junk", "compressed variable is damaged"),
+        (b" " * 126 + b"IM" + b"\x09\0\0\0\0\0\0\0", "type 9 where a variable"),
+    ],
+)
+def test_damage_is_named(content, message):
+    with pytest.raises(Mat5Error, match=message):
+        read_mat5(content)
