@@ -12,8 +12,8 @@ APPROACH_SPEED_RAD_S = 0.8
 LOAD_RAMP_S = 0.5
 
 RELAX_RAD = 0.15
-RELAX_HZ = 2.0
-RELAX_CYCLES = 4
+RELAX_HZ = 4.0
+RELAX_CYCLES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +46,24 @@ def motion_of(plan: RunPlan, here_rad: float) -> Motion:
     load_up = trajectory.minimum_jerk(0.0, float(load[0]), LOAD_RAMP_S)
     retreat = _move(float(angle[-1]), start)
     load_down = trajectory.minimum_jerk(float(load[-1]), 0.0, LOAD_RAMP_S)
-    # friction keeps torque stored in the cable; a dying oscillation lets go of it before the zero
-    relax = trajectory.relaxation(start, RELAX_RAD, RELAX_HZ, RELAX_CYCLES)
-    whole_angle = np.concatenate([approach, angle, retreat, relax])
+    whole_angle = np.concatenate([approach, angle, retreat, _relaxation(start)])
     loads = np.concatenate([_hold(load_up, approach.size), load, load_down])
     first = approach.size
     return Motion(whole_angle, _hold(loads, whole_angle.size), first, first + angle.size)
+
+
+def settling(here_rad: float) -> Motion:
+    """Return the motion, without load, that lets friction give up the torque it holds.
+
+    Played before the first zero: without it the zero holds whatever torque the last motion left
+    locked in gear and cable, some 30 mN m at the spindle on the simulated rig.
+    """
+    angle = _relaxation(here_rad)
+    return Motion(angle, np.zeros(angle.size), 0, angle.size)
+
+
+def _relaxation(centre_rad: float) -> NDArray[np.float64]:
+    return trajectory.relaxation(centre_rad, RELAX_RAD, RELAX_HZ, RELAX_CYCLES)
 
 
 def _move(start_rad: float, stop_rad: float) -> NDArray[np.float64]:

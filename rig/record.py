@@ -149,6 +149,9 @@ def record_campaign(
         notes: Operator's notes, kept in every log.
         on_progress: Told of the samples as they come.
     """
+    for _ in session.rest(REST_S):
+        pass
+    session.settle()
     epoch_ns = _epoch_ns(session, folder)
     for plan in plans:
         yield _record_run(session, plan, _log_path(folder, plan), epoch_ns, notes, on_progress)

@@ -19,11 +19,22 @@ from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
 from drivers.errors import DriverError
 from drivers.teensy.driver import SampleBatch, TeensyLogger
-from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Limits, Status
+from drivers.teensy.protocol import (
+    MAX_SETPOINTS,
+    STATUS_ARMED,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_QUEUE_DRY,
+    STATUS_SATURATED,
+    STATUS_WATCHDOG_TRIPPED,
+    TICK_US,
+    Identity,
+    Limits,
+)
 from drivers.transport.transport import Transport
 from estimation.recording import Flag
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
+from rig.motion import settling
 
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
@@ -65,7 +76,7 @@ class Reading:
     @property
     def armed(self) -> bool:
         """Whether the logger was armed in the newest sample."""
-        return bool(_has(self.counts["status"], Status.ARMED)[-1])
+        return bool(_has(self.counts["status"], STATUS_ARMED)[-1])
 
     def __len__(self) -> int:
         return int(self.time_s.size)
@@ -187,11 +198,18 @@ class Session:
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
                 self._logger.queue(targets[block], loads_ma[block])
                 queued = block.stop
+            self._logger.heartbeat()
             reading = self._read()
             self._check_board(reading)
             reading = _number(reading, played)
             played = max(played, int(reading.setpoint.max()) + 1)
             yield reading
+
+    def settle(self) -> None:
+        """Move the unloaded rig a little, so that friction gives up the torque it holds."""
+        motion = settling(self.spindle_angle_rad)
+        for _ in self.play(motion.target_angle_rad, motion.load_command_a):
+            pass
 
     def _read(self) -> Reading:
         give_up_s = self._transport.now_s + STALL_S
@@ -216,13 +234,15 @@ class Session:
             self._first_tick_us = int(batch.tick_us[0])
         status = batch.samples["status"]
         flags = np.zeros(len(status), np.uint8)
-        flags[_has(status, Status.SATURATED)] |= Flag.SATURATED
-        flags[_has(status, Status.WATCHDOG | Status.LIMIT)] |= Flag.SUSPECT
-        flags[_has(status, Status.ARMED) & _has(status, Status.QUEUE_DRY)] |= Flag.STALE
+        flags[_has(status, STATUS_SATURATED)] |= np.uint8(Flag.SATURATED)
+        flags[_has(status, STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED)] |= np.uint8(
+            Flag.SUSPECT
+        )
+        flags[_has(status, STATUS_ARMED) & _has(status, STATUS_QUEUE_DRY)] |= np.uint8(Flag.STALE)
         return Reading(
             batch.samples,
             batch.tick_us,
-            (batch.tick_us - self._first_tick_us) * 1e-6,
+            np.multiply(batch.tick_us - self._first_tick_us, 1e-6),
             self.calibrations.apply(batch.samples, self.zeros),
             flags,
             np.full(len(flags), -1),
@@ -285,9 +305,9 @@ class Session:
     def _check_board(self, reading: Reading) -> None:
         status = int(np.bitwise_or.reduce(reading.counts["status"]))
         for bit, what, why in (
-            (Status.LIMIT, "The logger tripped one of its own limits.", ""),
+            (STATUS_LIMIT_TRIPPED, "The logger tripped one of its own limits.", ""),
             (
-                Status.WATCHDOG,
+                STATUS_WATCHDOG_TRIPPED,
                 "The logger's watchdog tripped.",
                 "It heard nothing from this computer for 250 ms while armed.",
             ),
@@ -308,8 +328,9 @@ class Session:
             self._logger.stop()
 
 
-def _has(status: NDArray[np.uint16], bits: Status) -> NDArray[np.bool_]:
-    return np.not_equal(status & np.uint16(bits), 0)
+def _has(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
+    present: NDArray[np.bool_] = (status & np.uint16(bits)) != 0
+    return present
 
 
 def _number(reading: Reading, played: int) -> Reading:
@@ -318,7 +339,7 @@ def _number(reading: Reading, played: int) -> Reading:
     The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
     are taken to have played theirs: the sequence numbers say how many there were.
     """
-    dry = _has(reading.counts["status"], Status.QUEUE_DRY)
+    dry = _has(reading.counts["status"], STATUS_QUEUE_DRY)
     step = np.diff(reading.counts["sequence"].astype(np.int64), prepend=0)
     step[0] = 1
     setpoint = played - 1 + np.cumsum(np.where(dry, 0, step))

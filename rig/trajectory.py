@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 SAMPLE_RATE_HZ = 1000.0
 
+DECAYS = 4.0
+"""Time constants of a relaxation's decay."""
+
 FloatArray = NDArray[np.float64]
 
 
@@ -73,7 +76,11 @@ def minimum_jerk(start: float, stop: float, duration_s: float) -> FloatArray:
 def relaxation(
     centre_rad: float, amplitude_rad: float, frequency_hz: float, cycles: int
 ) -> FloatArray:
-    """Return a dying oscillation that ends at its centre; friction gives up stored torque."""
+    """Return an oscillation that dies out at its centre; friction gives up the torque it holds.
+
+    The amplitude decays exponentially to nothing, as in demagnetising: each reversal is a little
+    smaller than the one before, so that what friction still holds at the end is small too.
+    """
     t = times(cycles / frequency_hz)
-    decay = np.linspace(1.0, 0.0, t.size)
+    decay = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
     return centre_rad + amplitude_rad * decay * np.sin(2.0 * np.pi * frequency_hz * t)

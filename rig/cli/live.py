@@ -33,8 +33,8 @@ def live(
 ) -> int:
     """Show grip torque, estimate against sensor, as the rig measures it.
 
-    A simulated rig plays the quick protocol unless told otherwise; a real rig is never moved without
-    --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
+    A simulated rig plays the quick protocol unless told otherwise; a real rig is never moved
+    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
     """
     from rig.config import load_config
     from rig.live.estimator import ModelEstimator

@@ -1,6 +1,6 @@
 """A session with the rig as the stream of blocks the display shows."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ ZERO_S = 0.5
 def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
-    plans: Iterable[RunPlan],
+    plans: Sequence[RunPlan],
     estimator: EstimateStream | None,
 ) -> Iterator[SampleBlock]:
     """Open the rig, take its zeros, and yield what it measures until closed.
@@ -34,17 +34,18 @@ def session_blocks(
     """
     with Session(config, open_transport()) as session:
         session.take_zeros(ZERO_S)
+        if plans:
+            session.settle()
+            session.take_zeros(ZERO_S)
         for reading in _readings(session, plans):
             yield _block(session, reading, estimator)
 
 
-def _readings(session: Session, plans: Iterable[RunPlan]) -> Iterator[Reading]:
-    played = False
+def _readings(session: Session, plans: Sequence[RunPlan]) -> Iterator[Reading]:
     for plan in plans:
-        played = True
         motion = motion_of(plan, session.spindle_angle_rad)
         yield from session.play(motion.target_angle_rad, motion.load_command_a)
-    if not played:
+    if not plans:
         yield from session.watch()
 
 
