@@ -41,7 +41,8 @@ LEAD_S = 0.3
 
 TICKS_A_SECOND = 1_000_000 // TICK_US
 
-READ_TIMEOUT_S = 0.05
+READ_TIMEOUT_S = 0.2
+"""Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
 
 STALL_S = 1.0
 """With no sample for this long, the logger is taken for dead, s."""

@@ -2,10 +2,13 @@
 
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Board, SimulatedTransport
 from rig.config import SimulationSection
 from rig.simulation import hidden, parameters
 from rig.simulation.bench import SimulatedBench
+
+PACED_STEP_S = 0.05
+UNPACED_STEP_S = 0.2
 
 
 def open_simulated_logger(
@@ -30,8 +33,14 @@ def open_simulated_logger(
         sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     if uses_firmware(simulation):
-        return SimulatedTransport(FirmwareBoard(bench), url, pace=pace)
-    return SimulatedTransport(TeensyFake(bench), url, pace=pace)
+        return _transport(FirmwareBoard(bench), url, pace)
+    return _transport(TeensyFake(bench), url, pace)
+
+
+def _transport(board: Board, url: str, pace: float | None) -> SimulatedTransport:
+    # nobody watches a rig that is faster than real time, so it may move in larger steps
+    step_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
+    return SimulatedTransport(board, url, step_s=step_s, pace=pace)
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:
