@@ -76,7 +76,8 @@ class SimulatedTransport:
     def read(self, timeout_s: float) -> bytes:
         """Return the board's bytes, advancing it until there are some or `timeout_s` has passed."""
         self._require_link()
-        remaining = round(timeout_s / TICK_S)
+        # a wait, however short, lets time pass: a caller that waits for a moment must get there
+        remaining = max(1, round(timeout_s / TICK_S)) if timeout_s > 0 else 0
         data = self.board.transmit()
         while not data and remaining > 0:
             ticks = min(self._step_ticks, remaining)

@@ -41,7 +41,7 @@ def step(state, command_e4, load_ma):
     state[TICK] += 1
 
 
-@numba.njit(cache=True)
+@numba.njit  # not cached: the cache does not see changes in the functions of other files
 def run(state, rows, target, load_ma, armed, control_state, gains, limits):
     """Run closed-loop ticks with the controller inside."""
     for k in range(rows.shape[0]):

@@ -1,44 +1,25 @@
 """The C++ core and the Python fake answer the same commands with the same bytes."""
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
 from drivers.teensy.fake import TeensyFake
-from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError, firmware_library
+from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, Limits
 from tests.drivers.bench_physics import PlainBench
 
-FIRMWARE = Path(__file__).parents[2] / "firmware"
 GAINS = np.array([20.0, 0.05, -1.0, 0.2, 10000.0])
 WIDEST = Limits.widest()
 TIGHT = Limits(1500, 900, 5800, 30000, -4000, 4000)
 
 Action = bytes | int
 """Bytes for the board, or ticks to advance."""
-
-
-@pytest.fixture(scope="session")
-def library() -> Path:
-    """The firmware library, built from the present source."""
-    if shutil.which("make") is None or shutil.which("g++") is None:
-        found = firmware_library()
-        if found is None:
-            pytest.skip(
-                "the firmware library is not built and there is no g++ and make to build it"
-            )
-        return found
-    subprocess.run(["make", "-C", str(FIRMWARE)], check=True, capture_output=True)
-    found = firmware_library()
-    assert found is not None
-    return found
 
 
 def command(kind: Kind, sequence: int) -> bytes:
@@ -167,16 +148,14 @@ scripts = st.lists(
 )
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60)
 @given(scripts, st.integers(0, 2**32 - 1))
 def test_any_script(library: Path, script: list[Action], start_tick_us: int) -> None:
     preamble: list[Action] = [command(Kind.START, 60000), arm(60001, TIGHT)]
     assert_twins(preamble + script, library, start_tick_us)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(scripts, st.integers(1, 50))
 def test_the_fake_does_not_depend_on_how_time_is_cut(script: list[Action], cut: int) -> None:
     script = [command(Kind.START, 60000), arm(60001, TIGHT), *script]

@@ -1,0 +1,85 @@
+"""The logger's layouts: fixed sizes and offsets, round trips, and refusal of anything else."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import FrameError
+from drivers.teensy import protocol
+from drivers.teensy.protocol import Ack, Kind, Limits
+
+u16 = st.integers(0, 2**16 - 1)
+i32 = st.integers(-(2**31), 2**31 - 1)
+
+
+def test_the_sample_is_laid_out_as_documented() -> None:
+    layout = protocol.SAMPLE_DTYPE
+    assert layout.itemsize == 42
+    offsets = {name: layout.fields[name][1] for name in layout.names}
+    assert list(offsets.values()) == [0, 1, 2, 4, 8, 12, 16, 20, 24, 28, 30, 32, 34, 36, 38, 40]
+    assert all(layout[name].str[0] in "<|" for name in layout.names)
+
+
+def test_no_other_frame_has_the_size_of_a_sample() -> None:
+    layouts = {kind: layout for kind, layout in protocol._LAYOUTS.items() if kind != Kind.SAMPLE}
+    assert protocol.SAMPLE_DTYPE.itemsize not in {item.itemsize for item in layouts.values()}
+    assert (protocol.SAMPLE_DTYPE.itemsize - 4) % protocol.SETPOINT_DTYPE.itemsize
+
+
+def test_the_text_names_every_kind() -> None:
+    lines = protocol.layout_text().splitlines()
+    assert [line.split(":")[0] for line in lines[2:-2]] == [f"{k} {k.name}" for k in Kind]
+
+
+@given(u16, st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), st.tuples(*[i32] * 6))
+def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ...]) -> None:
+    payload = protocol.encode_arm(sequence, np.array(gains), Limits(*limits))
+    kind, number, fields = protocol.decode(payload)
+    assert (kind, number) == (Kind.ARM, sequence)
+    assert [float(fields[name]) for name in protocol.GAIN_NAMES] == gains
+    assert tuple(int(fields[name]) for name in protocol.LIMIT_NAMES) == limits
+
+
+@given(u16, st.lists(st.tuples(i32, st.integers(-(2**15), 2**15 - 1)), min_size=1, max_size=100))
+def test_setpoints_come_back(sequence: int, setpoints: list[tuple[int, int]]) -> None:
+    targets, loads = (np.array(values) for values in zip(*setpoints, strict=True))
+    payload = protocol.encode_setpoints(sequence, targets, loads)
+    assert protocol.decode(payload)[:2] == (Kind.SETPOINTS, sequence)
+    assert protocol.decode_setpoints(payload).tolist() == setpoints
+
+
+@given(u16, st.sampled_from(list(Kind)), st.integers(0, 6), u16, u16)
+def test_an_ack_comes_back(sequence: int, command: Kind, result: int, status: int, free: int):
+    ack = Ack(sequence, command, result, status, free)
+    assert protocol.decode_ack(protocol.decode(protocol.encode_ack(ack))[2]) == ack
+
+
+def test_identity_and_pong_come_back() -> None:
+    fields = protocol.decode(protocol.encode_hello_reply(9, "TEENSY-0042"))[2]
+    identity = protocol.decode_identity(fields)
+    assert identity.serial == "TEENSY-0042"
+    assert identity.protocol_hash == protocol.PROTOCOL_HASH
+    assert identity.firmware_version == "0.1.0"
+    kind, sequence, pong = protocol.decode(protocol.encode_pong(5, 2**64 - 1, 2**32 - 1))
+    assert (kind, sequence) == (Kind.PONG, 5)
+    assert (int(pong["token"]), int(pong["tick_us"])) == (2**64 - 1, 2**32 - 1)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"\x01\x10\x00",
+        b"\x02\x10\x00\x00",
+        b"\x01\x63\x00\x00",
+        b"\x01\x10\x00\x00\x00",
+        protocol.encode_command(Kind.SETPOINTS, 1),
+        protocol.encode_command(Kind.SETPOINTS, 1) + bytes(5),
+        protocol.encode_command(Kind.SETPOINTS, 1) + bytes(606),
+        bytes([1, Kind.SAMPLE]) + bytes(40),
+    ],
+    ids=["short", "version", "kind", "long", "none", "part", "many", "sample"],
+)
+def test_anything_else_is_refused(payload: bytes) -> None:
+    with pytest.raises(FrameError):
+        protocol.decode(payload)

@@ -1,0 +1,385 @@
+"""The logger's driver, on the fake and on the firmware core: what a session sees of it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from drivers.errors import (
+    CommandRefusedError,
+    DisarmUnconfirmedError,
+    DriverError,
+    LinkLostError,
+    LinkTimeoutError,
+    ProtocolMismatchError,
+)
+from drivers.framing import encode_frame
+from drivers.teensy import protocol
+from drivers.teensy.driver import SampleBatch, TeensyLogger
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.firmware_fake import FirmwareBoard
+from drivers.teensy.protocol import Limits, Result
+from drivers.transport.simulated import Board, SimulatedTransport
+from tests.drivers.bench_physics import START_SPINDLE, PlainBench
+from tests.drivers.faults import FaultyBoard, once
+
+GAINS = [20.0, 0.05, -1.0, 0.2, 10000.0]
+WIDEST = Limits.widest()
+
+MakeBoard = Callable[..., Board]
+
+
+@pytest.fixture(params=["fake", "firmware"])
+def make_board(request: pytest.FixtureRequest) -> MakeBoard:
+    """A board on its bench: the Python fake, and the firmware core."""
+    if request.param == "fake":
+        return lambda **options: TeensyFake(PlainBench(), **options)
+    library = request.getfixturevalue("library")
+    return lambda **options: FirmwareBoard(PlainBench(), library=library, **options)
+
+
+def logger_of(board: Board) -> TeensyLogger:
+    return TeensyLogger(SimulatedTransport(board))
+
+
+def read_for(logger: TeensyLogger, ticks: int, beat: bool = True) -> list[SampleBatch]:
+    """Read until `ticks` samples have come."""
+    batches: list[SampleBatch] = []
+    while sum(len(batch.samples) for batch in batches) < ticks:
+        if beat:
+            logger.heartbeat()
+        batches.append(logger.read(0.1))
+        assert len(batches[-1].samples), "the stream has dried up"
+    return batches
+
+
+def joined(batches: list[SampleBatch]) -> np.ndarray:
+    return np.concatenate([batch.samples for batch in batches])
+
+
+def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) -> None:
+    logger = logger_of(make_board(serial="TEENSY-0042"))
+    identity = logger.identify()
+    assert identity.serial == "TEENSY-0042"
+    assert identity.protocol_hash == protocol.PROTOCOL_HASH
+    logger.start()
+    rest = joined(read_for(logger, 100))
+    assert not rest["status"].any()
+    assert not rest["command_e4"].any()
+    logger.arm(GAINS, WIDEST)
+    targets = START_SPINDLE - np.arange(600)
+    assert logger.queue(targets, np.full(600, 200)) == protocol.QUEUE_CAPACITY - 600
+    played = joined(read_for(logger, 600))
+    armed = played[(played["status"] & protocol.STATUS_ARMED) != 0]
+    assert np.array_equal(armed["target"][:600], targets)
+    assert set(armed["load_ma"][:600]) == {200}
+    assert abs(int(armed["spindle"][599]) - int(targets[599])) < 60
+    logger.disarm()
+    logger.read(0.0)
+    after = joined(read_for(logger, 50))
+    assert not after["status"].any()
+    assert not after["command_e4"].any()
+    assert not after["load_ma"].any()
+    logger.stop()
+    counters = logger.counters
+    assert (counters.lost, counters.crc_errors, counters.retries, counters.gaps) == (0, 0, 0, 0)
+    assert counters.frames >= 750
+    logger.close()
+
+
+def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board: MakeBoard) -> None:
+    start_us = 2**32 - 120_000
+    logger = logger_of(make_board(start_tick_us=start_us))
+    logger.start()
+    batches = read_for(logger, 300)
+    samples, ticks = joined(batches), np.concatenate([batch.tick_us for batch in batches])
+    assert np.array_equal(samples["sequence"], np.arange(len(samples)))
+    assert np.array_equal(ticks, start_us + 1000 * np.arange(len(ticks)))
+    assert ticks.dtype == np.int64
+    assert batches[-1].lost == 0
+    logger.start()
+    again = logger.read(0.1)
+    assert again.samples["sequence"][0] == 0
+    assert again.tick_us[0] == ticks[-1] + 1000
+    logger.close()
+
+
+def test_nothing_to_read_is_an_empty_batch_after_the_timeout(make_board: MakeBoard) -> None:
+    transport = SimulatedTransport(make_board())
+    logger = TeensyLogger(transport)
+    logger.identify()
+    batch = logger.read(0.25)
+    assert len(batch.samples) == len(batch.tick_us) == batch.lost == 0
+    assert transport.now_s == pytest.approx(0.25)
+    logger.close()
+
+
+def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: MakeBoard) -> None:
+    logger = logger_of(make_board())
+    logger.start()
+    logger.arm(GAINS, WIDEST)
+    logger.queue(np.full(600, START_SPINDLE - 2000), np.full(600, 300))
+    samples = joined(read_for(logger, 400, beat=False))
+    silent = (samples["status"] & protocol.STATUS_WATCHDOG_TRIPPED) != 0
+    assert np.flatnonzero(silent)[0] == 251
+    assert silent[251:].all()
+    assert samples["command_e4"][:251].all()
+    assert not samples["command_e4"][251:].any()
+    assert not samples["load_ma"][251:].any()
+    with pytest.raises(CommandRefusedError, match="not armed") as refusal:
+        logger.queue(np.array([0]), np.array([0]))
+    assert refusal.value.result == Result.NOT_ARMED
+    logger.arm(GAINS, WIDEST)
+    fresh = joined(read_for(logger, 50))
+    assert not (fresh["status"][-50:] & protocol.STATUS_WATCHDOG_TRIPPED).any()
+    logger.close()
+
+
+def test_a_crossed_limit_takes_the_motor_out_of_force_in_the_same_tick(
+    make_board: MakeBoard,
+) -> None:
+    logger = logger_of(make_board())
+    logger.start()
+    limits = Limits(1500, 1000, 5800, 32767, -4000, 4000)
+    logger.arm(GAINS, limits)
+    logger.queue(np.full(200, -4000), np.zeros(200, np.int64))
+    samples = joined(read_for(logger, 200))
+    tripped = np.flatnonzero(samples["status"] & protocol.STATUS_LIMIT_TRIPPED)[0]
+    assert abs(int(samples["current"][tripped])) > 1500 or samples["proximal"][tripped] > 5800
+    before = samples[:tripped]
+    assert (np.abs(before["current"].astype(int)) <= 1500).all()
+    assert (before["proximal"] <= 5800).all()
+    assert before["command_e4"][-1] != 0
+    assert not samples["command_e4"][tripped:].any()
+    logger.close()
+
+
+def test_a_dry_queue_holds_the_last_target_and_says_so(make_board: MakeBoard) -> None:
+    logger = logger_of(make_board())
+    logger.start()
+    logger.arm(GAINS, WIDEST)
+    idle = joined(read_for(logger, 50))
+    assert ((idle["status"] & protocol.STATUS_QUEUE_DRY) != 0).all()
+    assert not idle["command_e4"].any()
+    assert np.array_equal(idle["target"], idle["spindle"])
+    logger.queue(np.full(10, START_SPINDLE - 70), np.full(10, 5))
+    samples = joined(read_for(logger, 50))
+    dry = (samples["status"] & protocol.STATUS_QUEUE_DRY) != 0
+    assert np.flatnonzero(dry)[0] == 10
+    assert set(samples["target"]) == {START_SPINDLE - 70}
+    assert set(samples["load_ma"]) == {5}
+    logger.close()
+
+
+def test_the_board_refuses_what_must_not_be(make_board: MakeBoard) -> None:
+    logger = logger_of(make_board())
+    with pytest.raises(CommandRefusedError, match="finite"):
+        logger.arm([np.nan, 0, 0, 0.5, 1], WIDEST)
+    with pytest.raises(CommandRefusedError):
+        logger.arm([1, 0, 0, 0.5, 10_001], WIDEST)
+    logger.arm(GAINS, Limits(1000, 500, 1000, 1000, -100, 100))
+    with pytest.raises(CommandRefusedError, match="limits"):
+        logger.queue(np.array([101]), np.array([0]))
+    with pytest.raises(CommandRefusedError):
+        logger.queue(np.array([0]), np.array([501]))
+    with pytest.raises(CommandRefusedError, match="full") as refusal:
+        logger.queue(np.zeros(2001, np.int64), np.zeros(2001, np.int64))
+    assert refusal.value.result == Result.QUEUE_FULL
+    logger.close()
+
+
+@pytest.mark.parametrize(
+    ("targets", "loads"),
+    [
+        (np.array([np.nan]), np.array([0])),
+        (np.array([1.0]), np.array([0])),
+        (np.array([2**31]), np.array([0])),
+        (np.array([0]), np.array([2**15])),
+        (np.array([0, 1]), np.array([0])),
+        (np.zeros((2, 2), int), np.zeros((2, 2), int)),
+    ],
+)
+def test_setpoints_are_whole_numbers_in_range(targets: np.ndarray, loads: np.ndarray) -> None:
+    logger = logger_of(TeensyFake(PlainBench()))
+    logger.arm(GAINS, WIDEST)
+    with pytest.raises(DriverError):
+        logger.queue(targets, loads)
+    logger.close()
+
+
+def test_a_clock_exchange_comes_back_with_the_samples(make_board: MakeBoard) -> None:
+    transport = SimulatedTransport(make_board())
+    logger = TeensyLogger(transport)
+    logger.start()
+    read_for(logger, 100)
+    sent_s = transport.now_s
+    logger.heartbeat()
+    logger.read(0.1)
+    assert logger.last_exchange is not None
+    assert logger.last_exchange.sent_s == sent_s
+    assert logger.last_exchange.received_s >= sent_s
+    assert logger.last_exchange.tick_us == round(sent_s * 1e6) - 1000
+    logger.close()
+
+
+# what can go wrong on the way
+
+
+def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
+    board = TeensyFake(PlainBench(), protocol_hash=0xDEADBEEF)
+    logger = logger_of(board)
+    with pytest.raises(
+        ProtocolMismatchError, match=f"deadbeef.*{protocol.PROTOCOL_HASH:08x}.*Flash"
+    ):
+        logger.arm(GAINS, WIDEST)
+    logger.close()
+
+
+def test_a_hello_reply_of_another_layout_is_a_mismatch() -> None:
+    board = FaultyBoard(TeensyFake(PlainBench()))
+    board.from_board = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
+    with pytest.raises(ProtocolMismatchError, match="another layout"):
+        logger_of(board).identify()
+
+
+def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
+    board = make_board()
+    board.receive(b"\x01\x02half a command of an earlier program")
+    logger_of(board).start()
+    board.advance(40)
+    board.transmit()
+    faulty = FaultyBoard(board)
+    faulty.from_board = once(lambda data: data[17:])
+    board.advance(5)
+    logger = logger_of(faulty)
+    logger.identify()
+    assert logger.counters.crc_errors == 0
+    assert logger.counters.discarded_bytes == 46 - 17
+    logger.start()
+    assert logger.read(0.1).samples["sequence"][0] == 0
+    assert logger.counters.lost == 0
+    logger.close()
+
+
+def test_a_silent_board_is_a_timeout_after_the_retries() -> None:
+    board = FaultyBoard(TeensyFake(PlainBench()))
+    board.from_board = lambda _: b""
+    logger = logger_of(board)
+    with pytest.raises(LinkTimeoutError, match="sim://"):
+        logger.identify()
+    assert logger.counters.retries == 2
+
+
+def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard) -> None:
+    board = FaultyBoard(make_board())
+    logger = logger_of(board)
+    logger.start()
+    logger.arm(GAINS, WIDEST)
+    board.from_board = once(lambda _: b"")
+    targets = START_SPINDLE - np.arange(30)
+    logger.queue(targets, np.zeros(30, np.int64))
+    assert logger.counters.retries == 1
+    samples = joined(read_for(logger, 90))
+    fed = (samples["status"] & protocol.STATUS_QUEUE_DRY) == 0
+    assert np.count_nonzero(fed) == 30
+    assert np.array_equal(samples["target"][fed], targets)
+    logger.close()
+
+
+def test_a_damaged_command_is_sent_again(make_board: MakeBoard) -> None:
+    board = FaultyBoard(make_board())
+    logger = logger_of(board)
+    logger.identify()
+    board.to_board = once(lambda data: data[:2] + b"\x55" + data[3:])
+    logger.arm(GAINS, WIDEST)
+    assert logger.counters.retries == 1
+    logger.close()
+
+
+def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: MakeBoard) -> None:
+    board = FaultyBoard(make_board())
+    logger = logger_of(board)
+    logger.start()
+    first = logger.read(0.1)
+    assert first.lost == 0
+
+    def damage(data: bytes) -> bytes:
+        frames = [data[k : k + 46] for k in range(0, len(data), 46)]
+        changed = frames[3][:20] + bytes([frames[3][20] ^ 1 or 2]) + frames[3][21:]
+        return b"".join([*frames[:3], changed, *frames[4:8], *frames[6:8], *frames[10:]])
+
+    board.from_board = once(damage)
+    batch = logger.read(0.1)
+    number = first.samples["sequence"][-1] + 1
+    expected = [number + k for k in range(50) if k not in (3, 8, 9)]
+    assert batch.samples["sequence"].tolist() == expected
+    assert batch.lost == 3
+    counters = logger.counters
+    assert (counters.lost, counters.gaps, counters.duplicates) == (3, 2, 2)
+    assert counters.crc_errors == 1
+    assert counters.discarded_bytes in (45, 46)
+    assert np.array_equal(np.diff(batch.tick_us), 1000 * np.diff(expected))
+    assert logger.read(0.1).lost == 3
+    logger.close()
+
+
+def test_frames_nobody_expected_are_counted() -> None:
+    board = FaultyBoard(TeensyFake(PlainBench()))
+    logger = logger_of(board)
+    logger.start()
+    strange = encode_frame(bytes(42)) + encode_frame(b"\x01\x63ab") + encode_frame(b"\x01\x10ab")
+    board.from_board = once(lambda data: strange + data)
+    assert len(logger.read(0.1).samples) == 50
+    assert logger.counters.unknown_frames == 3
+    logger.close()
+
+
+def test_disarm_is_not_believed_without_an_answer() -> None:
+    board = FaultyBoard(TeensyFake(PlainBench()))
+    transport = SimulatedTransport(board)
+    logger = TeensyLogger(transport)
+    logger.arm(GAINS, WIDEST)
+    board.from_board = lambda _: b""
+    with pytest.raises(DisarmUnconfirmedError, match=r"not confirmed.*cut its supply"):
+        logger.disarm()
+    with pytest.raises(DisarmUnconfirmedError):
+        logger.close()
+    with pytest.raises(LinkLostError):
+        transport.read(0.0)
+
+
+def test_disarm_is_not_believed_when_the_board_says_it_is_still_armed() -> None:
+    board = FaultyBoard(TeensyFake(PlainBench()))
+    logger = logger_of(board)
+    logger.arm(GAINS, WIDEST)
+
+    def still_armed(data: bytes) -> bytes:
+        ack = protocol.Ack(3, protocol.Kind.DISARM, Result.OK, protocol.STATUS_ARMED, 0)
+        return encode_frame(protocol.encode_ack(ack)) if data else data
+
+    board.from_board = still_armed
+    with pytest.raises(DisarmUnconfirmedError, match="still armed"):
+        logger.disarm()
+    board.from_board = lambda data: data
+    logger.close()
+
+
+def arm_and_fail(logger: TeensyLogger) -> None:
+    with logger:
+        logger.arm(GAINS, WIDEST)
+        raise ZeroDivisionError
+
+
+def test_leaving_the_with_block_disarms(make_board: MakeBoard) -> None:
+    board = make_board()
+    with pytest.raises(ZeroDivisionError):
+        arm_and_fail(logger_of(board))
+    with logger_of(board) as logger:
+        logger.start()
+        assert not logger.read(0.1).samples["status"].any()
+
+
+def test_a_disarm_needs_no_matching_protocol() -> None:
+    logger = logger_of(TeensyFake(PlainBench(), protocol_hash=1))
+    logger.disarm()
+    logger.close()
