@@ -1,4 +1,4 @@
-"""How fast a log is read as arrays, against the `mcap` package's ordered iteration of the same file."""
+"""How fast a log is read as arrays, against the `mcap` package's ordered iteration of it."""
 
 import tempfile
 from collections import deque

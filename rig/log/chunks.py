@@ -22,7 +22,7 @@ from rig.errors import DataError
 from rig.log.scan import ChunkRef, Damage
 from rig.log.schema import CDR_HEADER, MESSAGE_OPCODE, Stream
 
-BATCH_BYTES = 1 << 20
+BATCH_BYTES = 1 << 19
 """Unpacked bytes a thread takes at a time: it fits in a core's cache, and hides the hand-over."""
 
 MAX_CHUNK_BYTES = 1 << 30
@@ -149,16 +149,18 @@ def _plan(
     }
     placed = dict.fromkeys(wanted, 0)
     gathered: dict[int | None, list[ChunkRef]] = defaultdict(list)
+    gathered_bytes: dict[int | None, int] = defaultdict(int)
     batches: list[_Batch] = []
 
     def send(owner: int | None) -> None:
         batch = gathered.pop(owner, [])
+        size = gathered_bytes.pop(owner, 0)
         if not batch:
             return
         target = None
         if owner is not None:
             first = placed[owner]
-            placed[owner] += sum(c.unpacked_bytes for c in batch) // layouts[owner].size
+            placed[owner] += size // layouts[owner].size
             target = targets[owner].part(first, placed[owner])
         batches.append(_Batch(batch, owner, target))
 
@@ -169,7 +171,8 @@ def _plan(
         elif owner not in wanted:
             continue
         gathered[owner].append(chunk)
-        if sum(c.unpacked_bytes for c in gathered[owner]) > BATCH_BYTES:
+        gathered_bytes[owner] += chunk.unpacked_bytes
+        if gathered_bytes[owner] > BATCH_BYTES:
             send(owner)
     for owner in list(gathered):
         send(owner)
@@ -221,12 +224,7 @@ def _read_array(
         zstandard.ZstdError: A chunk cannot be unpacked.
     """
     decompressor = zstandard.ZstdDecompressor()
-    data = bytearray(sum(chunk.unpacked_bytes for chunk in chunks))
-    position = 0
-    for chunk in chunks:
-        stop = position + chunk.unpacked_bytes
-        data[position:stop] = _unpack(buffer, chunk, decompressor)
-        position = stop
+    data = b"".join([_unpack(buffer, chunk, decompressor) for chunk in chunks])
     records = np.frombuffer(data, layout.record)
     if not (
         (records["opcode"] == MESSAGE_OPCODE).all()
@@ -273,7 +271,8 @@ def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDec
     if chunk.compression == "lz4":
         raise DataError("it is compressed with lz4, which is not supported")
     if chunk.torn:
-        return decompressor.decompressobj().decompress(packed) if chunk.compression else packed
+        salvage = decompressor.decompressobj().decompress
+        return salvage(packed) if chunk.compression else bytes(packed)
     if chunk.compression:
         stated = zstandard.frame_content_size(packed)
         if stated != chunk.unpacked_bytes or stated > MAX_CHUNK_BYTES:

@@ -47,6 +47,11 @@ class Topic:
     def __len__(self) -> int:
         return int(self.rows.size)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the fields, in order."""
+        return tuple(field.name for field in self.stream.fields)
+
 
 @dataclass(frozen=True, eq=False)
 class LogFile:

@@ -29,10 +29,13 @@ from mcap.records import (
 )
 
 from rig.errors import DataError
-from rig.log.container import MAGIC
+from rig.log.container import CHUNK_HEAD, MAGIC
 
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
+_INDEX = struct.Struct("<HI")
+# plain numbers: looking a member of an enumeration up is slow where it is done for every record
+_CHUNK_OPCODE, _MESSAGE_INDEX_OPCODE, _CHUNK_INDEX_OPCODE = 0x06, 0x07, 0x08
 
 _READERS: dict[Opcode, Any] = {
     Opcode.HEADER: Header,
@@ -68,7 +71,7 @@ class Damage:
     what: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ChunkRef:
     """Where a chunk is and what it states about itself.
 
@@ -91,7 +94,7 @@ class ChunkRef:
     indexed: dict[int, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Indexed:
     """What a message index states: how many messages of a channel the chunk before it holds."""
 
@@ -145,7 +148,8 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
             position = found
             continue
         record, stop = parsed
-        _take(skeleton, record, position, buffer, checksums)
+        if record is not None:
+            _take(skeleton, record, position, buffer, checksums)
         position = stop
     if not (skeleton.library or skeleton.chunks or skeleton.channels):
         raise NotALogError(
@@ -164,16 +168,16 @@ def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
     stop = first + length
     if stop > len(buffer):
         return None
-    if opcode == Opcode.CHUNK:
+    if opcode == _CHUNK_OPCODE:
         chunk = _parse_chunk(buffer, start)
         return (chunk, stop) if chunk is not None and chunk.data.stop == stop else None
-    if opcode == Opcode.MESSAGE_INDEX:
+    if opcode == _MESSAGE_INDEX_OPCODE:
         if length < 6:
             return None
-        channel, size = struct.unpack_from("<HI", buffer, first)
+        channel, size = _INDEX.unpack_from(buffer, first)
         whole = size == length - 6 and size % 16 == 0
         return (Indexed(channel, size // 16), stop) if whole else None
-    if opcode == Opcode.CHUNK_INDEX:
+    if opcode == _CHUNK_INDEX_OPCODE:
         # the chunks were met already; the summary's checksum covers this
         return (None, stop) if length >= 64 else None
     if opcode not in _READERS:
@@ -203,17 +207,20 @@ class _View:
 
 def _parse_chunk(buffer: memoryview, start: int) -> ChunkRef | None:
     """Return the chunk a place states, whether or not the file holds all of it."""
+    if start + CHUNK_HEAD.size <= len(buffer):
+        head = CHUNK_HEAD.unpack_from(buffer, start)
+        if head[6:8] == (4, b"zstd"):  # ours, the quick way
+            first = start + CHUNK_HEAD.size
+            return ChunkRef(start, range(first, first + head[8]), "zstd", head[4], head[5])
     first = start + _HEAD.size
     try:
         _, _, unpacked, crc, name_length = _CHUNK.unpack_from(buffer, first)
-        if name_length > 8:
-            return None
-        name_stop = first + _CHUNK.size + name_length
-        name = bytes(buffer[name_stop - name_length : name_stop])
+        name_stop = first + _CHUNK.size + min(name_length, 4)
+        name = bytes(buffer[first + _CHUNK.size : name_stop])
         (packed,) = struct.unpack_from("<Q", buffer, name_stop)
     except struct.error:
         return None
-    if name not in (b"", b"zstd", b"lz4"):
+    if name not in (b"", b"lz4"):
         return None
     data = range(name_stop + 8, name_stop + 8 + packed)
     return ChunkRef(start, data, name.decode(), unpacked, crc)
@@ -262,16 +269,16 @@ def _take(
 ) -> None:
     """Add one record to the skeleton, checking the checksum it carries."""
     match record:
+        case ChunkRef():
+            skeleton.chunks.append(record)
+        case Indexed() if skeleton.chunks:
+            skeleton.chunks[-1].indexed[record.channel] = record.messages
         case Header():
             skeleton.profile, skeleton.library = record.profile, record.library
         case Schema():
             _keep(skeleton, skeleton.schemas, record, position)
         case Channel():
             _keep(skeleton, skeleton.channels, record, position)
-        case ChunkRef():
-            skeleton.chunks.append(record)
-        case Indexed() if skeleton.chunks:
-            skeleton.chunks[-1].indexed[record.channel] = record.messages
         case Metadata():
             skeleton.metadata.append((record.name, record.metadata))
         case Attachment():
