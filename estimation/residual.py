@@ -134,6 +134,41 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
     return found
 
 
+@dataclass(frozen=True)
+class Profile:
+    """A residual over one variable, for a figure.
+
+    Attributes:
+        label: Name and unit of the variable.
+        x: The variable, all runs together, shape (n,); a motor angle within its turn.
+        residual: The residual with each run's mean removed, shape (n,).
+        unit: Unit of the residual.
+    """
+
+    label: str
+    x: FloatArray
+    residual: FloatArray
+    unit: str
+
+
+def profile(model: Model, parts: Sequence[RunResidual], variable: str) -> Profile:
+    """Return the residual over one of the `VARIABLES`.
+
+    Args:
+        model: The model behind the residual.
+        parts: From `residuals`.
+        variable: Name of the variable.
+    """
+    channel = VARIABLES[variable]
+    x = np.concatenate([p.estimate if channel == model.target else p.run[channel] for p in parts])
+    if variable == "motor_angle":
+        x = np.mod(x, 2 * np.pi)
+    left = np.concatenate([part.values - part.values.mean() for part in parts])
+    source = "estimated load" if channel == model.target else channel.removesuffix("_s")
+    words = variable.replace("_", " ") if variable == "motor_angle" else source
+    return Profile(f"{words}, {unit_of(channel)}", x, left, model.unit)
+
+
 def largest_structure(
     model: Model, campaign: Campaign, seed: int = 0, surrogates: int = 19
 ) -> list[Structure]:
