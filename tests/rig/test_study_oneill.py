@@ -116,6 +116,12 @@ def test_an_archive_of_several_parts_is_narrowed(tmp_path, monkeypatch):
     assert "2 of 3 runs" in source.notes[0]
 
 
+def test_conditions_held_out_have_readable_headings(result):
+    assert "| surrogate | samples at random | runs | a frequency (LOFO) |" in shown.markdown(
+        result.study
+    )
+
+
 def command_line() -> typer.Typer:
     app = typer.Typer()
     app.add_typer(study_app)
