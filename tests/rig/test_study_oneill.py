@@ -1,7 +1,9 @@
 """`rig study oneill` on an analytic campaign, and on the measured data where it is there."""
 
 import json
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import typer
@@ -143,6 +145,23 @@ def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
     assert "linear rows of Table I" in done.stderr
     assert (tmp_path / "d" / "oneill.md").read_text().startswith("# Linear torque surrogates")
     assert (tmp_path / "r" / "oneill.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_without_data_the_same_is_done_on_a_simulated_campaign(monkeypatch):
+    seeds: list[int] = []
+
+    def simulate(seed: int) -> Campaign:
+        seeds.append(seed)
+        return campaign()
+
+    simulation = SimpleNamespace(simulate_reference_campaign=simulate)
+    monkeypatch.setitem(sys.modules, "rig.simulation.campaign", simulation)
+    words = ["study", "oneill", "--json", "--seed", "9"]
+    done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
+    found = json.loads(done.stdout)
+    assert seeds == [9]
+    assert not found["measured"]
+    assert found["source"] == "simulated reference campaign, seed 9"
 
 
 @pytest.mark.measured
