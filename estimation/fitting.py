@@ -1,12 +1,12 @@
 """Fitting a model on a campaign: amplitudes by least squares, shapes by variable projection.
 
 The runs enter as one small cross-product matrix each, so a bootstrap over runs costs little.
-Offsets of the runs are a nuisance: unless told otherwise each run's mean is removed from the target
-and from every column, and the model's own offset becomes the mean over the runs.
+Where offsets of the runs are a nuisance, each run's mean is removed from the target and from every
+column, and the model's own offset becomes the mean over the runs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,6 @@ class _Problem:
 
     model: Model
     runs: list[Recording]
-    run_offsets: bool
     free: NDArray[np.intp]  # columns that least squares solves for
     offset: int | None  # column of the model's own offset when run offsets replace it
     names: list[str]  # of all columns
@@ -60,7 +59,7 @@ class _Problem:
     def gram(self, run: Recording, shape: Sequence[float]) -> FloatArray:
         """Return the cross-products of free columns and target of one run."""
         table = np.column_stack([self.columns(run, shape)[:, self.free], run[self.model.target]])
-        if self.run_offsets:
+        if self.model.run_offsets:
             table -= table.mean(axis=0)
         product: FloatArray = table.T @ table
         return product
@@ -70,7 +69,7 @@ def fit(
     model: Model,
     campaign: Campaign,
     *,
-    run_offsets: bool = True,
+    run_offsets: bool | None = None,
     every: int | None = None,
     bootstrap: int = 200,
     seed: int = 0,
@@ -80,7 +79,7 @@ def fit(
     Args:
         model: Declared or fitted model; values of shape parameters are where the search starts.
         campaign: The runs; read once, only the model's channels at valid samples are kept.
-        run_offsets: Treat an offset of each run as a nuisance.
+        run_offsets: Treat an offset of each run as a nuisance; the model's own choice if None.
         every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
         bootstrap: Number of resamplings of runs behind the spreads; 0 for none.
         seed: Seed of the resampling.
@@ -93,7 +92,9 @@ def fit(
         FitError: No valid sample, or columns that cannot be told apart on these runs.
         MissingChannelError: A run lacks a channel of the model.
     """
-    problem = _problem(model, _prepared(model, campaign, every), run_offsets)
+    if run_offsets is not None:
+        model = replace(model, run_offsets=run_offsets)
+    problem = _problem(model, _prepared(model, campaign, every))
     shape = _search_shape(problem)
     grams = [problem.gram(run, shape) for run in problem.runs]
     amplitudes = _solve(problem, np.sum(grams, axis=0))
@@ -121,16 +122,15 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recor
     return runs
 
 
-def _problem(model: Model, runs: list[Recording], run_offsets: bool) -> _Problem:
+def _problem(model: Model, runs: list[Recording]) -> _Problem:
     parameters = [(term, p) for term in model.terms for p in term.effect.amplitudes]
     names = [f"{term.effect.id}.{p.name}" for term, p in parameters]
     offset = names.index(f"{OFFSET}.offset") if f"{OFFSET}.offset" in names else None
-    replaced = offset if run_offsets else None
+    replaced = offset if model.run_offsets else None
     free = np.array([k for k in range(len(names)) if k != replaced], dtype=np.intp)
     return _Problem(
         model=model,
         runs=runs,
-        run_offsets=run_offsets,
         free=free,
         offset=replaced,
         names=names,
@@ -243,7 +243,7 @@ def _bootstrap(
             ]
         )
         means.append(table.mean(axis=0))
-        if problem.run_offsets:
+        if problem.model.run_offsets:
             table = table - means[-1]
         products.append(table.T @ table)
     inside = np.concatenate([(free > problem.lower) & (free < problem.upper), np.ones(len(shape))])

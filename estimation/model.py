@@ -150,6 +150,9 @@ class Model:
         terms: The effects.
         description: What it is and where it comes from.
         low_pass: Filter of every channel.
+        run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
+            zero drifts. Not where the runs differ by what is to be estimated, such as a load that
+            is held within a run.
         evidence: What it was fitted on, or None for a declared model.
     """
 
@@ -159,6 +162,7 @@ class Model:
     terms: tuple[Term, ...]
     description: str = ""
     low_pass: LowPass = PAPER
+    run_offsets: bool = True
     evidence: Evidence | None = None
 
     def __post_init__(self) -> None:

@@ -86,6 +86,7 @@ def parse(text: str, where: str = "model") -> Model:
                 processing.number("cutoff_hz", LowPass().cutoff_hz),
                 processing.take("order", int, LowPass().order),
             ),
+            run_offsets=processing.take("run_offsets", bool, True),
             evidence=_evidence(evidence) if evidence.content else None,
         )
         for table in (top, processing, evidence):
@@ -120,6 +121,7 @@ def to_toml(model: Model) -> str:
         "[processing]",
         f"cutoff_hz = {_value(model.low_pass.cutoff_hz)}",
         f"order = {_value(model.low_pass.order)}",
+        f"run_offsets = {_value(model.run_offsets)}",
     ]
     for term in model.terms:
         lines += ["", "[[effects]]", f"id = {_value(term.effect.id)}", f"sign = {term.sign}"]
@@ -148,6 +150,8 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float) and not math.isfinite(value):
         raise ModelError(f"A model file cannot hold the value {value}.")
     return repr(value)
@@ -169,10 +173,8 @@ class _Table:
             near = nearest(key, list(self.content)) if self.content else ""
             raise ModelFileError(f"{self.where} lacks the key {key!r}.", near)
         value = self.content[key]
-        if not isinstance(value, kind) or isinstance(value, bool):
-            raise ModelFileError(
-                f"{self.where}: {key} = {value!r} is not {kind.__name__}.",
-            )
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise ModelFileError(f"{self.where}: {key} = {value!r} is not {kind.__name__}.")
         return value
 
     def number(self, key: str, default: float | None = None) -> float:

@@ -158,23 +158,40 @@ def linear_fitter(channel: str) -> Fitter:
     return fit
 
 
-def score_splits(splits: list[Split], channels: list[str], fitter: Fitter) -> Score:
-    """Fit on each split's training runs, estimate its test runs, and score all of these together.
+ESTIMATE = "estimate_n_m"
+
+
+def held_out(splits: list[Split], channels: Iterable[str], fitter: Fitter) -> Table:
+    """Fit on each split's training runs and estimate its test runs; all test runs in one table.
 
     Args:
         splits: Splits of a campaign of closing samples; see `Campaign.folds`.
-        channels: Channels the fitter needs.
+        channels: Channels the fitter needs, and any others wanted in the table.
         fitter: What is fitted.
+
+    Returns:
+        The channels, `TARGET` and `ESTIMATE` of all test runs, N m for the last two.
     """
     wanted = list(dict.fromkeys([*channels, TARGET]))
-    estimates: list[FloatArray] = []
-    truths: list[FloatArray] = []
+    tables, estimates = [], []
+    names: list[str] = []
+    runs: list[NDArray[np.intp]] = []
     for split in splits:
-        estimate = fitter(split.train.concatenate(wanted, valid_only=False))
+        estimator = fitter(split.train.concatenate(wanted, valid_only=False))
         test = split.test.concatenate(wanted, valid_only=False)
-        estimates.append(estimate(test))
-        truths.append(test.columns[TARGET])
-    return score(np.concatenate(estimates), np.concatenate(truths))
+        estimates.append(estimator(test))
+        runs.append(test.run + len(names))
+        names += test.names
+        tables.append(test)
+    columns = {name: np.concatenate([t.columns[name] for t in tables]) for name in wanted}
+    return Table(
+        {**columns, ESTIMATE: np.concatenate(estimates)}, np.concatenate(runs), tuple(names)
+    )
+
+
+def score_table(table: Table) -> Score:
+    """Score the estimate of a table from `held_out`."""
+    return score(table.columns[ESTIMATE], table.columns[TARGET])
 
 
 def closing_campaign(

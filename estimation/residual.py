@@ -6,7 +6,8 @@ the catalogue with its own statistics: that search takes the same inputs (a fitt
 `Campaign`) and starts from the same `residuals`.
 
 The unit of evidence is the run: a map of the residual against a variable is fitted on all other
-runs and scored on the run left out. Each run's mean is removed first: offsets are a nuisance.
+runs and scored on the run left out. Each run's mean is removed first where the model says that run
+offsets are a nuisance; else the mean over all runs is.
 """
 
 from collections.abc import Iterable, Sequence
@@ -134,6 +135,54 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
     return found
 
 
+def centred(model: Model, values: Sequence[FloatArray]) -> list[FloatArray]:
+    """Remove each run's mean, or the mean over all runs when run offsets are no nuisance.
+
+    Args:
+        model: Says which.
+        values: One array a run, shape (n,) or (n, columns).
+    """
+    if model.run_offsets:
+        return [part - part.mean(axis=0) for part in values]
+    mean = np.concatenate(values).mean(axis=0)
+    return [part - mean for part in values]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A residual over one variable, for a figure.
+
+    Attributes:
+        label: Name and unit of the variable.
+        x: The variable, all runs together, shape (n,); a motor angle within its turn.
+        residual: The residual as it was screened, its means removed, shape (n,).
+        unit: Unit of the residual.
+    """
+
+    label: str
+    x: FloatArray
+    residual: FloatArray
+    unit: str
+
+
+def profile(model: Model, parts: Sequence[RunResidual], variable: str) -> Profile:
+    """Return the residual over one of the `VARIABLES`.
+
+    Args:
+        model: The model behind the residual.
+        parts: From `residuals`.
+        variable: Name of the variable.
+    """
+    channel = VARIABLES[variable]
+    x = np.concatenate([p.estimate if channel == model.target else p.run[channel] for p in parts])
+    if variable == "motor_angle":
+        x = np.mod(x, 2 * np.pi)
+    left = np.concatenate(centred(model, [part.values for part in parts]))
+    source = "estimated load" if channel == model.target else channel.removesuffix("_s")
+    words = variable.replace("_", " ") if variable == "motor_angle" else source
+    return Profile(f"{words}, {unit_of(channel)}", x, left, model.unit)
+
+
 def largest_structure(
     model: Model, campaign: Campaign, seed: int = 0, surrogates: int = 19
 ) -> list[Structure]:
@@ -157,8 +206,8 @@ def largest_structure(
             f"{len(runs)} runs are too few to screen a residual.",
             "A map is fitted on all other runs and scored on the one left out.",
         )
-    left = [part.values - part.values.mean() for part in runs]
-    maps = [_Map.of(*parts) for parts in _features(model, runs)]
+    left = centred(model, [part.values for part in runs])
+    maps = [_Map.of(model, *parts) for parts in _features(model, runs)]
     shifted = _surrogates(left, seed, surrogates)
     chance = max((m.explained(r) for m in maps for r in shifted), default=0.0)
     found: dict[str, Structure] = {}
@@ -190,6 +239,11 @@ def _surrogates(left: list[FloatArray], seed: int, count: int) -> list[list[Floa
         ]
         for _ in range(count)
     ]
+
+
+def _shown(value: float, unit: str, sign: str = "") -> str:
+    """Return a value for people to read: torques of this rig are thousandths of N m."""
+    return f"{1e3 * value:{sign}.3g} mN m" if unit == "N m" else f"{value:{sign}.3g} {unit}"
 
 
 _Features = tuple[str, list[FloatArray], Sequence[str]]
@@ -238,10 +292,12 @@ class _Map:
     grams: FloatArray  # (runs, k, k)
 
     @classmethod
-    def of(cls, variable: str, columns: list[FloatArray], labels: Sequence[str]) -> "_Map":
-        """Lay out a map of columns, shape (n, k) a run; each run's mean is removed."""
-        centred = [part - part.mean(axis=0) for part in columns]
-        return cls(variable, centred, labels, np.array([part.T @ part for part in centred]))
+    def of(
+        cls, model: Model, variable: str, columns: list[FloatArray], labels: Sequence[str]
+    ) -> "_Map":
+        """Lay out a map of columns, shape (n, k) a run, its means removed like the residual's."""
+        inner = centred(model, columns)
+        return cls(variable, inner, labels, np.array([part.T @ part for part in inner]))
 
     def _solve(self, gram: FloatArray, right: FloatArray) -> FloatArray:
         # the pull towards zero settles bins that the fitted runs never visit
@@ -264,11 +320,11 @@ class _Map:
         rights = sum(c.T @ r for c, r in zip(self.columns, left, strict=True))
         weights = self._solve(self.grams.sum(axis=0), np.asarray(rights))
         if len(self.labels) == 1:  # a ripple: sine and cosine
-            amplitude, label = float(np.hypot(*weights)), self.labels[0]
-            detail = f"{amplitude:.3g} {unit} {label}"
+            amplitude = float(np.hypot(*weights))
+            detail = f"{_shown(amplitude, unit)} {self.labels[0]}"
         else:
             low, high = np.percentile(np.concatenate([c @ weights for c in self.columns]), [5, 95])
             amplitude = float(high - low) / 2
             largest = int(np.argmax(np.abs(weights)))
-            detail = f"largest ({weights[largest]:+.3g} {unit}) {self.labels[largest]}"
+            detail = f"largest ({_shown(weights[largest], unit, '+')}) {self.labels[largest]}"
         return Structure(self.variable, self.explained(left), chance, amplitude, unit, detail)

@@ -42,6 +42,7 @@ def models(draw: st.DrawFn) -> Model:
         target="proximal_torque_n_m",
         terms=tuple(terms),
         description=draw(st.text()),
+        run_offsets=draw(st.booleans()),
         low_pass=LowPass(draw(st.floats(0.1, 400)), draw(st.integers(1, 8))),
         evidence=draw(st.none() | evidence),
     )
@@ -86,6 +87,8 @@ DECLARED = shipped()["motor"].read_text(encoding="utf-8")
         ("sign = -1", "sign = 2", "it is 1 or -1"),
         ("sign = -1", 'sign = "minus"', "is not int"),
         ('balance = "motor"', 'balance = "moter"', "Did you mean 'motor'"),
+        ("run_offsets = true", "run_offsets = 1", "is not bool"),
+        ("order = 3", "order = true", "is not int"),
         ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),
         ("rig.model/1", "rig.model/2", "not a model of schema"),
         ("[processing]", "[processing", "is not TOML"),

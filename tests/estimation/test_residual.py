@@ -59,6 +59,20 @@ def test_missing_coulomb_friction_is_seen_over_the_direction():
     assert "opening" in first.detail or "closing" in first.detail
 
 
+def test_what_differs_between_runs_is_seen_only_when_it_is_no_nuisance():
+    runs = Campaign.of(
+        r.with_columns(proximal_torque_n_m=r["proximal_torque_n_m"] + 0.05 * (int(r.name) % 10))
+        for r in campaign()
+    )
+    found = {}
+    for declared in (True, False):
+        model = fit(read(shipped()["motor"]), runs, run_offsets=declared, bootstrap=0)
+        assert model.run_offsets is declared
+        found[declared] = largest_structure(model, runs)[0]
+    assert not found[True].stands_out
+    assert found[False].amplitude > 5 * found[True].amplitude
+
+
 def test_residuals_are_target_less_estimate():
     runs = campaign()
     model = fit(read(shipped()["motor"]), runs, bootstrap=0)
