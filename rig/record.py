@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calibration.zero import Drift, SensorZero, drift_verdicts
+from estimation.files import write_text_atomic
 from rig import __version__
 from rig.config import Config
 from rig.errors import UsageError
-from rig.files import write_text_atomic
 from rig.log.container import Attached
 from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
