@@ -82,5 +82,5 @@ def relaxation(
     smaller than the one before, so that what friction still holds at the end is small too.
     """
     t = times(cycles / frequency_hz)
-    decay = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
+    decay: FloatArray = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
     return centre_rad + amplitude_rad * decay * np.sin(2.0 * np.pi * frequency_hz * t)

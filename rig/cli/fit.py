@@ -28,13 +28,12 @@ def fit(
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
     from rig.importers.registry import open_campaign
-    from rig.models import load_model
     from rig.reports.first_look import parameter_table
     from rig.reports.table import to_rich
 
     screen = console()
     campaign = open_campaign(path, format_)
-    declared = load_model(model)
+    declared = model_file.read(Path(model))
     fitted = fit_model(declared, campaign, seed=seed)
     error = held_out_error(declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed)
     screen.print(to_rich(parameter_table(fitted)))

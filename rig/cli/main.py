@@ -7,9 +7,13 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.demo import demo
+from rig.cli.fit import fit
 from rig.cli.live import live
+from rig.cli.log import log_app
 from rig.cli.record import record
 from rig.cli.replay import replay
+from rig.cli.study import study_app
 
 app = typer.Typer(
     name="rig",
@@ -23,11 +27,13 @@ app = typer.Typer(
 )
 
 
+app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
-# app.add_typer(log_app, name="log")
-# app.add_typer(study_app, name="study")
+app.command()(fit)
+app.add_typer(log_app, name="log")
+app.add_typer(study_app, name="study")
 
 
 def _version(wanted: bool) -> None:

@@ -28,9 +28,7 @@ def simulate_reference_campaign(seed: int = 0, protocol: str = "reference") -> C
         UsageError: There is no such protocol.
     """
     plans = load_protocol(protocol).plans()
-    return Campaign(
-        tuple(Run(p.name, partial(_simulate, p, seed, i)) for i, p in enumerate(plans))
-    )
+    return Campaign(tuple(Run(p.name, partial(_simulate, p, seed, i)) for i, p in enumerate(plans)))
 
 
 def _simulate(plan: RunPlan, seed: int, index: int) -> Recording:
