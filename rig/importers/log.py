@@ -10,6 +10,7 @@ from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import SAMPLE_TOPIC, exclusion, recording_from_log
 from rig.log.reader import LogFile, damaged, read_log
 from rig.log.repair import repaired_path
+from rig.log.writer import PART_SUFFIX
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,19 @@ def _head(path: Path) -> LogFile:
             "The record of the run is missing: the file is damaged, or not written by rig.",
             f"Run `rig log check {path}`.",
         )
-    if log.end is not None and log.damage:
+    if log.damage and not _unfinished(log):
         raise damaged(log)
     return log
 
 
+def _unfinished(log: LogFile) -> bool:
+    """Whether its recorder did not finish the log."""
+    return log.end is None or log.path.suffix == PART_SUFFIX
+
+
 def _run(head: LogFile) -> Run:
     path = head.path
-    unfinished = head.end is None
+    unfinished = _unfinished(head)
 
     def load() -> Recording:
         topics = None if unfinished else (SAMPLE_TOPIC,)

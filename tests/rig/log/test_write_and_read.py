@@ -1,6 +1,5 @@
 """What is written is read back, by us and by two independent readers."""
 
-
 import numpy as np
 import pytest
 from mcap.reader import make_reader
