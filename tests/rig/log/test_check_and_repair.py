@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from rig.errors import DataError, ExitCode, UsageError
 from rig.log.check import Verdict, check_log
-from rig.log.convert import COUNTS_TOPIC, SAMPLE_TOPIC
 from rig.log.reader import DamagedLogError, read_log
 from rig.log.repair import RepairError, repair_log, repaired_path
 from rig.log.run import RunEnd, RunInfo
 from rig.log.schema import Field, Stream
+from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import LogExistsError, LogWriter
 
 NUMBERED = Stream(
@@ -22,7 +22,7 @@ NUMBERED = Stream(
 
 
 def sample_report(path):
-    return next(t for t in check_log(path).topics if t.topic == SAMPLE_TOPIC)
+    return next(t for t in check_log(path).topics if t.topic == SAMPLE)
 
 
 def write_numbered(path, sequence, x=None, log_time_ns=None, end=None, flags=None):
@@ -68,8 +68,8 @@ def test_samples_lost_at_the_very_end_are_known_from_the_plan(tmp_path, make_log
     report = check_log(make_log(tmp_path / "a.mcap", samples=590, duration_s=0.6))
     assert report.verdict is Verdict.INCOMPLETE
     assert {t.topic: t.expected_by_plan for t in report.topics} == {
-        SAMPLE_TOPIC: 600,
-        COUNTS_TOPIC: 600,
+        SAMPLE: 600,
+        COUNTS: 600,
     }
 
 
@@ -147,8 +147,8 @@ def test_a_damaged_length_does_not_hide_what_follows(log):
     read = read_log(log, tolerant=True)
     assert read.run == whole.run
     assert read.end == whole.end
-    assert len(read.topics[COUNTS_TOPIC]) == 600
-    assert 340 <= len(read.topics[SAMPLE_TOPIC]) < 600
+    assert len(read.topics[COUNTS]) == 600
+    assert 340 <= len(read.topics[SAMPLE]) < 600
 
 
 def test_a_log_without_damage_is_left_alone(tmp_path, log):

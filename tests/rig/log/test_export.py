@@ -6,9 +6,10 @@ import pytest
 
 from estimation.recording import Flag, Recording, Stretch
 from rig.errors import UsageError
-from rig.log.convert import COUNTS_TOPIC, SAMPLE_TOPIC, write_recording
+from rig.log.convert import write_recording
 from rig.log.export import ExportExistsError, ExportFormat, export_log
 from rig.log.reader import DamagedLogError, read_log
+from rig.log.streams import COUNTS, SAMPLE
 
 
 def read_csv(path):
@@ -46,7 +47,7 @@ def test_every_value_is_exported_exactly(tmp_path, log, kind):
         ["run.mcap", *(item.name for item in written)]
     )
     source = read_log(log)
-    for path, topic in zip(written, (SAMPLE_TOPIC, COUNTS_TOPIC), strict=True):
+    for path, topic in zip(written, (SAMPLE, COUNTS), strict=True):
         columns = READERS[kind](path)
         assert list(columns) == ["log_time_ns", *source.topics[topic].columns]
         for name in source.topics[topic].columns:
@@ -69,14 +70,14 @@ def test_flags_and_missing_values_are_exported(tmp_path, kind):
 
 
 def test_units_are_in_the_parquet_schema(log, tmp_path):
-    (written,) = export_log(log, ExportFormat.PARQUET, tmp_path / "x.parquet", SAMPLE_TOPIC)
+    (written,) = export_log(log, ExportFormat.PARQUET, tmp_path / "x.parquet", SAMPLE)
     field = pyarrow.parquet.read_schema(written).field("proximal_torque_n_m")
     assert field.metadata[b"unit"] == b"N m"
 
 
 def test_one_topic_goes_to_the_named_file(log, tmp_path):
     target = tmp_path / "counts.csv"
-    assert export_log(log, ExportFormat.CSV, target, COUNTS_TOPIC) == [target]
+    assert export_log(log, ExportFormat.CSV, target, COUNTS) == [target]
 
 
 def test_all_topics_go_to_a_folder(log, tmp_path):
