@@ -210,8 +210,8 @@ def stream_time_s(topic: Topic) -> NDArray[np.float64]:
         return time_s
     if not len(topic):
         return np.empty(0)
-    first = topic.log_time_ns.min()
-    return (topic.log_time_ns - first).astype(np.float64) * 1e-9
+    elapsed_ns: NDArray[np.uint64] = topic.log_time_ns - topic.log_time_ns.min()
+    return elapsed_ns.astype(np.float64) * 1e-9
 
 
 def not_finite(topic: Topic) -> NDArray[np.bool_]:
