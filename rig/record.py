@@ -130,7 +130,7 @@ def open_campaign_folder(
         write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
     plans = protocol.plans()
     check_disk_space(folder, plans)
-    return [plan for plan in plans if not _log_path(folder, plan).exists()]
+    return [plan for plan in plans if not _is_recorded(_log_path(folder, plan))]
 
 
 def record_campaign(
@@ -227,7 +227,7 @@ def _new_log(
         Attached("config.json", "application/json", settings),
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
     ]
-    _set_aside_part(path)
+    _set_aside(path)
     streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
     return LogWriter(path, info, streams, attachments=attachments)
 
@@ -250,8 +250,6 @@ def _end_of_run(
     result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
 ) -> RunEnd:
     return RunEnd(
-        clean=result.complete,
-        reason="" if result.complete else result.remark,
         expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
         counters=counters,
         zeros_after=_mean_counts(after),
@@ -268,15 +266,23 @@ def _log_path(folder: Path, plan: RunPlan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 
-def _set_aside_part(path: Path) -> None:
-    """Rename what an aborted run left, so that the run can be made again and nothing is lost."""
-    part = path.with_name(path.name + PART_SUFFIX)
-    attempt = 1
-    while part.exists():
-        aside = path.with_name(f"{path.stem}.aborted-{attempt}.mcap{PART_SUFFIX}")
-        if not aside.exists():
-            part.rename(aside)
-        attempt += 1
+def _is_recorded(path: Path) -> bool:
+    """Say whether a run went to its end; one that was aborted is made again."""
+    if not path.exists():
+        return False
+    end = read_log(path, topics=(), tolerant=True, checksums=False).end
+    return end is not None and end.clean
+
+
+def _set_aside(path: Path) -> None:
+    """Rename what an aborted attempt left: the run can be made again and nothing is lost."""
+    for ending in (".mcap", ".mcap" + PART_SUFFIX):
+        left = path.with_name(path.stem + ending)
+        attempts = itertools.count(1)
+        while left.exists():
+            aside = path.with_name(f"{path.stem}.aborted-{next(attempts)}{ending}")
+            if not aside.exists():
+                left.rename(aside)
 
 
 def _epoch_ns(session: Session, folder: Path) -> int:

@@ -7,7 +7,7 @@ first, and the disarming is confirmed by the logger itself.
 
 import signal
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from types import FrameType, TracebackType
 from typing import Self
@@ -116,7 +116,7 @@ class Session:
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
-            ways_out.callback(self._logger.close)
+            ways_out.callback(self._close)
             self.identity = self._logger.identify()
             ways_out.callback(self._stop_streaming)
             ways_out.enter_context(_sigterm_as_interrupt())
@@ -188,9 +188,9 @@ class Session:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
+        self._check_setpoints(target_angle_rad, load_command_a)
         targets = self._to_counts("target_angle_rad", target_angle_rad)
         loads_ma = self._to_counts("load_command_a", load_command_a)
-        self._check_setpoints(target_angle_rad, load_command_a)
         lead = round(LEAD_S * TICKS_A_SECOND)
         self._logger.arm(self.config.controller.gains(), self._board_limits())
         queued = played = 0
@@ -202,7 +202,7 @@ class Session:
             self._logger.heartbeat()
             reading = self._read()
             self._check_board(reading)
-            reading = _number(reading, played)
+            reading = _number(reading, played, targets.size)
             played = max(played, int(reading.setpoint.max()) + 1)
             yield reading
 
@@ -239,7 +239,6 @@ class Session:
         flags[_has(status, STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED)] |= np.uint8(
             Flag.SUSPECT
         )
-        flags[_has(status, STATUS_ARMED) & _has(status, STATUS_QUEUE_DRY)] |= np.uint8(Flag.STALE)
         return Reading(
             batch.samples,
             batch.tick_us,
@@ -326,7 +325,14 @@ class Session:
                 "Cut the motor supply by hand and look at the rig.",
             ) from error
         finally:
-            self._logger.stop()
+            # a logger that did not confirm will not answer this either; the first error counts
+            with suppress(DriverError):
+                self._logger.stop()
+
+    def _close(self) -> None:
+        """Let go of the link; whether the rig was disarmed has been settled before."""
+        with suppress(DriverError):
+            self._logger.close()
 
 
 def _has(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
@@ -334,17 +340,24 @@ def _has(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
     return present
 
 
-def _number(reading: Reading, played: int) -> Reading:
-    """Number the setpoints of a reading, `played` being the first one not played yet.
+def _number(reading: Reading, played: int, planned: int) -> Reading:
+    """Number the setpoints of a reading, and flag samples that should have had one and had none.
 
     The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
     are taken to have played theirs: the sequence numbers say how many there were.
+
+    Args:
+        reading: Samples read while playing.
+        played: The first setpoint that is not played yet.
+        planned: Number of setpoints of the whole play.
     """
     dry = _has(reading.counts["status"], STATUS_QUEUE_DRY)
     step = np.diff(reading.counts["sequence"].astype(np.int64), prepend=0)
     step[0] = 1
-    setpoint = played - 1 + np.cumsum(np.where(dry, 0, step))
-    return replace(reading, setpoint=np.where(dry, -1, setpoint))
+    newest = played - 1 + np.cumsum(np.where(dry, 0, step))
+    held = dry & (newest >= 0) & (newest < planned - 1)
+    flags = np.where(held, reading.flags | np.uint8(Flag.STALE), reading.flags).astype(np.uint8)
+    return replace(reading, setpoint=np.where(dry, -1, newest), flags=flags)
 
 
 @contextmanager
