@@ -135,7 +135,7 @@ def test_lost_and_damaged_bytes_are_counted_and_nothing_is_made_up():
 
 
 def test_a_host_that_is_late_leaves_flagged_samples_not_wrong_ones(monkeypatch):
-    """The queue runs dry when the host sends too late; the target is held and the samples say so."""
+    """The queue runs dry when the host is late; the target is held and the samples say so."""
     monkeypatch.setattr("rig.session.LEAD_S", 0.05)
     config = simulated()
     link = SimulatedTransport(transport(config).board, step_s=0.08)
