@@ -136,10 +136,14 @@ def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
     ends = np.flatnonzero(stream == 0)
     room = len(data) // (payload_size + CRC_SIZE + 2)
     payloads = np.empty(room * payload_size, np.uint8)
+    crcs = np.empty(room, np.uint16)
     spans = np.empty((len(ends), 2), np.int64)
-    good, bad, bad_bytes, found = _decode(
-        stream, ends, payload_size, tables, start, MAX_WIRE, payloads, spans
+    whole, bad, bad_bytes, found = _unstuff(
+        stream, ends, payload_size, MAX_WIRE, payloads, crcs, spans
     )
+    good = _keep_good(payloads, whole, payload_size, crcs, tables, start)
+    bad += whole - good
+    bad_bytes += (whole - good) * (payload_size + CRC_SIZE + 2)
     tail = data[ends[-1] + 1 :] if len(ends) else data
     others = []
     for first, end in spans[:found].tolist():
@@ -218,25 +222,27 @@ def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
 
 
 @numba.njit(cache=True)
-def _decode(
+def _unstuff(
     data: NDArray[np.uint8],
     ends: NDArray[np.int64],
     payload_size: int,
-    tables: NDArray[np.uint16],
-    start: int,
     max_wire: int,
     payloads: NDArray[np.uint8],
+    crcs: NDArray[np.uint16],
     spans: NDArray[np.int64],
 ) -> tuple[int, int, int, int]:
-    """Fill `payloads`, flat, and the spans of other frames, given where each frame ends."""
+    """Undo COBS of every frame that fits, given where each ends, and note the spans of the others.
+
+    Fills `payloads` (flat) and `crcs`, as received and not yet compared: comparing them here would
+    hold up the next frame behind each frame's last branch.
+    """
     wire = payload_size + 3  # code byte, payload, CRC
-    position = good = bad = bad_bytes = found = 0
+    position = whole = bad = bad_bytes = found = 0
     for end in ends:
         length = end - position
         if length == wire:
-            first = good * payload_size
-            if _decode_frame(data, position, payload_size, payloads, first, tables, start):
-                good += 1
+            if _unstuff_frame(data, position, payload_size, payloads, crcs, whole):
+                whole += 1
             else:
                 bad += 1
                 bad_bytes += length + 1
@@ -248,20 +254,20 @@ def _decode(
             spans[found, 1] = end
             found += 1
         position = end + 1
-    return good, bad, bad_bytes, found
+    return whole, bad, bad_bytes, found
 
 
 @numba.njit(cache=True)
-def _decode_frame(
+def _unstuff_frame(
     data: NDArray[np.uint8],
     position: int,
     payload_size: int,
     payloads: NDArray[np.uint8],
-    first: int,
-    tables: NDArray[np.uint16],
-    start: int,
+    crcs: NDArray[np.uint16],
+    row: int,
 ) -> bool:
-    """Decode the frame at `position` to `payloads[first:]`; False when COBS or CRC is wrong."""
+    """Undo COBS of the frame at `position`; False when it is not COBS."""
+    first = row * payload_size
     for place in range(payload_size):
         payloads[np.uintp(first + place)] = data[np.uintp(position + 1 + place)]
     low = data[position + payload_size + 1]
@@ -277,9 +283,30 @@ def _decode_frame(
         else:
             high = np.uint8(0)
         following += int(data[np.uintp(position + following)])
-    if following != wire:
-        return False
-    return bool(_crc(payloads, first, payload_size, tables, start) == low + 256 * high)
+    crcs[row] = low + 256 * high
+    return following == wire
+
+
+@numba.njit(cache=True)
+def _keep_good(
+    payloads: NDArray[np.uint8],
+    whole: int,
+    payload_size: int,
+    crcs: NDArray[np.uint16],
+    tables: NDArray[np.uint16],
+    start: int,
+) -> int:
+    """Move the payloads whose CRC fits to the front; return how many there are."""
+    good = 0
+    for row in range(whole):
+        first = row * payload_size
+        if _crc(payloads, first, payload_size, tables, start) != crcs[row]:
+            continue
+        if good != row:
+            for place in range(payload_size):
+                payloads[good * payload_size + place] = payloads[first + place]
+        good += 1
+    return good
 
 
 @numba.njit(cache=True)
