@@ -1,4 +1,4 @@
-"""Shared by the drivers' tests. None watches the wall clock: compiled code is slow the first time."""
+"""No test of this room watches the wall clock: compiled code is slow the first time."""
 
 import shutil
 import subprocess
