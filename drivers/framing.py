@@ -42,25 +42,9 @@ def crc16(data: bytes) -> int:
 
 def cobs_encode(data: bytes) -> bytes:
     """Return `data` stuffed so that it holds no zero byte, without a delimiter."""
-    encoded = bytearray()
-    runs = data.split(b"\x00")
-    last = len(runs) - 1
-    for index, run in enumerate(runs):
-        start = 0
-        while len(run) - start > MAX_BLOCK:
-            encoded.append(MAX_BLOCK + 1)
-            encoded += run[start : start + MAX_BLOCK]
-            start += MAX_BLOCK
-        rest = run[start:]
-        if len(rest) == MAX_BLOCK:
-            encoded.append(MAX_BLOCK + 1)
-            encoded += rest
-            if index == last:  # a full block implies no zero, so nothing need follow it
-                break
-            rest = b""
-        encoded.append(len(rest) + 1)
-        encoded += rest
-    return bytes(encoded)
+    encoded = np.empty(len(data) + len(data) // MAX_BLOCK + 1, np.uint8)
+    size = _cobs_encode(np.frombuffer(data, np.uint8), encoded)
+    return encoded[:size].tobytes()
 
 
 def cobs_decode(encoded: bytes) -> bytes:
@@ -69,20 +53,11 @@ def cobs_decode(encoded: bytes) -> bytes:
     Raises:
         FrameError: A zero byte inside, or a block that runs past the end.
     """
-    if 0 in encoded:
-        raise FrameError("The frame holds a zero byte.", "Bytes were lost or changed on the link.")
-    data = bytearray()
-    position = 0
-    while position < len(encoded):
-        code = encoded[position]
-        following = position + code
-        if following > len(encoded):
-            raise FrameError("The frame ends early.", "Bytes were lost or changed on the link.")
-        data += encoded[position + 1 : following]
-        if code <= MAX_BLOCK and following < len(encoded):
-            data.append(0)
-        position = following
-    return bytes(data)
+    data = np.empty(len(encoded), np.uint8)
+    size = _cobs_decode(np.frombuffer(encoded, np.uint8), data)
+    if size < 0:
+        raise FrameError("A frame is not COBS.", "Bytes were lost or changed on the link.")
+    return data[:size].tobytes()
 
 
 def encode_frame(payload: bytes) -> bytes:
@@ -219,6 +194,44 @@ def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
 
 
 # The loops below index flat arrays and never slice: a slice costs these kernels more than the copy.
+
+
+@numba.njit(cache=True)
+def _cobs_encode(data: NDArray[np.uint8], encoded: NDArray[np.uint8]) -> int:
+    """Stuff `data` into `encoded`; return the size."""
+    code_at, size, code = 0, 1, 1
+    for index, value in enumerate(data):
+        if value != 0:
+            encoded[size] = value
+            size += 1
+            code += 1
+        full = code == MAX_BLOCK + 1
+        if value == 0 or (full and index + 1 < data.size):  # a full block at the end needs no more
+            encoded[code_at] = code
+            code_at, size, code = size, size + 1, 1
+    encoded[code_at] = code
+    return size
+
+
+@numba.njit(cache=True)
+def _cobs_decode(encoded: NDArray[np.uint8], data: NDArray[np.uint8]) -> int:
+    """Undo `_cobs_encode` into `data`; return the size, or -1 for what is not COBS."""
+    position = size = 0
+    while position < encoded.size:
+        code = int(encoded[position])
+        if code == 0 or position + code > encoded.size:
+            return -1
+        for offset in range(1, code):
+            value = encoded[position + offset]
+            if value == 0:
+                return -1
+            data[size] = value
+            size += 1
+        position += code
+        if code <= MAX_BLOCK and position < encoded.size:
+            data[size] = 0
+            size += 1
+    return size
 
 
 @numba.njit(cache=True)
