@@ -1,1 +1,1 @@
-"""Benchmarks: each file measures one thing as a ratio within one run."""
+"""Ratios against named baselines, measured in one run: `make bench`."""

@@ -1,13 +1,21 @@
-"""A benchmark's result: how many times better than a stated baseline, in the same run."""
+"""A measured ratio against a named baseline, and the timing both sides share."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """One ratio and the target it is held against."""
+    """One line of the benchmark table.
+
+    Attributes:
+        name: What was measured, against which baseline.
+        ratio: The measured ratio.
+        target: What it should reach.
+        higher_is_better: Whether the target is a floor (True) or a ceiling.
+        detail: The two figures the ratio was made of.
+    """
 
     name: str
     ratio: float
@@ -15,12 +23,17 @@ class Ratio:
     higher_is_better: bool = True
     detail: str = ""
 
+    @property
+    def holds(self) -> bool:
+        """Whether the target is reached."""
+        return self.ratio >= self.target if self.higher_is_better else self.ratio <= self.target
+
 
 def best_of(function: Callable[[], object], repeats: int = 3) -> float:
-    """Return the shortest of several runs, in seconds."""
+    """Return the shortest of several timings of a call, s; the shortest is the least disturbed."""
     times = []
     for _ in range(repeats):
-        start = perf_counter()
+        start = time.perf_counter()
         function()
-        times.append(perf_counter() - start)
+        times.append(time.perf_counter() - start)
     return min(times)

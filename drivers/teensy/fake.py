@@ -42,7 +42,7 @@ SAMPLE_WIRE = SAMPLE_DTYPE.itemsize + 4
 """Bytes of a sample frame on the wire."""
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
 _LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
-_ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS, Kind.STOP)
+_ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
 
 
