@@ -1,8 +1,8 @@
-"""The position controller the logger runs at 1 kHz, compiled, the twin of `firmware/core/control.hpp`.
+"""The position controller the logger runs at 1 kHz, the twin of `firmware/core/control.hpp`.
 
-Signs are the rig's raw ones: on closing the spindle count and the command fall while the motor count
-rises. Both implementations do the same float64 operations in the same order, so that the fake and the
-firmware answer with the same bytes.
+Signs are the rig's raw ones: on closing the spindle count and the command fall while the motor
+count rises. Both implementations do the same float64 operations in the same order, so that the
+fake and the firmware answer with the same bytes.
 """
 
 import numba

@@ -1,1 +1,51 @@
-"""Physical effects, one file each."""
+"""Physical effects, one file each. Adding an effect is adding a file to this folder."""
+
+import difflib
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+
+from estimation.effects.effect import Effect, Parameter, Proportional
+from estimation.errors import EstimationError
+
+__all__ = ["Effect", "Parameter", "Proportional", "UnknownEffectError", "catalogue", "effect"]
+
+
+class UnknownEffectError(EstimationError):
+    """No file of the catalogue holds the effect asked for."""
+
+
+@cache
+def catalogue() -> Mapping[str, Effect]:
+    """Return every effect of this folder by id."""
+    found: dict[str, Effect] = {}
+    for module in pkgutil.iter_modules(__path__):
+        content = importlib.import_module(f"{__name__}.{module.name}")
+        for _, kind in inspect.getmembers(content, inspect.isclass):
+            if (
+                issubclass(kind, Effect)
+                and kind.__module__ == content.__name__
+                and "id" in vars(kind)
+            ):
+                found[kind.id] = kind()
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+def effect(name: str) -> Effect:
+    """Return one effect by its id.
+
+    Raises:
+        UnknownEffectError: There is none of that id; the nearest one is named.
+    """
+    known = catalogue()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
+        raise UnknownEffectError(
+            f"There is no effect {name!r}.",
+            f"The catalogue has: {', '.join(known)}.",
+            f"Did you mean {near[0]!r}?" if near else "",
+        )
+    return known[name]

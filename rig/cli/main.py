@@ -4,8 +4,16 @@ import sys
 from typing import Annotated
 
 import typer
+from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.demo import demo
+from rig.cli.fit import fit
+from rig.cli.live import live
+from rig.cli.log import log_app
+from rig.cli.record import record
+from rig.cli.replay import replay
+from rig.cli.study import study_app
 
 app = typer.Typer(
     name="rig",
@@ -19,8 +27,13 @@ app = typer.Typer(
 )
 
 
-USAGE_ERROR = typer.BadParameter.__mro__[2]
-"""The base of typer's own errors, which typer does not export by name."""
+app.command()(demo)
+app.command()(record)
+app.command()(live)
+app.command()(replay)
+app.command()(fit)
+app.add_typer(log_app, name="log")
+app.add_typer(study_app, name="study")
 
 
 def _version(wanted: bool) -> None:
@@ -61,14 +74,15 @@ def main(arguments: list[str] | None = None) -> int:
 def _report(error: Exception, words: list[str]) -> int:
     """Write an error for people to stderr, for machines to stdout, and return its exit code."""
     from rig.cli.output import emit_json
-    from rig.errors import KNOWN_ERRORS, exit_code_of
+    from rig.errors import KNOWN_ERRORS, ExitCode, exit_code_of
 
     if isinstance(error, typer.Abort):
         sys.stderr.write("Interrupted.\n")
         return 130
-    if isinstance(error, USAGE_ERROR):
-        error.show(file=sys.stderr)
-        return error.exit_code
+    if isinstance(error, TyperException):
+        # a word on the command line that typer itself refused
+        getattr(error, "show", lambda **_: None)(file=sys.stderr)
+        return int(ExitCode.USAGE)
     if "--debug" in words or not isinstance(error, KNOWN_ERRORS):
         import traceback
 

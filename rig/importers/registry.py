@@ -4,7 +4,7 @@ An importer is an object in the entry point group `rig.importers`. It says wheth
 its format without reading the samples, and opens it as a campaign of run handles.
 """
 
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -35,8 +35,31 @@ class Importer(Protocol):
 
 
 def importers() -> dict[str, Importer]:
-    """Return every installed importer by name; a third party adds one by entry point."""
-    return {entry.name: entry.load() for entry in sorted(entry_points(group="rig.importers"))}
+    """Return every installed importer by name; a third party adds one by entry point.
+
+    Raises:
+        UsageError: An entry point does not load, or is no importer; none is skipped silently.
+    """
+    return {entry.name: _loaded(entry) for entry in sorted(entry_points(group="rig.importers"))}
+
+
+def _loaded(entry: EntryPoint) -> Importer:
+    package = entry.dist.name if entry.dist else entry.module
+    try:
+        importer = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"The importer {entry.name!r} of {package} cannot be loaded: {error}.",
+            f"Its entry point is {entry.value}.",
+            f"Install {package} again, or remove it.",
+        ) from error
+    if not isinstance(importer, Importer):
+        raise UsageError(
+            f"{entry.value} of {package} is no importer.",
+            "Expected an object with name, description, recognises() and open().",
+            f"Install {package} again, or remove it.",
+        )
+    return importer
 
 
 def open_campaign(path: Path, format_name: str | None = None) -> Campaign:

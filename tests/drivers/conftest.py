@@ -1,4 +1,4 @@
-"""No test of this room watches the wall clock: compiled code is slow the first time."""
+"""Shared by the drivers' tests. None watches the wall clock: compiling is slow the first time."""
 
 import shutil
 import subprocess

@@ -1,0 +1,42 @@
+"""How much faster than real time the simulated rig runs on one core."""
+
+import numpy as np
+
+from benchmarks.ratio import Ratio, best_of
+from drivers.teensy import control
+from rig.simulation.bench import SimulatedBench
+from rig.simulation.hidden import NAMES, HiddenEffect
+from rig.simulation.parameters import REFERENCE_GAINS
+
+DURATION_S = 20.0
+
+
+def measure() -> list[Ratio]:
+    """Time closed-loop grasps at 0.3 Hz, plain and with every hidden effect switched on."""
+    ticks = round(1e3 * DURATION_S)
+    phase = 2.0 * np.pi * 0.3 * 1e-3 * np.arange(ticks)
+    target = np.round(683.0 * (1.0 + np.cos(phase))).astype(np.int32)
+    load_ma = np.full(ticks, 500, np.int32)
+
+    def seconds(effects: list[HiddenEffect]) -> float:
+        bench = SimulatedBench(effects=effects)
+        state, gains = control.new_state(), np.array(REFERENCE_GAINS)
+        bench.advance(ticks, target, load_ma, True, state, gains)  # compiles
+        return best_of(lambda: bench.advance(ticks, target, load_ma, True, state, gains), 5)
+
+    plain_s = seconds([])
+    loaded_s = seconds([HiddenEffect(name) for name in NAMES])
+    return [
+        Ratio(
+            "simulated rig over real time, controller in the loop, one core",
+            DURATION_S / plain_s,
+            150.0,
+            detail=f"{DURATION_S:g} s simulated in {plain_s * 1e3:.1f} ms",
+        ),
+        Ratio(
+            "the same with every hidden effect switched on",
+            DURATION_S / loaded_s,
+            150.0,
+            detail=f"{DURATION_S:g} s simulated in {loaded_s * 1e3:.1f} ms",
+        ),
+    ]

@@ -1,0 +1,135 @@
+"""Counts to SI units: one straight line a channel, and the immutable set of them a log names.
+
+A channel's value is `(counts - zero_counts) * slope`. The slope carries the sign that makes closing
+positive. The zero comes from the sensor at rest before a run and is kept apart from the slope, so
+that a log can be read again with another zero or another slope.
+"""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.errors import CalibrationError
+from estimation.channels import unit_of
+
+SHIPPED = Path(__file__).parent / "shipped"
+
+
+@dataclass(frozen=True, slots=True)
+class LinearCalibration:
+    """One channel's line.
+
+    Attributes:
+        channel: SI channel it gives, with the unit in its name.
+        counts: Field of the raw counts it reads.
+        slope: SI units a count; negative where the raw count falls on closing.
+        zero_counts: Counts at zero, from the certificate or the mounting.
+        source: Where slope and zero come from.
+        tared: Whether the zero is measured anew before each run.
+    """
+
+    channel: str
+    counts: str
+    slope: float
+    zero_counts: float = 0.0
+    source: str = ""
+    tared: bool = False
+
+    def __post_init__(self) -> None:
+        unit_of(self.channel)
+        if not (np.isfinite(self.slope) and self.slope != 0.0 and np.isfinite(self.zero_counts)):
+            raise CalibrationError(
+                f"{self.channel}: slope {self.slope}, zero {self.zero_counts} do not make a line.",
+                "A slope is finite and not zero, a zero is finite.",
+            )
+
+
+@dataclass(frozen=True)
+class CalibrationSet:
+    """The calibrations of every channel of a rig.
+
+    Attributes:
+        name: Name of the set.
+        channels: SI channel to its line.
+    """
+
+    name: str
+    channels: Mapping[str, LinearCalibration]
+
+    @property
+    def content_hash(self) -> str:
+        """SHA-256 of the set's content, first 16 hexadecimal digits."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()[:16]
+
+    def to_json(self) -> str:
+        """Return the set as JSON, the form a log carries as an attachment."""
+        lines = {name: asdict(line) for name, line in sorted(self.channels.items())}
+        return json.dumps({"name": self.name, "channels": lines}, indent=1, sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> "CalibrationSet":
+        """Read a set written by `to_json`.
+
+        Raises:
+            CalibrationError: The text is not such a set.
+        """
+        try:
+            raw = json.loads(text)
+            lines = {name: LinearCalibration(**line) for name, line in raw["channels"].items()}
+            return cls(str(raw["name"]), lines)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise CalibrationError("The text is not a calibration set.", str(error)) from error
+
+    def apply(
+        self, counts: NDArray[np.void], zeros: Mapping[str, float] | None = None
+    ) -> dict[str, NDArray[np.float64]]:
+        """Convert raw counts to SI columns.
+
+        Args:
+            counts: Structured array with the counts fields, shape (n,).
+            zeros: Channel to measured zero in counts, in place of the line's own zero.
+
+        Returns:
+            SI channel to values, each of shape (n,).
+        """
+        zeros = zeros or {}
+        return {
+            name: (counts[line.counts] - zeros.get(name, line.zero_counts)) * line.slope
+            for name, line in self.channels.items()
+        }
+
+
+def load_calibration_set(path: Path) -> CalibrationSet:
+    """Read a calibration set from a TOML file: `name`, then one table `[channels.NAME]` a channel.
+
+    Raises:
+        CalibrationError: The file cannot be read or is not a calibration set.
+    """
+    try:
+        raw = tomllib.loads(path.read_text())
+        lines = {
+            name: LinearCalibration(channel=name, **table)
+            for name, table in raw["channels"].items()
+        }
+        return CalibrationSet(str(raw["name"]), lines)
+    except OSError as error:
+        raise CalibrationError(
+            f"The calibration file {path} cannot be read.", str(error), "Check the path."
+        ) from error
+    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+        raise CalibrationError(
+            f"{path} is not a calibration set.",
+            f"{type(error).__name__}: {error}.",
+            "It needs `name` and a table [channels.NAME] with counts and slope for each channel.",
+        ) from error
+
+
+def shipped_calibration_set(name: str) -> CalibrationSet:
+    """Return a calibration set shipped with the project, such as `reference`."""
+    return load_calibration_set(SHIPPED / f"{name}.toml")

@@ -1,0 +1,107 @@
+"""Sensor zeros before and after a run, and whether they drifted in between."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.errors import CalibrationError
+from calibration.linear import CalibrationSet
+from estimation.channels import unit_of
+
+MINIMUM_SAMPLES = 100
+
+
+@dataclass(frozen=True, slots=True)
+class SensorZero:
+    """A sensor at rest.
+
+    Attributes:
+        channel: SI channel.
+        mean_counts: Mean reading, counts.
+        std_counts: Standard deviation of one reading, counts.
+        samples: Number of readings.
+    """
+
+    channel: str
+    mean_counts: float
+    std_counts: float
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """How far a zero moved over a run.
+
+    Attributes:
+        channel: SI channel.
+        unit: Its unit.
+        before: Zero before the run relative to the calibration's own, SI.
+        after: The same after the run, SI.
+        limit: Largest change that passes, SI.
+        passes: Whether the change is within the limit.
+    """
+
+    channel: str
+    unit: str
+    before: float
+    after: float
+    limit: float
+    passes: bool
+
+
+def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, SensorZero]:
+    """Average the readings of every tared channel at rest.
+
+    Args:
+        counts: Structured raw counts, shape (n,).
+        calibrations: Says which channels are tared.
+
+    Raises:
+        CalibrationError: Too few readings, or none of them differ although a real sensor has noise.
+    """
+    if counts.size < MINIMUM_SAMPLES:
+        raise CalibrationError(
+            f"{counts.size} readings are too few for a zero.",
+            f"A zero is the mean of at least {MINIMUM_SAMPLES} readings at rest.",
+        )
+    zeros = {}
+    for name, line in calibrations.channels.items():
+        if not line.tared:
+            continue
+        readings = counts[line.counts].astype(np.float64)
+        zeros[name] = SensorZero(
+            name, float(readings.mean()), float(readings.std(ddof=1)), int(counts.size)
+        )
+    return zeros
+
+
+def drift_verdicts(
+    before: Mapping[str, SensorZero],
+    after: Mapping[str, SensorZero],
+    calibrations: CalibrationSet,
+    limits: Mapping[str, float],
+) -> list[Drift]:
+    """Compare the zeros before and after a run.
+
+    Args:
+        before: Zeros before the run.
+        after: Zeros after it.
+        calibrations: Slopes from counts to SI.
+        limits: Channel to the largest change that passes, SI; a channel without one is not judged.
+    """
+    verdicts = []
+    for name, limit in limits.items():
+        if name not in before or name not in after:
+            raise CalibrationError(
+                f"{name} has a drift limit but no zero.",
+                "Only channels that are tared have a zero.",
+                "Remove the limit, or set `tared = true` in the calibration.",
+            )
+        line = calibrations.channels[name]
+        first = (before[name].mean_counts - line.zero_counts) * line.slope
+        last = (after[name].mean_counts - line.zero_counts) * line.slope
+        passes = abs(last - first) <= limit
+        verdicts.append(Drift(name, unit_of(name), first, last, limit, passes))
+    return verdicts

@@ -1,0 +1,211 @@
+"""Channels that are computed: speeds, accelerations, the twist of the gearbox.
+
+A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
+and second derivative of `X_angle_rad`; `gearbox_differential_rad` is the motor's angle behind the
+gear ratio less the spindle's. Offline they come from a zero-phase filter and a noise-robust
+derivative, live from a causal filter and backward differences: the same names, two sources.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimation.filters import (
+    PAPER,
+    CausalFilter,
+    LowPass,
+    fill_gaps,
+    filter_recording,
+    holoborodko_derivative,
+)
+from estimation.recording import FloatArray, Recording
+
+GEAR_RATIO = 35.0
+"""Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
+
+GEARBOX = "gearbox_differential_rad"
+VELOCITY, ACCELERATION = "_velocity_rad_s", "_acceleration_rad_s2"
+
+Derivative = Callable[[FloatArray], FloatArray]
+
+
+def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the measured channels that the named channels are computed from, sorted."""
+    needed: set[str] = set()
+    for name in names:
+        if name == GEARBOX:
+            needed |= {"motor_angle_rad", "spindle_angle_rad"}
+        elif name != "time_s":
+            needed.add(_differentiated(name)[0])
+    return tuple(sorted(needed))
+
+
+def _differentiated(name: str) -> tuple[str, int]:
+    """Return the channel a channel is the derivative of, and how many times."""
+    for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
+        if name.endswith(suffix):
+            return name.removesuffix(suffix) + "_angle_rad", times
+    return name, 0
+
+
+def _derive(
+    filtered: Mapping[str, FloatArray], names: Iterable[str], derivative: Derivative
+) -> dict[str, FloatArray]:
+    channels: dict[str, FloatArray] = {}
+    for name in names:
+        if name == GEARBOX:
+            channels[name] = (
+                filtered["motor_angle_rad"] / GEAR_RATIO - filtered["spindle_angle_rad"]
+            )
+            continue
+        source, times = _differentiated(name)
+        channels[name] = filtered[source]
+        for _ in range(times):
+            channels[name] = derivative(channels[name])
+    return channels
+
+
+def settled(channels: Recording, low_pass: LowPass, step: int = 1) -> Recording:
+    """Return every n-th sample that is valid and away from the ends of its run.
+
+    At the ends the filter works on a reflection of the run, and a second derivative shows it.
+
+    Args:
+        channels: Filtered channels of one whole run.
+        low_pass: The filter they went through.
+        step: Keep every n-th sample.
+    """
+    edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
+    inner = channels.valid.copy()
+    inner[:edge] = False
+    inner[max(len(inner) - edge, 0) :] = False
+    kept = np.flatnonzero(inner)[::step]
+    return replace(
+        channels,
+        time_s=channels.time_s[kept],
+        columns={name: values[kept] for name, values in channels.columns.items()},
+        flags=channels.flags[kept],
+    )
+
+
+def zero_phase_channels(
+    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
+) -> Recording:
+    """Return a recording of the named channels, filtered without lag and differentiated.
+
+    Args:
+        recording: Measured channels.
+        names: Channels wanted, measured or derived; `time_s` is always there.
+        low_pass: Filter of every measured channel.
+
+    Raises:
+        MissingChannelError: A measured channel is not in the recording.
+        FilterError: The run cannot be filtered.
+    """
+    wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
+    measured = {name: recording[name] for name in measured_channels(wanted)}
+    filtered = filter_recording(replace(recording, columns=measured), low_pass)
+    period_s = 1.0 / recording.sample_rate_hz
+    ticks = np.rint((recording.time_s - recording.time_s[0]) / period_s).astype(np.int64)
+
+    def derivative(values: FloatArray) -> FloatArray:
+        filled = fill_gaps(ticks, values[:, None])[:, 0]
+        return np.asarray(holoborodko_derivative(filled, period_s)[ticks])
+
+    return replace(filtered, columns=_derive(filtered.columns, wanted, derivative))
+
+
+class CausalChannels:
+    """Filtered and derived channels as they come live, in batches of any size.
+
+    Samples that were lost are bridged by a straight line when the next one arrives; after a silence
+    of more than `LONGEST_GAP_S` the filter starts anew. A sample in which a needed channel is not
+    finite counts as lost, and its derived values are NaN. The result does not depend on how the
+    samples are cut into batches.
+    """
+
+    LONGEST_GAP_S = 0.25
+
+    def __init__(
+        self, names: Iterable[str], sample_rate_hz: float, low_pass: LowPass = PAPER
+    ) -> None:
+        self.names = tuple(dict.fromkeys(names))
+        self.measured = measured_channels(self.names)
+        self._rate_hz = sample_rate_hz
+        self._filter = CausalFilter(sample_rate_hz, low_pass)
+        self._last_time_s: float | None = None
+        self._last_row: FloatArray = np.empty(0)
+        self._history: FloatArray = np.empty((0, 0))  # the last two filtered rows
+
+    def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
+        """Take the next samples and return the channels for them.
+
+        Args:
+            time_s: Device time, shape (n,), increasing across batches.
+            measured: Measured channels in SI units, each of shape (n,); others are ignored.
+
+        Returns:
+            Channel name to values, each of shape (n,); NaN where a needed value is not finite.
+        """
+        time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
+        columns = [np.atleast_1d(np.asarray(measured[n], np.float64)) for n in self.measured]
+        rows = np.column_stack(columns) if columns else np.empty((len(time), 0))
+        channels = {name: np.full(len(time), np.nan) for name in self.names}
+        good = np.flatnonzero(np.isfinite(rows).all(axis=1))
+        for part in self._unbroken(time, good):
+            for name, values in self._advance(time[part], rows[part]).items():
+                channels[name][part] = values
+        return channels
+
+    def _unbroken(self, time: FloatArray, good: np.ndarray) -> list[np.ndarray]:
+        """Cut the samples where the silence before them was too long."""
+        if good.size == 0:
+            return []
+        before = time[good[0]] if self._last_time_s is None else self._last_time_s
+        silence = np.diff(time[good], prepend=before)
+        parts = np.split(good, np.flatnonzero(silence > self.LONGEST_GAP_S))
+        return [part for part in parts if part.size]
+
+    def _advance(self, time: FloatArray, rows: FloatArray) -> dict[str, FloatArray]:
+        if self._last_time_s is None or time[0] - self._last_time_s > self.LONGEST_GAP_S:
+            self._filter.restart()
+            self._last_time_s, self._last_row = time[0] - 1.0 / self._rate_hz, rows[0]
+            first = True
+        else:
+            first = False
+        steps = np.rint(np.diff(time, prepend=self._last_time_s) * self._rate_hz)
+        ticks = np.concatenate([[0], np.cumsum(np.maximum(steps, 1))]).astype(np.int64)
+        filled = fill_gaps(ticks, np.vstack([self._last_row, rows]))[1:]
+        filtered = self._filter.step(filled)
+        if first:
+            self._history = np.repeat(filtered[:1], 2, axis=0)
+        lined = np.vstack([self._history, filtered])
+        self._history, self._last_row, self._last_time_s = lined[-2:], rows[-1], float(time[-1])
+        derived = _derive(
+            dict(zip(self.measured, lined.T, strict=True)),
+            [name for name in self.names if name != "time_s"],
+            self._backward,
+        )
+        at = ticks[1:] + 1  # two rows of history, and tick 1 is the first new row
+        channels = {name: values[at] for name, values in derived.items()}
+        return {**channels, "time_s": time} if "time_s" in self.names else channels
+
+    def _backward(self, values: FloatArray) -> FloatArray:
+        # the first value is made of one sample too few, and is never handed out
+        return np.diff(values, prepend=values[:1]) * self._rate_hz
+
+
+def causal_channels(
+    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
+) -> Recording:
+    """Return a recording of the named channels as they would have come live.
+
+    Raises:
+        MissingChannelError: A measured channel is not in the recording.
+    """
+    wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
+    source = CausalChannels(wanted, recording.sample_rate_hz, low_pass)
+    measured = {name: recording[name] for name in source.measured}
+    return replace(recording, columns=source.step(recording.time_s, measured))

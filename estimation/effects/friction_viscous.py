@@ -1,0 +1,20 @@
+"""Viscous friction: a loss in proportion to speed."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Parameter, Proportional
+
+
+class ViscousFriction(Proportional):
+    """Viscous friction of grease and bearings.
+
+    Equation: torque = b speed.
+
+    Source: the classic friction model; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
+    """
+
+    id = "friction.viscous"
+    roles: ClassVar = {"speed": "motor_velocity_rad_s"}
+    amplitudes = (Parameter("damping", "target / speed", "loss for one rad/s", lower=0.0),)
+    confused_with = ("friction.drag", "sensor.delay")
+    told_apart_by = "a staircase of constant speeds in both directions"

@@ -1,0 +1,20 @@
+"""Inertia: torque that accelerates the moving parts."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Parameter, Proportional
+
+
+class Inertia(Proportional):
+    """Inertia of the rotor, the gearhead or the jaw.
+
+    Equation: torque = J acceleration.
+
+    Source: Newton's second law; the motor balance of any servo joint.
+    """
+
+    id = "inertia.missing"
+    roles: ClassVar = {"acceleration": "motor_acceleration_rad_s2"}
+    amplitudes = (Parameter("inertia", "target / acceleration", "moment of inertia", lower=0.0),)
+    confused_with = ("sensor.delay", "sensor.lag")
+    told_apart_by = "the same motion at twice the frequency"

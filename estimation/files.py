@@ -1,0 +1,30 @@
+"""Writing a text file so that a reader sees the old one or the new one, never half of either."""
+
+import os
+import tempfile
+from pathlib import Path
+
+
+def write_text_atomic(path: Path, text: str) -> None:
+    """Write a text file under a temporary name beside the target and rename it.
+
+    Args:
+        path: Target; its folder is made when it is missing.
+        text: Content, written as UTF-8.
+
+    Raises:
+        OSError: The folder cannot be made or written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.chmod(0o644)  # mkstemp keeps its file private
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

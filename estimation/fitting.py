@@ -1,0 +1,330 @@
+"""Fitting a model on a campaign: amplitudes by least squares, shapes by variable projection.
+
+The runs enter as one small cross-product matrix each, so a bootstrap over runs costs little.
+Where offsets of the runs are a nuisance, each run's mean is removed from the target and from every
+column, and the model's own offset becomes the mean over the runs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, optimize
+
+from estimation.campaign import Campaign
+from estimation.derived import settled
+from estimation.errors import EstimationError
+from estimation.model import (
+    Estimate,
+    Evidence,
+    Model,
+    balance_channels,
+    estimate,
+    with_values,
+)
+from estimation.recording import FloatArray, Recording
+
+OFFSET = "sensor.offset"
+GRID = 13
+"""Points a shape parameter is tried at before it is refined, spaced evenly in its logarithm."""
+
+
+class FitError(EstimationError):
+    """The campaign does not tell the model's parameters."""
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A model laid out for fitting: its runs and which columns are which."""
+
+    model: Model
+    runs: list[Recording]
+    free: NDArray[np.intp]  # columns that least squares solves for
+    offset: int | None  # column of the model's own offset when run offsets replace it
+    names: list[str]  # of all columns
+    signs: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+    def columns(self, run: Recording, shape: Sequence[float]) -> FloatArray:
+        """Return all signed columns of a run, shape (n, columns)."""
+        blocks = []
+        rest = list(shape)
+        for term in self.model.terms:
+            own, rest = rest[: len(term.effect.shape)], rest[len(term.effect.shape) :]
+            blocks.append(term.columns(run, own))
+        return np.column_stack(blocks) * self.signs
+
+    def gram(self, run: Recording, shape: Sequence[float]) -> FloatArray:
+        """Return the cross-products of free columns and target of one run."""
+        table = np.column_stack([self.columns(run, shape)[:, self.free], run[self.model.target]])
+        if self.model.run_offsets:
+            table -= table.mean(axis=0)
+        product: FloatArray = table.T @ table
+        return product
+
+
+def fit(
+    model: Model,
+    campaign: Campaign,
+    *,
+    run_offsets: bool | None = None,
+    every: int | None = None,
+    bootstrap: int = 200,
+    seed: int = 0,
+) -> Model:
+    """Fit a model on the runs of a campaign that are not excluded.
+
+    Args:
+        model: Declared or fitted model; values of shape parameters are where the search starts.
+        campaign: The runs; read once, only the model's channels at valid samples are kept.
+        run_offsets: Treat an offset of each run as a nuisance; the model's own choice if None.
+        every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
+        bootstrap: Number of resamplings of runs behind the spreads; 0 for none.
+        seed: Seed of the resampling.
+
+    Returns:
+        The model with values, spreads and evidence. Spreads are to first order in all parameters,
+        shapes too. A parameter at its bound, or fitted on a single run, has no spread.
+
+    Raises:
+        FitError: No valid sample, or columns that cannot be told apart on these runs.
+        MissingChannelError: A run lacks a channel of the model.
+    """
+    if run_offsets is not None:
+        model = replace(model, run_offsets=run_offsets)
+    problem = _problem(model, _prepared(model, campaign, every))
+    shape = _search_shape(problem)
+    grams = [problem.gram(run, shape) for run in problem.runs]
+    amplitudes = _solve(problem, np.sum(grams, axis=0))
+    offset = _mean_offset(problem, shape, amplitudes)
+    fitted = _with_numbers(problem, amplitudes, shape, offset)
+    spreads = _bootstrap(problem, amplitudes, shape, bootstrap, seed)
+    return _with_numbers(
+        problem, amplitudes, shape, offset, spreads, _evidence(fitted, problem.runs, seed)
+    )
+
+
+def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recording]:
+    """Read the runs and keep the model's channels at every n-th valid sample."""
+    runs = []
+    for recording in campaign.evidence:
+        step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
+        run = settled(balance_channels(model, recording), model.low_pass, step)
+        if len(run):
+            runs.append(run)
+    if not runs:
+        raise FitError(
+            f"There is no valid sample to fit the model {model.name!r} on.",
+            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded.",
+        )
+    return runs
+
+
+def _problem(model: Model, runs: list[Recording]) -> _Problem:
+    parameters = [(term, p) for term in model.terms for p in term.effect.amplitudes]
+    names = [f"{term.effect.id}.{p.name}" for term, p in parameters]
+    offset = names.index(f"{OFFSET}.offset") if f"{OFFSET}.offset" in names else None
+    replaced = offset if model.run_offsets else None
+    free = np.array([k for k in range(len(names)) if k != replaced], dtype=np.intp)
+    return _Problem(
+        model=model,
+        runs=runs,
+        free=free,
+        offset=replaced,
+        names=names,
+        signs=np.array([float(term.sign) for term, _ in parameters]),
+        lower=np.array([p.lower for _, p in parameters])[free],
+        upper=np.array([p.upper for _, p in parameters])[free],
+    )
+
+
+def _solve(problem: _Problem, gram: FloatArray) -> FloatArray:
+    """Return the amplitudes of the free columns within their bounds."""
+    if problem.free.size == 0:
+        return np.empty(0)
+    scale = np.sqrt(np.maximum(np.diag(gram)[:-1], np.finfo(float).tiny))
+    normal = gram[:-1, :-1] / np.outer(scale, scale)
+    _check_independent(problem, normal, np.diag(gram)[:-1])
+    root = linalg.cholesky(normal)
+    right = linalg.solve_triangular(root, gram[:-1, -1] / scale, trans="T")
+    free: FloatArray = linalg.solve_triangular(root, right) / scale
+    if np.all(free >= problem.lower) and np.all(free <= problem.upper):
+        return free
+    bounds = (problem.lower * scale, problem.upper * scale)
+    bounded: FloatArray = optimize.lsq_linear(root, right, bounds, method="bvls").x / scale
+    return bounded
+
+
+def _check_independent(problem: _Problem, normal: FloatArray, power: FloatArray) -> None:
+    values, vectors = np.linalg.eigh(normal)
+    if np.all(power > 0) and values[0] > 1e-10:
+        return
+    guilty = np.abs(vectors[:, 0]) > 0.1 if np.all(power > 0) else power <= 0
+    named = ", ".join(problem.names[k] for k in problem.free[guilty])
+    raise FitError(
+        f"These runs do not tell {named}.",
+        "The columns are constant or proportional to one another in every run.",
+        "Take an effect out of the model, or record runs that excite it.",
+    )
+
+
+def _error_share(problem: _Problem, log_shape: Sequence[float] | FloatArray) -> float:
+    """Return the share of the target's power that the best amplitudes leave."""
+    gram = np.sum(
+        [problem.gram(run, [float(x) for x in np.exp(log_shape)]) for run in problem.runs], axis=0
+    )
+    vector = np.append(_solve(problem, gram), -1.0)
+    return float(vector @ gram @ vector / max(gram[-1, -1], np.finfo(float).tiny))
+
+
+def _search_shape(problem: _Problem) -> list[float]:
+    """Return the shape parameters: a grid along each, twice round, then a bounded descent."""
+    parameters = [p for term in problem.model.terms for p in term.effect.shape]
+    if not parameters:
+        return []
+    bounds = [(np.log(p.lower), np.log(p.upper)) for p in parameters]
+    known = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
+    point = [
+        float(np.clip(np.log(start.value), *bound)) if start else float(np.mean(bound))
+        for start, bound in zip(known, bounds, strict=True)
+    ]
+
+    def error(candidate: Sequence[float] | FloatArray) -> float:
+        try:
+            return _error_share(problem, candidate)
+        except FitError:  # a shape at which columns fall together, such as a width far too wide
+            return 1.0
+
+    for _ in range(2 if len(parameters) > 1 else 1):
+        for k, bound in enumerate(bounds):
+            tried = [[*point[:k], float(x), *point[k + 1 :]] for x in np.linspace(*bound, GRID)]
+            point = min([point, *tried], key=error)
+    best = optimize.minimize(
+        error, point, method="Powell", bounds=bounds, options={"xtol": 1e-4, "ftol": 1e-10}
+    )
+    return [float(x) for x in np.exp(best.x)]
+
+
+def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:
+    """Return the mean over the runs of what the free columns leave."""
+    if problem.offset is None:
+        return 0.0
+    return float(np.mean([_run_offset(problem, run, shape, free) for run in problem.runs]))
+
+
+def _run_offset(
+    problem: _Problem, run: Recording, shape: Sequence[float], free: FloatArray
+) -> float:
+    left = run[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free
+    return float(left.mean() * problem.signs[problem.offset or 0])
+
+
+def _bootstrap(
+    problem: _Problem, free: FloatArray, shape: list[float], count: int, seed: int
+) -> FloatArray | None:
+    """Return values over a bootstrap of runs: (replicate, free columns + shapes + offset).
+
+    Each replicate takes one Gauss-Newton step from the fit, with the derivative of the estimate by
+    the logarithm of each shape as a further column. Parameters at a bound stay there: NaN.
+    """
+    runs = problem.runs
+    if count == 0 or len(runs) < 2:
+        return None
+    names = len(free)
+    products, means = [], []
+    for run in runs:
+        table = np.column_stack(
+            [
+                problem.columns(run, shape)[:, problem.free],
+                _slopes(problem, run, shape, free),
+                run[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free,
+            ]
+        )
+        means.append(table.mean(axis=0))
+        if problem.model.run_offsets:
+            table = table - means[-1]
+        products.append(table.T @ table)
+    inside = np.concatenate([(free > problem.lower) & (free < problem.upper), np.ones(len(shape))])
+    moving = np.flatnonzero(inside)
+    weights = np.random.default_rng(seed).multinomial(
+        len(runs), np.full(len(runs), 1 / len(runs)), size=count
+    )
+    start = np.concatenate([free, np.log(shape)])
+    values = np.full((count, len(start) + 1), np.nan)
+    for replicate, weight in enumerate(weights):
+        total = np.tensordot(weight, products, axes=1)
+        step = np.zeros(len(start))
+        step[moving] = linalg.lstsq(
+            total[np.ix_(moving, moving)], total[moving, -1], check_finite=False
+        )[0]
+        values[replicate, :-1] = np.where(inside > 0, start + step, np.nan)
+        if problem.offset is not None:
+            mean = np.average(means, axis=0, weights=weight)
+            values[replicate, -1] = (mean[-1] - mean[:-1] @ step) * problem.signs[problem.offset]
+    values[:, names:-1] = np.exp(values[:, names:-1])
+    return values
+
+
+def _slopes(
+    problem: _Problem, run: Recording, shape: list[float], free: FloatArray, step: float = 1e-3
+) -> FloatArray:
+    """Return the derivative of the estimate by the logarithm of each shape, shape (n, shapes)."""
+    slopes = np.empty((len(run), len(shape)))
+    for k in range(len(shape)):
+        ends = []
+        for sign in (1, -1):
+            moved = [x * np.exp(sign * step) if i == k else x for i, x in enumerate(shape)]
+            ends.append(problem.columns(run, moved)[:, problem.free] @ free)
+        slopes[:, k] = (ends[0] - ends[1]) / (2 * step)
+    return slopes
+
+
+def _with_numbers(
+    problem: _Problem,
+    free: FloatArray,
+    shape: list[float],
+    offset: float,
+    spreads: FloatArray | None = None,
+    evidence: Evidence | None = None,
+) -> Model:
+    """Return the model with its numbers in place."""
+    amplitudes = np.full(len(problem.names), offset)
+    amplitudes[problem.free] = free
+    place = np.full(len(problem.names), -1)  # the offset is the bootstrap's last column
+    place[problem.free] = np.arange(len(free))
+    values: list[dict[str, Estimate]] = []
+    column, shape_at = 0, 0
+    for term in problem.model.terms:
+        own: dict[str, Estimate] = {}
+        for parameter in term.effect.amplitudes:
+            own[parameter.name] = _estimate(amplitudes[column], spreads, int(place[column]))
+            column += 1
+        for parameter in term.effect.shape:
+            own[parameter.name] = _estimate(shape[shape_at], spreads, len(free) + shape_at)
+            shape_at += 1
+        values.append(own)
+    return with_values(problem.model, values, evidence)
+
+
+def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate:
+    if spreads is None or not np.isfinite(spreads[:, column]).all():
+        return Estimate(float(value))
+    replicates = spreads[:, column]
+    low, high = np.percentile(replicates, [2.5, 97.5])
+    return Estimate(float(value), float(replicates.std(ddof=1)), (float(low), float(high)))
+
+
+def _evidence(fitted: Model, runs: list[Recording], seed: int) -> Evidence:
+    errors = [run[fitted.target] - estimate(fitted, run) for run in runs]
+    samples = sum(len(error) for error in errors)
+    squares = sum(float(error @ error) for error in errors)
+    centred = sum(float(np.sum((error - error.mean()) ** 2)) for error in errors)
+    return Evidence(
+        runs=tuple(run.name for run in runs),
+        samples=samples,
+        rmse=float(np.sqrt(centred / samples)),
+        rmse_with_means=float(np.sqrt(squares / samples)),
+        seed=seed,
+    )

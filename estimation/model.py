@@ -1,0 +1,259 @@
+"""A model: one balance of the rig, the channel it estimates, and the effects it is made of.
+
+What is declared, what is fitted, what a residual search adds and what runs live is this same
+object. A parameter without a value is one that has not been fitted yet.
+"""
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from estimation import derived
+from estimation.channels import unit_of
+from estimation.effects import Effect, Parameter
+from estimation.errors import EstimationError
+from estimation.filters import PAPER, LowPass
+from estimation.recording import FloatArray, Recording
+from estimation.units import evaluate
+
+BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw")
+"""Balance ids of the grasper; besides these, `joint.N` of an arm and `calibration.NAME`."""
+
+
+class ModelError(EstimationError):
+    """A model contradicts itself, or is asked for what it does not hold."""
+
+
+class NotFittedError(ModelError):
+    """A model has parameters without values."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A parameter's value and how sure it is.
+
+    Attributes:
+        value: Value in the unit of the parameter.
+        spread: Standard deviation over a bootstrap of runs, or None when it is not known.
+        ci95: 95 % interval of the same bootstrap, or None.
+    """
+
+    value: float
+    spread: float | None = None
+    ci95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Term:
+    """One effect in a model.
+
+    Attributes:
+        effect: The effect.
+        sign: Side of the balance: 1 adds to the target, -1 takes from it.
+        channels: Role to channel name.
+        values: Parameter name to estimate; what is missing is not fitted. The value of a shape
+            parameter is also where a fit starts.
+    """
+
+    effect: Effect
+    sign: int = 1
+    channels: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, Estimate] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.sign not in (1, -1):
+            raise ModelError(f"The sign of {self.effect.id} is {self.sign}; it is 1 or -1.")
+        known = [p.name for p in self.parameters]
+        for given, allowed, what in (
+            (self.channels, list(self.effect.roles), "role"),
+            (self.values, known, "parameter"),
+        ):
+            for name in given:
+                if name not in allowed:
+                    raise ModelError(
+                        f"{self.effect.id} has no {what} {name!r}.", nearest(name, allowed)
+                    )
+        object.__setattr__(
+            self, "channels", MappingProxyType({**self.effect.roles, **self.channels})
+        )
+        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters of the effect: the amplitudes, then the shape."""
+        return (*self.effect.amplitudes, *self.effect.shape)
+
+    def unit(self, parameter: Parameter, target: str) -> str:
+        """Return the unit symbol of a parameter when this term estimates `target`."""
+        roles = {role: unit_of(channel) for role, channel in self.channels.items()}
+        return evaluate(parameter.unit, {"target": unit_of(target), **roles})
+
+    def numbers(self, parameters: Sequence[Parameter]) -> list[float]:
+        """Return the values of some of the parameters.
+
+        Raises:
+            NotFittedError: One of them has no value.
+        """
+        missing = [p.name for p in parameters if p.name not in self.values]
+        if missing:
+            raise NotFittedError(
+                f"{self.effect.id} has no value for {', '.join(missing)}.",
+                "The model is declared but not fitted.",
+                "Fit it on a campaign, or name a fitted model file.",
+            )
+        return [self.values[p.name].value for p in parameters]
+
+    @property
+    def weights(self) -> list[float]:
+        """Signed amplitudes, one a column."""
+        return [self.sign * value for value in self.numbers(self.effect.amplitudes)]
+
+    def columns(
+        self, channels: Mapping[str, FloatArray] | Recording, shape: Sequence[float]
+    ) -> FloatArray:
+        """Return the effect's columns on a run's channels, without sign, shape (n, columns)."""
+        inputs = {role: channels[channel] for role, channel in self.channels.items()}
+        return self.effect.columns(inputs, shape)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What a model was fitted on, and how well.
+
+    Attributes:
+        runs: Names of the runs.
+        samples: Samples that entered the fit.
+        rmse: Root mean square error with each run's mean error removed, in the target's unit.
+        rmse_with_means: The same with the means left in.
+        seed: Seed of the bootstrap behind the spreads.
+    """
+
+    runs: tuple[str, ...]
+    samples: int
+    rmse: float
+    rmse_with_means: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Model:
+    """A balance, the channel it estimates, and its effects.
+
+    Attributes:
+        name: Short name.
+        balance: Balance id, see `BALANCES`.
+        target: Channel that is estimated.
+        terms: The effects.
+        description: What it is and where it comes from.
+        low_pass: Filter of every channel.
+        run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
+            zero drifts. Not where the runs differ by what is to be estimated, such as a load that
+            is held within a run.
+        evidence: What it was fitted on, or None for a declared model.
+    """
+
+    name: str
+    balance: str
+    target: str
+    terms: tuple[Term, ...]
+    description: str = ""
+    low_pass: LowPass = PAPER
+    run_offsets: bool = True
+    evidence: Evidence | None = None
+
+    def __post_init__(self) -> None:
+        unit_of(self.target)
+        if self.balance not in BALANCES and not re.fullmatch(
+            r"joint\.\d+|calibration\.\S+", self.balance
+        ):
+            raise ModelError(
+                f"There is no balance {self.balance!r}.",
+                f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME.",
+                nearest(self.balance, BALANCES),
+            )
+        if not self.terms:
+            raise ModelError(f"The model {self.name!r} has no effect.", "It estimates nothing.")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels the effects read, without the target."""
+        names = (name for term in self.terms for name in term.channels.values())
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def unit(self) -> str:
+        """Unit symbol of the target."""
+        return unit_of(self.target)
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether every parameter has a value."""
+        return all(p.name in term.values for term in self.terms for p in term.parameters)
+
+
+def nearest(name: str, allowed: Sequence[str]) -> str:
+    """Say what was probably meant; empty when nothing is near."""
+    near = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
+    return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(allowed)}."
+
+
+def balance_channels(model: Model, recording: Recording, causal: bool = False) -> Recording:
+    """Return the model's channels and its target, filtered alike.
+
+    Args:
+        model: The model.
+        recording: Measured channels.
+        causal: Filter as live, with its lag; else without lag.
+
+    Raises:
+        MissingChannelError: The recording lacks a channel.
+        FilterError: The run cannot be filtered.
+    """
+    source = derived.causal_channels if causal else derived.zero_phase_channels
+    return source(recording, [*model.channels, model.target], model.low_pass)
+
+
+def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> FloatArray:
+    """Return the estimate from channels that are filtered already, shape (n,), in `model.unit`.
+
+    Raises:
+        NotFittedError: A parameter has no value.
+    """
+    parts = [
+        term.columns(channels, term.numbers(term.effect.shape)) @ np.array(term.weights)
+        for term in model.terms
+    ]
+    total: FloatArray = np.sum(parts, axis=0)
+    return total
+
+
+def predict(model: Model, recording: Recording, causal: bool = False) -> FloatArray:
+    """Estimate the target of one run.
+
+    Args:
+        model: A fitted model.
+        recording: Measured channels; the target itself is not needed.
+        causal: Filter as live, with its lag, so that the result is the live one to rounding; a
+            sample with a channel that is not finite then gives NaN. Else without lag.
+
+    Returns:
+        Shape (n,), in `model.unit`.
+
+    Raises:
+        NotFittedError: A parameter has no value.
+        MissingChannelError: The recording lacks a channel.
+    """
+    source = derived.causal_channels if causal else derived.zero_phase_channels
+    return estimate(model, source(recording, model.channels, model.low_pass))
+
+
+def with_values(
+    model: Model, values: Sequence[Mapping[str, Estimate]], evidence: Evidence | None
+) -> Model:
+    """Return the model with new parameter values, one mapping a term."""
+    terms = tuple(replace(term, values=new) for term, new in zip(model.terms, values, strict=True))
+    return replace(model, terms=terms, evidence=evidence)

@@ -1,0 +1,255 @@
+"""The model file: one readable TOML file, the same for a declared and for a fitted model.
+
+schema = "rig.model/1"
+name = "motor"
+balance = "motor"
+target = "proximal_torque_n_m"
+
+[[effects]]
+id = "friction.coulomb"
+sign = -1
+channels.speed = "motor_velocity_rad_s"
+parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
+"""
+
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from estimation.effects import effect
+from estimation.errors import EstimationError
+from estimation.files import write_text_atomic
+from estimation.filters import LowPass
+from estimation.model import Estimate, Evidence, Model, ModelError, Term, nearest
+
+SCHEMA = "rig.model/1"
+
+
+class ModelFileError(ModelError):
+    """A model file cannot be read; says which file and which key."""
+
+
+def shipped() -> dict[str, Path]:
+    """Return the declared models that come with the project, by name."""
+    folder = Path(str(files("estimation"))) / "models"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def read(path: Path) -> Model:
+    """Read a model file.
+
+    Args:
+        path: The file, or the name of a model from `shipped`.
+
+    Raises:
+        ModelFileError: The file is missing, is not TOML, or a key is unknown, missing or wrong.
+    """
+    known = shipped()
+    place = known.get(str(path), path)
+    try:
+        text = place.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelFileError(
+            f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(known)}."
+        ) from error
+    return parse(text, str(place))
+
+
+def parse(text: str, where: str = "model") -> Model:
+    """Read a model from TOML text.
+
+    Args:
+        text: TOML.
+        where: Name of the file for messages.
+
+    Raises:
+        ModelFileError: As for `read`.
+    """
+    try:
+        top = _Table(tomllib.loads(text), where)
+        if top.take("schema", str) != SCHEMA:
+            raise ModelFileError(f"{where} is not a model of schema {SCHEMA}.")
+        processing = top.table("processing")
+        evidence = top.table("fit")
+        target = top.take("target", str)
+        model = Model(
+            name=top.take("name", str),
+            balance=top.take("balance", str),
+            target=target,
+            description=top.take("description", str, ""),
+            terms=tuple(_term(entry, target) for entry in top.tables("effects")),
+            low_pass=LowPass(
+                processing.number("cutoff_hz", LowPass().cutoff_hz),
+                processing.take("order", int, LowPass().order),
+            ),
+            run_offsets=processing.take("run_offsets", bool, True),
+            evidence=_evidence(evidence) if evidence.content else None,
+        )
+        for table in (top, processing, evidence):
+            table.finish()
+    except tomllib.TOMLDecodeError as error:
+        raise ModelFileError(f"{where} is not TOML.", str(error)) from error
+    except ModelFileError:
+        raise
+    except EstimationError as error:
+        raise ModelFileError(f"{where}: {error.what}", error.why, error.fix) from error
+    return model
+
+
+def write(model: Model, path: Path) -> None:
+    """Write a model file; an existing one is replaced in one step.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    write_text_atomic(path, to_toml(model))
+
+
+def to_toml(model: Model) -> str:
+    """Return a model as TOML text; `parse` gives the same model back."""
+    lines = [
+        f"schema = {_value(SCHEMA)}",
+        f"name = {_value(model.name)}",
+        f"balance = {_value(model.balance)}",
+        f"target = {_value(model.target)}",
+        f"description = {_value(model.description)}",
+        "",
+        "[processing]",
+        f"cutoff_hz = {_value(model.low_pass.cutoff_hz)}",
+        f"order = {_value(model.low_pass.order)}",
+        f"run_offsets = {_value(model.run_offsets)}",
+    ]
+    for term in model.terms:
+        lines += ["", "[[effects]]", f"id = {_value(term.effect.id)}", f"sign = {term.sign}"]
+        lines += [f"channels.{role} = {_value(name)}" for role, name in term.channels.items()]
+        for parameter in term.parameters:
+            if (known := term.values.get(parameter.name)) is not None:
+                unit = term.unit(parameter, model.target)
+                entries = {"value": known.value, "unit": unit}
+                entries |= {"spread": known.spread} if known.spread is not None else {}
+                entries |= {"ci95": list(known.ci95)} if known.ci95 is not None else {}
+                lines.append(f"parameters.{parameter.name} = {_value(entries)}")
+    if model.evidence is not None:
+        lines += ["", "[fit]"]
+        lines += [
+            f"{key} = {_value(getattr(model.evidence, key))}"
+            for key in ("runs", "samples", "rmse", "rmse_with_means", "seed")
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _value(value: Any) -> str:
+    """Return a value as TOML; a JSON string is a TOML basic string but for DEL."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ModelError(f"A model file cannot hold the value {value}.")
+    return repr(value)
+
+
+class _Table:
+    """A TOML table that knows which of its keys were read."""
+
+    def __init__(self, content: Mapping[str, Any], where: str) -> None:
+        self.content = content
+        self.where = where
+        self._read: list[str] = []
+
+    def take(self, key: str, kind: type, default: Any = None) -> Any:
+        self._read.append(key)
+        if key not in self.content and default is not None:
+            return default
+        if key not in self.content:
+            near = nearest(key, list(self.content)) if self.content else ""
+            raise ModelFileError(f"{self.where} lacks the key {key!r}.", near)
+        value = self.content[key]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise ModelFileError(f"{self.where}: {key} = {value!r} is not {kind.__name__}.")
+        return value
+
+    def number(self, key: str, default: float | None = None) -> float:
+        if isinstance(self.content.get(key), int):
+            return float(self.take(key, int))
+        value: float = self.take(key, float, default)
+        if not math.isfinite(value):
+            raise ModelFileError(f"{self.where}: {key} = {value} is not a finite number.")
+        return value
+
+    def table(self, key: str) -> "_Table":
+        return _Table(self.take(key, dict, {}), f"{self.where}, {key}")
+
+    def tables(self, key: str) -> Iterable["_Table"]:
+        for index, entry in enumerate(self.take(key, list), start=1):
+            if not isinstance(entry, dict):
+                raise ModelFileError(f"{self.where}: {key} holds {entry!r}, not a table.")
+            yield _Table(entry, f"{self.where}, {key} {index}")
+
+    def finish(self) -> None:
+        """Raise for the first key that nothing has read."""
+        for key in self.content:
+            if key not in self._read:
+                raise ModelFileError(
+                    f"{self.where} has an unknown key {key!r}.", fix=nearest(key, self._read)
+                )
+
+
+def _term(entry: _Table, target: str) -> Term:
+    kind = effect(entry.take("id", str))
+    sign = entry.take("sign", int, 1)
+    channels = entry.table("channels")
+    parameters = entry.table("parameters")
+    values, units = {}, {}
+    for name in parameters.content:
+        known = parameters.table(name)
+        values[name] = Estimate(
+            known.number("value"),
+            known.number("spread") if "spread" in known.content else None,
+            _pair(known) if "ci95" in known.content else None,
+        )
+        units[name] = known.take("unit", str)
+        known.finish()
+    entry.finish()
+    names = {role: channels.take(role, str) for role in channels.content}
+    term = Term(kind, sign, names, values)
+    _check_units(term, target, units)
+    return term
+
+
+def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
+    """Raise when a parameter's stated unit is not the one its channels give it."""
+    for parameter in term.parameters:
+        unit = term.unit(parameter, target)
+        if stated.get(parameter.name, unit) != unit:
+            raise ModelError(
+                f"{term.effect.id}: {parameter.name} is stated in {stated[parameter.name]!r},"
+                f" not in {unit!r}.",
+                "The unit follows from the target and the channels.",
+                f"Convert the value to {unit} and state that unit.",
+            )
+
+
+def _pair(table: _Table) -> tuple[float, float]:
+    values = table.take("ci95", list)
+    if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
+        raise ModelFileError(f"{table.where}: ci95 = {values!r} is not two numbers.")
+    return float(values[0]), float(values[1])
+
+
+def _evidence(table: _Table) -> Evidence:
+    return Evidence(
+        runs=tuple(str(name) for name in table.take("runs", list)),
+        samples=table.take("samples", int),
+        rmse=table.number("rmse"),
+        rmse_with_means=table.number("rmse_with_means"),
+        seed=table.take("seed", int),
+    )

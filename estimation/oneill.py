@@ -1,0 +1,219 @@
+"""The processing and the linear fits of O'Neill et al. 2018, on any campaign of the grasper rig.
+
+Source: J. J. O'Neill, T. K. Stephens, T. M. Kowalewski, "Evaluation of torque measurement
+surrogates as applied to grip torque and jaw angle estimation of robotic surgical tools", IEEE
+Robotics and Automation Letters 2018, sections II.C and II.E, Table I.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.campaign import Campaign, Split, Table
+from estimation.derived import GEARBOX, zero_phase_channels
+from estimation.errors import EstimationError
+from estimation.filters import PAPER, LowPass
+from estimation.recording import FloatArray, Recording
+from estimation.scores import Score, score
+
+CLOSING_SPEED_RAD_S = 0.25
+"""Filtered spindle speed from which a sample counts as closing, rad/s."""
+
+TRIM_S = 1.0
+"""Length dropped at the start and at the end of each run, s."""
+
+AUTHORS_SKIP = 1 / 8
+"""The authors' linear fit leaves out this first part of the closing samples."""
+
+TEST_SHARE = 0.15
+"""Share of the samples that the paper's random split tests on."""
+
+SURROGATES = {
+    "command": "motor_command_ratio",
+    "current": "motor_current_a",
+    "gearbox": GEARBOX,
+}
+"""The paper's torque surrogates by short name, and the channel of each."""
+
+TARGET = "proximal_torque_n_m"
+SPEED = "spindle_velocity_rad_s"
+
+
+class StudyError(EstimationError):
+    """The paper's processing leaves nothing to fit or to score."""
+
+
+def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER) -> Recording:
+    """Filter and derive channels as the paper does; the spindle speed is always among them.
+
+    Raises:
+        MissingChannelError: A measured channel is not in the recording.
+        FilterError: The run cannot be filtered.
+    """
+    return zero_phase_channels(recording, [*names, SPEED], low_pass)
+
+
+def is_closing(run: Recording) -> NDArray[np.bool_]:
+    """Say which samples of a processed run the paper keeps, shape (n,).
+
+    Kept are samples whose filtered spindle speed is at least `CLOSING_SPEED_RAD_S` in the closing
+    direction, without the run's first and last `TRIM_S`.
+    """
+    trim = round(TRIM_S * run.sample_rate_hz)
+    kept = run[SPEED] >= CLOSING_SPEED_RAD_S
+    kept[:trim] = False
+    kept[max(len(kept) - trim, 0) :] = False
+    return kept
+
+
+def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:
+    """Return the closing samples of a processed run.
+
+    Args:
+        run: A run from `processed`.
+        keep_flagged: Keep samples that carry a flag. The paper knows no flags, so its counts and
+            its errors come out only with them.
+    """
+    kept = is_closing(run)
+    if not keep_flagged:
+        kept &= run.valid
+    return replace(
+        run,
+        time_s=run.time_s[kept],
+        columns={name: values[kept] for name, values in run.columns.items()},
+        flags=run.flags[kept],
+    )
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """The paper's linear fit: torque = gain x surrogate + offset, SI units."""
+
+    gain: float
+    offset: float
+
+    def __call__(self, surrogate: FloatArray) -> FloatArray:
+        """Return the estimate for surrogate values of shape (n,)."""
+        return self.gain * surrogate + self.offset
+
+
+def fit_line(surrogate: FloatArray, torque: FloatArray) -> LinearFit:
+    """Fit a line by least squares.
+
+    Args:
+        surrogate: Shape (n,).
+        torque: Shape (n,), N m.
+
+    Raises:
+        StudyError: Fewer than two samples, or the surrogate does not vary.
+    """
+    if len(surrogate) < 2 or np.ptp(surrogate) == 0:
+        raise StudyError(
+            f"A line cannot be fitted to {len(surrogate)} closing samples.",
+            "The spindle never closes fast enough, or the surrogate is constant.",
+        )
+    centre = surrogate.mean()
+    gain = float((surrogate - centre) @ torque / np.sum((surrogate - centre) ** 2))
+    return LinearFit(gain, float(torque.mean() - gain * centre))
+
+
+def score_authors(surrogate: FloatArray, torque: FloatArray) -> tuple[LinearFit, Score]:
+    """Fit and score on the last 7/8 of the closing samples, as the authors do."""
+    first = round(len(surrogate) * AUTHORS_SKIP)
+    fit = fit_line(surrogate[first:], torque[first:])
+    return fit, score(fit(surrogate[first:]), torque[first:])
+
+
+def score_pooled(surrogate: FloatArray, torque: FloatArray) -> tuple[LinearFit, Score]:
+    """Fit and score on the same samples, all of them."""
+    fit = fit_line(surrogate, torque)
+    return fit, score(fit(surrogate), torque)
+
+
+def score_random(surrogate: FloatArray, torque: FloatArray, seed: int) -> tuple[LinearFit, Score]:
+    """Fit on a random 85 % of the samples and score on the rest, as the paper does.
+
+    Neighbouring samples are almost equal, so the test samples are no new evidence: this split is
+    for comparison with the paper only.
+    """
+    order = np.random.default_rng(seed).permutation(len(surrogate))
+    test, train = np.split(order, [round(TEST_SHARE * len(order))])
+    fit = fit_line(surrogate[train], torque[train])
+    return fit, score(fit(surrogate[test]), torque[test])
+
+
+Fitter = Callable[[Table], Callable[[Table], FloatArray]]
+"""Fits on a table of closing samples and returns what estimates the torque on another one."""
+
+
+def linear_fitter(channel: str) -> Fitter:
+    """Return the fitter of the linear fit on one channel."""
+
+    def fit(table: Table) -> Callable[[Table], FloatArray]:
+        line = fit_line(table.columns[channel], table.columns[TARGET])
+        return lambda other: line(other.columns[channel])
+
+    return fit
+
+
+ESTIMATE = "estimate_n_m"
+
+
+def held_out(splits: list[Split], channels: Iterable[str], fitter: Fitter) -> Table:
+    """Fit on each split's training runs and estimate its test runs; all test runs in one table.
+
+    Args:
+        splits: Splits of a campaign of closing samples; see `Campaign.folds`.
+        channels: Channels the fitter needs, and any others wanted in the table.
+        fitter: What is fitted.
+
+    Returns:
+        The channels, `TARGET` and `ESTIMATE` of all test runs, N m for the last two.
+    """
+    wanted = list(dict.fromkeys([*channels, TARGET]))
+    tables, estimates = [], []
+    names: list[str] = []
+    runs: list[NDArray[np.intp]] = []
+    for split in splits:
+        estimator = fitter(split.train.concatenate(wanted, valid_only=False))
+        test = split.test.concatenate(wanted, valid_only=False)
+        estimates.append(estimator(test))
+        runs.append(test.run + len(names))
+        names += test.names
+        tables.append(test)
+    columns = {name: np.concatenate([t.columns[name] for t in tables]) for name in wanted}
+    return Table(
+        {**columns, ESTIMATE: np.concatenate(estimates)}, np.concatenate(runs), tuple(names)
+    )
+
+
+def score_table(table: Table) -> Score:
+    """Score the estimate of a table from `held_out`."""
+    return score(table.columns[ESTIMATE], table.columns[TARGET])
+
+
+def closing_campaign(
+    campaign: Campaign,
+    names: Iterable[str],
+    keep_flagged: bool = True,
+    on_run: Callable[[Recording], None] = lambda run: None,
+) -> Campaign:
+    """Reduce a campaign to its closing samples, held in memory; excluded runs stay excluded.
+
+    Args:
+        campaign: Raw runs, read one at a time.
+        names: Channels to keep.
+        keep_flagged: See `closing_samples`.
+        on_run: Called with each processed run, before it is reduced.
+    """
+    wanted = list(names)
+
+    def reduced() -> Iterable[Recording]:
+        for recording in campaign:
+            run = processed(recording, wanted)
+            on_run(run)
+            yield closing_samples(run, keep_flagged)
+
+    return Campaign.of(reduced())

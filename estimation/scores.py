@@ -1,0 +1,76 @@
+"""How good an estimate is: the error measures of the grip-torque papers, in the input's unit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from estimation.errors import EstimationError
+
+
+class ScoreError(EstimationError):
+    """An estimate and its truth cannot be compared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Error of an estimate over n samples.
+
+    Attributes:
+        samples: Number of samples.
+        mae: Mean absolute error.
+        p95: 95th percentile of the absolute error.
+        rmse: Root mean square error.
+        pearson_r: Pearson's correlation of estimate and truth; NaN when one of them is constant.
+        spearman_rho: Spearman's rank correlation; NaN when one of them is constant.
+    """
+
+    samples: int
+    mae: float
+    p95: float
+    rmse: float
+    pearson_r: float
+    spearman_rho: float
+
+
+def rmse(estimate: ArrayLike, truth: ArrayLike) -> float:
+    """Return the root mean square error of two arrays of equal shape."""
+    return float(np.sqrt(np.mean(np.square(np.asarray(estimate) - np.asarray(truth)))))
+
+
+def score(estimate: ArrayLike, truth: ArrayLike) -> Score:
+    """Score an estimate against the truth.
+
+    Args:
+        estimate: Estimated values, shape (n,).
+        truth: Measured values in the same unit, shape (n,).
+
+    Raises:
+        ScoreError: The shapes differ, there is no sample, or a value is not finite.
+    """
+    estimated = np.asarray(estimate, dtype=np.float64)
+    measured = np.asarray(truth, dtype=np.float64)
+    if estimated.shape != measured.shape or estimated.ndim != 1 or estimated.size == 0:
+        raise ScoreError(
+            f"An estimate of shape {estimated.shape} cannot be scored against {measured.shape}.",
+            "Both must hold the same samples, at least one.",
+        )
+    if not (np.isfinite(estimated).all() and np.isfinite(measured).all()):
+        raise ScoreError(
+            "An estimate or its truth holds values that are not finite.",
+            "A score over the remaining samples would hide them.",
+            "Leave these samples out on purpose, and say so.",
+        )
+    error = np.abs(estimated - measured)
+    varies = bool(np.ptp(estimated) > 0 and np.ptp(measured) > 0)
+    return Score(
+        samples=int(error.size),
+        mae=float(error.mean()),
+        p95=float(np.percentile(error, 95)),
+        rmse=float(np.sqrt(np.mean(error**2))),
+        pearson_r=float(np.corrcoef(estimated, measured)[0, 1]) if varies else float("nan"),
+        spearman_rho=(
+            float(stats.spearmanr(estimated, measured).statistic) if varies else float("nan")
+        ),
+    )

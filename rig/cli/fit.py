@@ -1,0 +1,48 @@
+"""`rig fit`: fit a declared model on a campaign."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json
+
+
+def fit(
+    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    model: Annotated[
+        str, typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name.")
+    ] = "grip",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Where the fitted model goes.")
+    ] = None,
+    folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
+    seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+    ] = None,
+    json_: JsonFlag = False,
+) -> None:
+    """Fit a declared model on all runs and report its error on runs it was not fitted on."""
+    from estimation import model_file
+    from estimation.cross_validation import held_out_error
+    from estimation.fitting import fit as fit_model
+    from rig.importers.registry import open_campaign
+    from rig.reports.first_look import parameter_table
+    from rig.reports.table import to_rich
+
+    screen = console()
+    campaign = open_campaign(path, format_)
+    declared = model_file.read(Path(model))
+    fitted = fit_model(declared, campaign, seed=seed)
+    error = held_out_error(declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed)
+    screen.print(to_rich(parameter_table(fitted)))
+    screen.print(
+        f"{fitted.target} on {error.runs} runs not fitted on: rmse {error.rmse:.4g} {fitted.unit},"
+        f" {error.rmse_with_means:.4g} with each run's mean left in."
+    )
+    if out is not None:
+        model_file.write(fitted, out)
+        screen.print(f"Model: {out}", markup=False)
+    if json_:
+        emit_json({"model": fitted, "held_out": error, "out": out})

@@ -1,0 +1,66 @@
+"""`rig live`: grip torque in the terminal."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console
+
+
+def live(
+    config: Annotated[
+        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
+    ] = None,
+    protocol: Annotated[
+        str | None,
+        typer.Option("--protocol", "-p", help="Play this protocol; else the rig is only watched."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Leave after this much device time, s.")
+    ] = None,
+    pace: Annotated[
+        float, typer.Option(help="Simulated seconds a second; 0 is as fast as possible.")
+    ] = 1.0,
+    lever_mm: Annotated[
+        float | None, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
+    ] = None,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    json_: JsonFlag = False,
+) -> int:
+    """Show grip torque, estimate against sensor, as the rig measures it.
+
+    A simulated rig plays the quick protocol unless told otherwise; a real rig is never moved
+    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
+    """
+    from rig.config import load_config
+    from rig.live.estimator import ModelEstimator
+    from rig.live.options import ShowOptions
+    from rig.live.run import show
+    from rig.live.session_blocks import session_blocks
+    from rig.live.until import until
+    from rig.logger import open_logger
+    from rig.protocol import load_protocol
+    from rig.trajectory import SAMPLE_RATE_HZ
+
+    settings = load_config(config)
+    if protocol is None and settings.is_simulated:
+        protocol = "quick"
+    plans = load_protocol(protocol).plans() if protocol else []
+    model_path = model or settings.model_path
+    estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None
+    blocks = session_blocks(
+        settings, lambda: open_logger(settings, pace=pace or None), plans, estimator
+    )
+    options = ShowOptions(
+        title=f"rig live: {settings.name}",
+        channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
+        lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
+        plain=plain,
+        json=json_,
+    )
+    show(until(blocks, duration), options, console())
+    return 0

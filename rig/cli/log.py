@@ -1,0 +1,214 @@
+"""`rig log`: what is in a log, is it whole, repair it, export it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json
+
+if TYPE_CHECKING:
+    from rig.log.check import LogReport
+    from rig.log.reader import LogFile
+    from rig.log.repair import RepairReport
+
+log_app = typer.Typer(
+    name="log",
+    help="Look into, check, repair and export logs.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+LogOrFolder = Annotated[Path, typer.Argument(help="A log, or a folder of logs.")]
+OneLog = Annotated[Path, typer.Argument(help="A log.")]
+
+
+@log_app.command()
+def info(path: LogOrFolder, json: JsonFlag = False) -> None:
+    """Say what is in a log: run, conditions, streams, rates, marks, attachments."""
+    from rig.log.reader import read_log
+
+    found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
+    if json:
+        emit_json({"logs": found})
+        return
+    for log in found:
+        _show_info(log)
+
+
+@log_app.command()
+def check(path: LogOrFolder, json: JsonFlag = False) -> int:
+    """Count samples expected and received and list every gap.
+
+    Exit code 0 if complete, 1 if samples are missing, 5 if a file is damaged.
+    """
+    from rig.log.check import check_log
+
+    reports = [check_log(item) for item in _logs(path)]
+    code = max((report.verdict.exit_code for report in reports), default=0)
+    if json:
+        emit_json({"logs": reports, "exit_code": int(code)})
+    else:
+        for report in reports:
+            _show_report(report)
+    return int(code)
+
+
+@log_app.command()
+def repair(
+    path: OneLog,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write; NAME.repaired.mcap by default.")
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Write what is readable of a damaged log to a new file; the original stays as it is."""
+    from rig.log.repair import repair_log
+
+    report = repair_log(path, out)
+    if json:
+        emit_json(report)
+    else:
+        _show_repair(report)
+
+
+@log_app.command()
+def export(
+    path: OneLog,
+    format_name: Annotated[str, typer.Option("--format", help="csv, parquet or npz.")] = "csv",
+    topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File with --topic, else folder; beside the log by default.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
+    json: JsonFlag = False,
+) -> None:
+    """Export a log, one file for each topic."""
+    from rig.errors import UsageError
+    from rig.log.export import ExportFormat, export_log
+
+    known = [item.value for item in ExportFormat]
+    if format_name not in known:
+        raise UsageError(
+            f"There is no format {format_name!r}.", fix=f"Choose one of {', '.join(known)}."
+        )
+    written = export_log(path, ExportFormat(format_name), out, topic, force=force)
+    if json:
+        emit_json({"written": written})
+    else:
+        for target in written:
+            console().print(f"wrote {target}")
+
+
+def _logs(path: Path) -> list[Path]:
+    """Return the logs at a path, at least one."""
+    from rig.errors import UsageError
+    from rig.log.check import logs_in
+
+    found = logs_in(path)
+    if not found:
+        raise UsageError(f"There is no log in {path}.", fix="Name a file or another folder.")
+    return found
+
+
+def _described(log: "LogFile") -> dict[str, Any]:
+    """Return what `info` tells about a log."""
+    from rig.log.check import stream_time_s
+    from rig.log.convert import exclusion
+
+    topics = []
+    for name, topic in log.topics.items():
+        time_s = stream_time_s(topic)
+        duration_s = float(time_s[-1] - time_s[0]) if len(topic) > 1 else 0.0
+        topics.append(
+            {
+                "topic": name,
+                "messages": len(topic),
+                "duration_s": duration_s,
+                "rate_hz": (len(topic) - 1) / duration_s if duration_s > 0 else None,
+                "expected_rate_hz": topic.stream.rate_hz,
+                "fields": {field.name: field.unit for field in topic.stream.fields},
+            }
+        )
+    return {
+        "path": log.path,
+        "bytes": log.path.stat().st_size,
+        "written_by": log.library,
+        "run": log.run,
+        "end": log.end,
+        "topics": topics,
+        "unread_topics": log.unread,
+        "marks": log.marks,
+        "stretches": log.stretches,
+        "attachments": {item.name: len(item.data) for item in log.attachments},
+        "excluded": exclusion(log),
+        "damaged": bool(log.damage),
+    }
+
+
+def _show_info(log: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    screen = console()
+    run, end = log["run"], log["end"]
+    screen.print(f"{log['path']}  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
+    if run is not None:
+        conditions = ", ".join(f"{name} = {value}" for name, value in run.conditions.items())
+        screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions or '-'}")
+        screen.print(f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}")
+        excluded = log["excluded"]
+        screen.print(f"  excluded: {excluded}" if excluded else "  counts as evidence")
+    state = "not closed" if end is None else "clean" if end.clean else f"not clean: {end.reason}"
+    screen.print(f"  end {state}{'; the file is damaged' if log['damaged'] else ''}")
+    table = Table(box=None, pad_edge=True)
+    for heading in ("topic", "messages", "s", "Hz", "fields"):
+        table.add_column(heading, justify="left" if heading in ("topic", "fields") else "right")
+    for topic in log["topics"]:
+        rate = f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else "-"
+        fields = ", ".join(topic["fields"])
+        messages, duration = str(topic["messages"]), f"{topic['duration_s']:.3f}"
+        table.add_row(topic["topic"], messages, duration, rate, fields)
+    screen.print(table)
+    for mark in log["marks"]:
+        screen.print(f"  mark at {mark.time_s:.3f} s: {mark.text}")
+    for name, size in log["attachments"].items():
+        screen.print(f"  attached {name}, {size} bytes")
+
+
+def _date(started_at_ns: int | None) -> str:
+    from datetime import UTC, datetime
+
+    if started_at_ns is None:
+        return "at an unknown time"
+    return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")
+
+
+def _show_report(report: "LogReport") -> None:
+    screen = console()
+    screen.print(f"{report.verdict.value:10}  {report.path}")
+    for topic in report.topics:
+        screen.print(f"  {topic.topic}: {topic.received} of {topic.expected} samples")
+        for gap in topic.gaps:
+            screen.print(
+                f"    gap at {gap.start_s:.4f} s, {gap.length_s * 1e3:.1f} ms: {gap.samples}"
+                f" samples, {gap.first_sequence} to {gap.last_sequence}"
+            )
+    for problem in report.problems:
+        screen.print(f"  {problem}")
+    for damage in report.damage:
+        screen.print(f"    byte {damage.offset}, {damage.length} bytes: {damage.what}")
+
+
+def _show_repair(report: "RepairReport") -> None:
+    screen = console()
+    if report.repaired is None:
+        screen.print(f"{report.original} is not damaged; nothing was written.")
+        return
+    screen.print(f"wrote {report.repaired}, and read it back equal")
+    for topic, count in report.recovered.items():
+        unproven = report.salvaged.get(topic, 0)
+        note = f", {unproven} of them from the torn end, without a checksum" if unproven else ""
+        screen.print(
+            f"  {topic}: {count} samples recovered{note}; {report.lost.get(topic, 0)} known lost"
+        )
+    screen.print(f"{report.original} is unchanged.")

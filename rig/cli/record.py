@@ -1,0 +1,69 @@
+"""`rig record`: run a protocol and leave one log a run."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json, progress
+
+
+def record(
+    protocol: Annotated[
+        str, typer.Option("--protocol", "-p", help="Protocol file, or a shipped one by name.")
+    ] = "quick",
+    config: Annotated[
+        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
+    notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
+    json: JsonFlag = False,
+) -> int:
+    """Run a protocol on the rig and leave one log a run in logs/.
+
+    Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
+    """
+    from rig.config import load_config
+    from rig.logger import open_logger
+    from rig.protocol import load_protocol
+    from rig.record import RunResult, open_campaign_folder, record_campaign
+    from rig.session import Session
+
+    screen = console()
+    settings = load_config(config)
+    if seed is not None:
+        settings = settings.changed(simulation={"seed": seed})
+    plan = load_protocol(protocol)
+    folder = resume or out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
+    todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
+    screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
+    results: list[RunResult] = []
+    try:
+        with Session(settings, open_logger(settings)) as session, progress() as bar:
+            samples = sum(run.target_angle_rad.size for run in todo)
+            task = bar.add_task("recording", total=samples)
+            done = 0
+
+            def show(name: str, taken: int, expected: int) -> None:
+                bar.update(task, completed=done + taken, description=name)
+
+            for result in record_campaign(session, todo, folder, notes=notes, on_progress=show):
+                done += result.expected
+                results.append(result)
+                if result.drifted or not result.complete:
+                    screen.print(f"[yellow]{result.name}: {result.remark}[/yellow]")
+    except KeyboardInterrupt:
+        screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
+        raise
+    bad = [result.name for result in results if result.drifted or not result.complete]
+    screen.print(
+        f"{len(results)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
+    )
+    if json:
+        emit_json({"folder": folder, "runs": results, "look_at": bad})
+    return 1 if bad else 0

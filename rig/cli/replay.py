@@ -1,0 +1,101 @@
+"""`rig replay LOG`: the live display on a recording, with any model."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console
+
+if TYPE_CHECKING:
+    from estimation.campaign import Campaign
+    from estimation.recording import Recording
+    from rig.live.replay import EstimateStream
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(help="Recording: a file, folder or archive.")],
+    run: Annotated[
+        str | None, typer.Option(help="Name of the run; the first that counts if not given.")
+    ] = None,
+    model: Annotated[Path | None, typer.Option(help="Model file that estimates live.")] = None,
+    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as possible.")] = 1.0,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    json_: JsonFlag = False,
+    lever_mm: Annotated[
+        float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
+    ] = 12.0,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of LOG; guessed if not given.")
+    ] = None,
+) -> int:
+    """Show a recording as it looked live, with the estimate of any model.
+
+    Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object a line: a
+    frame every 0.1 s, a summary last. Ctrl-C leaves with exit code 130.
+    """
+    from rig.errors import ExitCode, UsageError
+    from rig.importers.registry import open_campaign
+    from rig.live.options import ShowOptions
+    from rig.live.replay import replay_blocks
+    from rig.live.run import show
+
+    if not 0 <= speed < math.inf:
+        raise UsageError(
+            f"A speed of {speed:g} shows nothing.",
+            fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
+        )
+    recording = _choose(open_campaign(log, format_), run, quiet=json_)
+    estimator = _estimator(model, recording) if model else None
+    target = estimator.target_channel if estimator else "distal_torque_n_m"
+    options = ShowOptions(
+        title=f"rig replay {recording.name}",
+        channels=(target,),
+        lever_m=lever_mm / 1e3,
+        plain=plain,
+        json=json_,
+    )
+    summary = show(replay_blocks(recording, estimator, speed or None), options, console())
+    return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
+
+
+def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
+    """Return the named run, or the first that counts, and tell the person which one it is."""
+    from rig.errors import DataError, UsageError
+
+    if not len(campaign):
+        raise DataError("The log holds no runs.", "There is nothing to show.")
+    if name is not None and name not in campaign.names:
+        raise UsageError(
+            f"The log has no run {name!r}.",
+            f"It has: {', '.join(campaign.names)}.",
+            f"Type --run {campaign.names[0]}",
+        )
+    runs = campaign.select([name]).runs if name else (campaign.evidence.runs or campaign.runs)
+    recording = runs[0].recording()
+    if not quiet:
+        _tell(campaign, recording, chosen=name is not None)
+    return recording
+
+
+def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
+    """Say which run is shown, if there are more, and what speaks against it."""
+    people = console()
+    if len(campaign) > 1 and not chosen:
+        place = campaign.names.index(recording.name) + 1
+        people.print(
+            f"Run {recording.name}, {place} of {len(campaign)}; --run NAME shows another.",
+            markup=False,
+        )
+    if recording.excluded:
+        people.print(
+            f"Run {recording.name} is left out of evidence: {recording.excluded}", markup=False
+        )
+
+
+def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
+    """Read a model file and begin a stream of its estimates at the recording's rate."""
+    from rig.live.estimator import ModelEstimator
+
+    return ModelEstimator(path, recording.sample_rate_hz)

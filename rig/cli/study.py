@@ -1,0 +1,72 @@
+"""`rig study`: make a paper's results again."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json, progress
+
+if TYPE_CHECKING:
+    from rig.studies.oneill import Source
+
+study_app = typer.Typer(
+    name="study",
+    help="Make a paper's results again, on measured or simulated data.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+
+@study_app.callback()
+def studies() -> None:
+    """Make a paper's results again, on measured or simulated data."""
+
+
+@study_app.command()
+def oneill(
+    data: Annotated[
+        Path | None,
+        typer.Option(help="Measured data: a folder or archive. Without it, a simulated campaign."),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder for the HTML report.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of splits and of the simulation.")] = 0,
+    json: JsonFlag = False,
+) -> None:
+    """Make the linear rows of Table I of O'Neill et al. 2018 again."""
+    from estimation.files import write_text_atomic
+    from rig.reports import oneill as shown
+    from rig.reports.render import write_report
+    from rig.reports.table import to_rich
+    from rig.studies.oneill import open_reference, run_study
+
+    source = _simulated(seed) if data is None else open_reference(data)
+    with progress() as bar:
+        task = bar.add_task("runs", total=len(source.campaign))
+        result = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
+    screen = console()
+    screen.print(shown.lead(result.study), markup=False)
+    for note in [f"Data: {source.name}.", *shown.notes(result.study)]:
+        screen.print(note, markup=False)
+    for table in shown.tables(result.study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(result.study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if report is not None:
+        page = write_report(report / "oneill.html", shown.page(result))
+        screen.print(f"Report: {page}", markup=False)
+    if json:
+        emit_json(result.study)
+
+
+def _simulated(seed: int) -> "Source":
+    from rig.simulation.campaign import simulate_reference_campaign
+    from rig.studies.oneill import Source
+
+    return Source(
+        simulate_reference_campaign(seed),
+        name=f"simulated reference campaign, seed {seed}",
+        measured=False,
+    )

@@ -1,0 +1,179 @@
+"""Import measured motion of a da Vinci Research Kit patient-side manipulator.
+
+The text format of WPI-AIM/dvrk_dynamics_identification: 21 columns without a header or a time,
+200 Hz: positions, velocities and torques of seven joints, joint 7 being the jaw. Joints 5 to 7 are
+logged in motor coordinates; they become dVRK joint coordinates here: q = M q_motor, and from equal
+power tau_motor = M^T tau, so tau = M^-T tau_motor (Y. Wang et al., "A Convex Optimization-Based
+Dynamic Model Identification Package for the da Vinci Research Kit", RA-L 4(4), 2019).
+
+Torque is motor current times nominal constants: the arm has no torque sensor.
+"""
+
+import lzma
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import numpy as np
+
+from estimation.campaign import Campaign, Run
+from estimation.recording import FloatArray, Instrument, Recording
+from rig.errors import DataError
+
+SAMPLE_RATE_HZ = 200.0
+JOINTS = 7
+COLUMNS = 3 * JOINTS
+PRISMATIC_JOINT = 3
+WRIST = slice(4, 7)
+MOTOR_TO_JOINT: FloatArray = np.array(
+    [[1.0186, 0.0, 0.0], [-0.8306, 0.6089, 0.6089], [0.0, -1.2177, 1.2177]]
+)
+"""M of q_dvrk[5:7] = M q_motor[5:7]."""
+MAX_BYTES = 1 << 28
+LARGEST = 1e6
+SUFFIXES = (".csv", ".csv.xz")
+NOTES = (
+    "Torque and force are motor current times nominal constants; the arm has no torque sensor. "
+    "Joints 5 to 7 were converted from motor to joint coordinates."
+)
+
+
+class PsmImporter:
+    """Importer of the dVRK patient-side manipulator's text format."""
+
+    name = "dvrk-psm"
+    description = "dVRK arm motion, 200 Hz: 21 columns without a header, .csv or .csv.xz"
+
+    def recognises(self, path: Path) -> bool:
+        """Say whether the path is, or holds, text of 21 numeric columns without a header."""
+        return any(_first_line_fits(file) for file in _files(path)[:1])
+
+    def open(self, path: Path) -> Campaign:
+        """Open a file, or the files of a folder sorted by name, as a campaign.
+
+        Raises:
+            DataError: There is no such file. Reading a run raises DataError where its file is
+                damaged, naming file, line and what was expected.
+        """
+        files = _files(path)
+        if not files:
+            raise DataError(f"{path} holds no .csv or .csv.xz file.")
+        return Campaign(tuple(Run(_stem(f), partial(load_run, f), f) for f in files))
+
+
+IMPORTER = PsmImporter()
+
+
+def load_run(path: Path) -> Recording:
+    """Read one file as a recording.
+
+    Returns:
+        Channels `joint_<i>_angle_rad`, `joint_<i>_velocity_rad_s` and `joint_<i>_torque_n_m` of the
+        joints 1 to 7; joint 3 has `joint_3_position_m`, `joint_3_velocity_m_s`, `joint_3_force_n`.
+
+    Raises:
+        DataError: The file is damaged; names the file, the line and what was expected.
+    """
+    values = _numbers(path, _content(path))
+    position, velocity, torque = values.reshape(3, JOINTS, -1)
+    for motion in (position, velocity):
+        motion[WRIST] = MOTOR_TO_JOINT @ motion[WRIST]
+    torque[WRIST] = np.linalg.solve(MOTOR_TO_JOINT.T, torque[WRIST])
+    columns = {}
+    for joint in range(1, JOINTS + 1):
+        units = (
+            ("position_m", "velocity_m_s", "force_n")
+            if joint == PRISMATIC_JOINT
+            else ("angle_rad", "velocity_rad_s", "torque_n_m")
+        )
+        for unit, block in zip(units, (position, velocity, torque), strict=True):
+            columns[f"joint_{joint}_{unit}"] = block[joint - 1]
+    return Recording(
+        name=_stem(path),
+        time_s=np.arange(values.shape[1]) / SAMPLE_RATE_HZ,
+        columns=columns,
+        rig="dVRK patient-side manipulator",
+        instrument=Instrument(),
+        notes=NOTES,
+        source=str(path),
+    )
+
+
+def _opened(path: Path) -> BinaryIO:
+    """Open a file for reading, unpacked."""
+    return cast(BinaryIO, lzma.open(path)) if path.suffix.lower() == ".xz" else path.open("rb")
+
+
+def _content(path: Path) -> str:
+    """Return the text of a file, unpacked and limited in size."""
+    try:
+        with _opened(path) as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, EOFError, lzma.LZMAError) as error:
+        raise DataError(
+            f"{path} cannot be read: {error}.",
+            "Expected a whole .csv or .csv.xz file; nothing of it was imported.",
+            "Copy it again from its source.",
+        ) from error
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} holds more than {MAX_BYTES >> 20} MB of text.")
+    return content.decode("latin-1")
+
+
+def _numbers(path: Path, text: str) -> FloatArray:
+    """Return the columns, shape (21, n)."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    if lines.pop():
+        raise _fault(path, len(lines) + 1, "the file ends inside the line", "a line end")
+    if len(lines) < 2:
+        raise _fault(path, len(lines), f"there are {len(lines)} samples", "at least two")
+    rows = np.empty((len(lines), COLUMNS))
+    for number, line in enumerate(lines, 1):
+        fields = line.split(",")
+        if len(fields) != COLUMNS:
+            raise _fault(
+                path,
+                number,
+                f"the line has {len(fields)} columns",
+                f"{COLUMNS} (position, velocity and torque of {JOINTS} joints)",
+            )
+        try:
+            rows[number - 1] = [float(field) for field in fields]
+        except ValueError as error:
+            raise _fault(path, number, str(error), "a number in each column") from None
+    bad = ~(np.abs(rows) <= LARGEST).all(axis=1)  # true for NaN and infinity too
+    if bad.any():
+        raise _fault(
+            path, int(np.argmax(bad)) + 1, "a value is not finite or absurd", f"|x| <= {LARGEST:g}"
+        )
+    return np.ascontiguousarray(rows.T)
+
+
+def _fault(path: Path, line: int, what: str, expected: str) -> DataError:
+    return DataError(
+        f"{path}, line {line}: {what}.",
+        f"Expected {expected}. Nothing of the file was imported.",
+        "Copy the file again from its source.",
+    )
+
+
+def _files(path: Path) -> list[Path]:
+    entries = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [entry for entry in entries if entry.is_file() and _is_named_so(entry)]
+
+
+def _is_named_so(path: Path) -> bool:
+    return path.name.lower().endswith(SUFFIXES)
+
+
+def _stem(path: Path) -> str:
+    return path.name[: path.name.lower().rindex(".csv")]
+
+
+def _first_line_fits(path: Path) -> bool:
+    try:
+        with _opened(path) as file:
+            fields = file.readline(1 << 14).split(b",")
+        return len([float(field) for field in fields]) == COLUMNS
+    except (OSError, EOFError, lzma.LZMAError, ValueError):
+        return False

@@ -1,0 +1,247 @@
+"""Import MATLAB `.mat` files of versions 5 to 7.
+
+Mapping rules. A *run* is either the file itself, where it has a variable `time_s`, or each scalar
+struct with a field `time_s` (a table saved with `table2struct(t, 'ToScalar', true)`); a file may
+hold one or the other. In a run,
+
+- a numeric vector as long as `time_s` whose name ends in a unit is a channel (`motor_current_a`),
+- a numeric scalar whose name ends in a unit is a condition (`load_command_a`),
+- text is a condition, except `notes`, which becomes the notes.
+
+Anything else is refused, with the list of what was found. Closing motion and torque are positive,
+and units are SI: the file's author sees to that, or a sidecar `<file>.mat.toml` does, which maps
+other names and then alone decides what is imported (`variable` may be `struct.field`):
+
+    sample_rate_hz = 1000               # where there is no time variable
+    [channels.spindle_angle_rad]
+    variable = "enc"
+    scale = -7.669904e-4                # default 1; value = scale * variable + offset
+    offset = 0.0                        # default 0, in the channel's unit
+    [conditions]
+    load_command_a = 0.2
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.campaign import Campaign, Run
+from estimation.channels import CHANNELS
+from estimation.recording import FloatArray, Recording, RecordingError
+from rig.errors import DataError
+from rig.importers.mat5 import Mat5Error, Unread, Value, read_mat5
+from rig.importers.matlab_sidecar import TIME, Sidecar, carries_unit, read_sidecar, sidecar_path
+
+MAX_BYTES = 1 << 31
+HDF5_VERSION = b"MATLAB 7.3 MAT-file"
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"  # after the 512 bytes MATLAB puts before it
+
+Values = Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a run holds: columns with time, conditions, notes."""
+
+    columns: dict[str, FloatArray]
+    conditions: dict[str, float | str]
+    notes: str = ""
+
+
+class MatlabImporter:
+    """Importer of MATLAB files."""
+
+    name = "matlab"
+    description = (
+        "MATLAB .mat (v5 to v7): vectors or structs named as channels, or with a .mat.toml"
+    )
+
+    def recognises(self, path: Path) -> bool:
+        """Say whether the path is a `.mat` file, or a folder of nothing but these and sidecars.
+
+        A folder that holds other files beside is not claimed: name the format to import it.
+        """
+        if path.is_dir():
+            names = [entry.name.lower() for entry in path.iterdir()]
+            if not all(name.endswith((".mat", ".mat.toml")) for name in names):
+                return False
+        return bool(_files(path))
+
+    def open(self, path: Path) -> Campaign:
+        """Open a file, or the files of a folder sorted by name, as a campaign.
+
+        Each file is read and checked once here to find its runs, and again when a run is loaded.
+
+        Raises:
+            DataError: A file is damaged, of version 7.3, or holds names that are no channels; lists
+                what was found and what was expected.
+        """
+        files = _files(path)
+        if not files:
+            raise DataError(f"{path} holds no .mat file.")
+        runs = []
+        for file in files:
+            for part in _contents(file):
+                name = f"{file.stem}/{part}" if part else file.stem
+                runs.append(Run(name, partial(load_run, file, name, part), file))
+        return Campaign(tuple(runs))
+
+
+IMPORTER = MatlabImporter()
+
+
+def load_run(path: Path, name: str, part: str = "") -> Recording:
+    """Read one run.
+
+    Args:
+        path: The file.
+        name: Name of the run.
+        part: Name of the struct that holds the run, or "" for the file's own variables.
+
+    Raises:
+        DataError: The file is damaged or its names do not follow the rules of this module.
+    """
+    contents = _contents(path)
+    if part not in contents:
+        raise DataError(f"{path} no longer holds the run {part or path.stem!r}.")
+    content = contents[part]
+    columns = dict(content.columns)
+    try:
+        return Recording(
+            name=name,
+            time_s=columns.pop(TIME),
+            columns=columns,
+            conditions=content.conditions,
+            notes=content.notes,
+            source=f"{path}:{part}" if part else str(path),
+        )
+    except RecordingError as error:
+        raise DataError(f"{path}: {error.what}", error.why, error.fix) from error
+
+
+def _files(path: Path) -> list[Path]:
+    entries = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [entry for entry in entries if entry.suffix.lower() == ".mat" and entry.is_file()]
+
+
+def _contents(path: Path) -> dict[str, Content]:
+    """Return what each run of a file holds, by the name of its struct; "" is the file itself."""
+    variables = _variables(path)
+    sidecar = read_sidecar(path)
+    if sidecar is not None:
+        return {"": _mapped(path, variables, sidecar)}
+    if TIME in variables:
+        return {"": _named(path, variables)}
+    structs = {name: v for name, v in variables.items() if isinstance(v, dict) and TIME in v}
+    if not structs or len(structs) < len(variables):
+        raise _unknown(path, variables, [name for name in variables if name not in structs])
+    return {name: _named(path, fields) for name, fields in structs.items()}
+
+
+def _variables(path: Path) -> dict[str, Value]:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise DataError(f"{path} has more than {MAX_BYTES >> 30} GB.")
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror}.") from error
+    if content.startswith(HDF5_VERSION) or content[512:520] == HDF5_SIGNATURE:
+        raise DataError(
+            f"{path} is a MATLAB file of version 7.3 (HDF5), which is not read.",
+            "Versions 5 to 7 are.",
+            "Save it again in MATLAB: save(name, '-struct', 'data', '-v7').",
+        )
+    try:
+        return read_mat5(content)
+    except Mat5Error as error:
+        raise DataError(
+            f"{path} cannot be read as a MATLAB file: {error}.",
+            "Expected version 5 to 7, whole. Nothing of it was imported.",
+            "Save it again in MATLAB with '-v7'.",
+        ) from error
+
+
+def _named(path: Path, values: Values) -> Content:
+    """Sort values into channels, conditions and notes by their names and shapes."""
+    time = values[TIME]
+    shape = time.shape if isinstance(time, np.ndarray) and time.ndim == 1 else None
+    content = Content({}, {}, notes=str(values.get("notes", "")))
+    wrong = []
+    for name, value in values.items():
+        if isinstance(value, str):
+            if name != "notes":
+                content.conditions[name] = value
+        elif not isinstance(value, np.ndarray) or not carries_unit(name):
+            wrong.append(name)
+        elif value.shape == shape:
+            content.columns[name] = _finite(path, name, value)
+        elif value.ndim == 0 and name != TIME:
+            content.conditions[name] = float(_finite(path, name, value))
+        else:
+            wrong.append(name)
+    if wrong:
+        raise _unknown(path, values, wrong)
+    return content
+
+
+def _mapped(path: Path, variables: Values, sidecar: Sidecar) -> Content:
+    """Take what a sidecar names, scaled."""
+    columns = {}
+    for name, channel in sidecar.channels.items():
+        value: object = variables
+        for key in channel.variable.split("."):
+            value = value.get(key) if isinstance(value, dict) else None
+        if not isinstance(value, np.ndarray) or value.ndim != 1:
+            raise DataError(
+                f"{path}: {channel.variable!r}, which the sidecar maps to {name}, is no numeric "
+                "vector of this file.",
+                f"Found: {_listing(variables)}.",
+                f"Correct `variable` in {sidecar_path(path).name}.",
+            )
+        columns[name] = channel.scale * _finite(path, name, value) + channel.offset
+    lengths = {name: values.size for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise DataError(f"{path}: the channels differ in length: {lengths}.")
+    if sidecar.sample_rate_hz is not None:
+        columns[TIME] = np.arange(next(iter(lengths.values()))) / sidecar.sample_rate_hz
+    return Content(columns, dict(sidecar.conditions))
+
+
+def _finite(path: Path, name: str, values: NDArray[np.generic]) -> FloatArray:
+    array = values.astype(np.float64)
+    if not np.isfinite(array).all():
+        sample = int(np.argmin(np.isfinite(array))) + 1
+        raise DataError(
+            f"{path}: {name} is not finite at sample {sample}.",
+            "A recording has no NaN; a sample that is not there is flagged.",
+            "Cut or repair the vector where the file is made.",
+        )
+    return array
+
+
+def _listing(values: Values) -> str:
+    return ", ".join(f"{name} {_kind(value)}" for name, value in values.items()) or "nothing"
+
+
+def _kind(value: Value) -> str:
+    if isinstance(value, dict):
+        return f"(struct of {', '.join(value)})"
+    if isinstance(value, Unread):
+        return f"({value.kind})"
+    if isinstance(value, str):
+        return "(text)"
+    return str(value.shape) if value.ndim else "(scalar)"
+
+
+def _unknown(path: Path, values: Values, wrong: list[str]) -> DataError:
+    return DataError(
+        f"{path}: no run could be made of its variables"
+        + (f"; not understood: {', '.join(wrong)}." if wrong else "."),
+        f"Found: {_listing(values)}. Expected time_s and vectors of its length named as channels "
+        f"with units ({', '.join(CHANNELS)}), at the top or in scalar structs.",
+        f"Rename them, or map them in {sidecar_path(path).name}.",
+    )

@@ -1,0 +1,38 @@
+"""How a person wants a stream shown."""
+
+import math
+from dataclasses import dataclass
+
+from rig.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class ShowOptions:
+    """How to show a stream.
+
+    Attributes:
+        title: What is shown.
+        channels: Quantities to watch, the main one first.
+        lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
+        plain: Lines for people, also in a terminal that could draw.
+        json: One JSON object a line on stdout, nothing for people.
+    """
+
+    title: str
+    channels: tuple[str, ...] = ("distal_torque_n_m",)
+    lever_m: float = 0.012
+    plain: bool = False
+    json: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the lever arm.
+
+        Raises:
+            UsageError: It is not a positive length.
+        """
+        if not 0 < self.lever_m < math.inf:
+            raise UsageError(
+                f"A lever arm of {self.lever_m * 1e3:g} mm gives no force.",
+                "The force at the jaw tip is the torque over the lever arm.",
+                "Give a positive --lever-mm, for example 12.",
+            )

@@ -1,0 +1,184 @@
+"""The display as a person sees it: lines of text made from one snapshot, for any terminal size."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.text import Text
+
+from rig.live import text as words
+from rig.live.block import DeviceStatus, FloatArray, LimitStatus
+from rig.live.digits import big
+from rig.live.sparkline import round_scale, sparkline
+from rig.live.state import TRACE_S, Reading, Snapshot, Value
+
+# The palette of Okabe and Ito (2008), told apart by every kind of colour vision; each style is
+# also told apart by a word or a symbol.
+STYLES = {
+    "title": "bold",
+    "quiet": "dim",
+    "estimate": "#56B4E9",
+    "sensor": "#E69F00",
+    "good": "#009E73",
+    "warning": "bold #E69F00",
+    "bad": "bold #D55E00",
+}
+
+WIDE = 64
+"""From this many columns on, the numbers stand beside the digits and not under them."""
+
+MARGIN = 18
+"""Columns left of a trace, for its name and the edges of its scale."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A snapshot as rich renders it. Fits the width; the traces take what height is left.
+
+    Attributes:
+        snapshot: What to show.
+        title: What is being shown: a session's or a recording's name.
+        lever_m: Lever arm from the jaw's axis to its tip, m.
+        footer: What a person can do.
+    """
+
+    snapshot: Snapshot
+    title: str
+    lever_m: float
+    footer: str = "Ctrl-C leaves"
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield one line of text after the other, none wider than the terminal."""
+        # the last column and line stay free: some terminals wrap or scroll there
+        width, height = max(options.max_width - 1, 20), console.height - 1
+        for line in self.lines(width, height):
+            line.truncate(width, overflow="ellipsis")
+            yield line
+
+    def lines(self, width: int, height: int) -> list[Text]:
+        """Return the display's lines, at most `height` of them if the terminal is not tiny."""
+        snapshot, main = self.snapshot, self.snapshot.readings[0]
+        above = [_header(snapshot, self.title, width), *_headline(main, self.lever_m, width)]
+        above += [_other(reading) for reading in snapshot.readings[1:]]
+        if snapshot.flagged:
+            seen = words.flagged(snapshot.flagged)
+            above.append(_styled(f"▲ flagged in {TRACE_S:g} s: {seen}", "warning"))
+        below = [_device(device) for device in snapshot.devices]
+        below += [_limit(limit, width) for limit in snapshot.limits]
+        below.append(_styled(self.footer, "quiet"))
+        free = height - len(above) - len(below)
+        return [*above, *_traces(main, width, free), *below]
+
+
+def _styled(content: str, style: str = "") -> Text:
+    return Text(content, style=STYLES.get(style, style), no_wrap=True)
+
+
+def _header(snapshot: Snapshot, title: str, width: int) -> Text:
+    """Title on the left; time, rate and losses on the right. The right part is never cut."""
+    time = "no samples yet" if snapshot.time_s is None else f"{snapshot.time_s:.1f} s"
+    right = f"{time}  {words.rate(snapshot)}  "
+    lost = words.lost(snapshot.lost, snapshot.samples)
+    room = width - len(right) - len(lost) - 1
+    line = _styled(title, "title")
+    line.truncate(max(room, 0), overflow="ellipsis", pad=True)
+    line.append(" " + right)
+    line.append(lost, style=STYLES["bad"] if snapshot.lost else "")
+    return line
+
+
+def _headline(reading: Reading, lever_m: float, width: int) -> Iterator[Text]:
+    """Yield the main number in large digits, and what belongs to it."""
+    source, value = words.main_value(reading)
+    name = _styled(f"{words.name_of(reading.channel)}, {source}  ", "title")
+    style = STYLES["warning"] if value.number is None else STYLES[source]
+    number = Text(words.with_unit(value, reading.unit), style=style, no_wrap=True)
+    if name.cell_len + number.cell_len <= width:
+        yield name.append_text(number)
+    else:
+        yield from (name, number)
+    digits = words.digits(value, reading.unit)
+    large = big(digits) if digits is not None else ["", "  ▀▀▀ ▀▀▀ ▀▀▀", ""]
+    beside = list(_beside(reading, source, value, lever_m))
+    if width < WIDE:
+        yield from (_styled(line, source) for line in large)
+        yield from (_styled(line) for line in beside if line)
+        return
+    for line, note in zip(large, beside, strict=True):
+        # the column is wide enough for -999.9, so that the notes stand still
+        yield _styled(f"{line:<24}", source).append(note, style="default")
+
+
+def _beside(reading: Reading, source: str, value: Value, lever_m: float) -> Iterator[str]:
+    """Yield three notes on the main number: the force at the tip, the sensor, the error."""
+    force_n = words.tip_force_n(reading, value, lever_m)
+    if reading.channel != words.TIP_CHANNEL:
+        yield ""
+    elif force_n is None:
+        yield f"no force at the jaw tip (lever {lever_m * 1e3:g} mm)"
+    else:
+        yield f"{force_n:.2f} N at the jaw tip (lever {lever_m * 1e3:g} mm)"
+    if source == "sensor":
+        yield from ("no estimator", "")
+        return
+    yield f"sensor {words.with_unit(reading.sensor, reading.unit)}"
+    yield words.error_rms(reading)
+
+
+def _other(reading: Reading) -> Text:
+    """Return one line on a quantity that is not the main one."""
+    source, value = words.main_value(reading)
+    line = _styled(f"{words.name_of(reading.channel)}, {source} ")
+    line.append(words.with_unit(value, reading.unit), style=STYLES[source])
+    if source == "estimate":
+        line.append(f", sensor {words.with_unit(reading.sensor, reading.unit)}")
+    return line
+
+
+def _traces(reading: Reading, width: int, free: int) -> Iterator[Text]:
+    """Yield the recent traces, one under the other on one scale, in at most `free` lines."""
+    factor, unit, _ = words.in_shown_unit(reading.unit)
+    traces = {"estimate": reading.estimate_trace * factor, "sensor": reading.sensor_trace * factor}
+    shown = {name: trace for name, trace in traces.items() if not np.all(np.isnan(trace))}
+    height = min(free - 1, 12) // max(len(shown), 1)
+    if not shown or height < 1:
+        return
+    scale = round_scale(
+        min(float(np.nanmin(trace)) for trace in shown.values()),
+        max(float(np.nanmax(trace)) for trace in shown.values()),
+    )
+    for name, trace in shown.items():
+        yield from _trace(name, trace, scale, width, height)
+    yield _styled(f"{'':<{MARGIN}}{unit}, last {TRACE_S:g} s", "quiet")
+
+
+def _trace(
+    name: str, trace: FloatArray, scale: tuple[float, float], width: int, height: int
+) -> Iterator[Text]:
+    """Yield the lines of one trace, its name and the edges of its scale on the left."""
+    low, high = f"{scale[0]:g}", f"{scale[1]:g}"
+    labels = [high, *[""] * (height - 2), low] if height > 1 else [f"{low}..{high}"]
+    names = [name, *[""] * (height - 1)]
+    drawn = sparkline(trace[0], trace[1], width - MARGIN, height, scale)
+    for title, label, line in zip(names, labels, drawn, strict=True):
+        edge = "┤" if label else "│"
+        yield _styled(f"{title:<8} {label:>7} {edge}").append(line, style=STYLES[name])
+
+
+def _device(device: DeviceStatus) -> Text:
+    symbol, style = words.STATES.get(device.state, ("◆", "warning"))
+    line = _styled(f"{symbol} {device.name} ", style).append(device.state)
+    return line.append(f"  {device.detail}" if device.detail else "", style="default")
+
+
+def _limit(limit: LimitStatus, width: int) -> Text:
+    """Return a limit as a bar and in numbers; the bar gives way in a narrow terminal."""
+    share = words.limit_share(limit)
+    style = "bad" if share is None or share >= 1 else "warning" if share >= 0.8 else "good"
+    line = _styled(f"{limit.name} ")
+    if width >= WIDE:
+        filled = round(20 * min(share or 0.0, 1.0))
+        line.truncate(20, overflow="ellipsis", pad=True)
+        line.append("█" * filled + "░" * (20 - filled), style=STYLES[style]).append(" ")
+    return line.append(words.limit_words(limit), style=STYLES[style] if style != "good" else "")

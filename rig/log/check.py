@@ -1,0 +1,265 @@
+"""Is a log whole: samples expected and received, every gap, every damaged place.
+
+What was expected is known three ways: from the sequence numbers between the first and the last
+sample, from the planned duration and rate, and from what the recorder itself had counted when it
+closed the log. The largest of them counts.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import ExitCode
+from rig.log.container import MAGIC
+from rig.log.reader import LogFile, Topic, read_log
+from rig.log.scan import Damage
+from rig.log.writer import LIBRARY, PART_SUFFIX
+
+PLAN_TOLERANCE = 1e-3
+"""Relative shortfall against the plan that two clocks explain."""
+
+
+class Verdict(Enum):
+    """What a check found."""
+
+    COMPLETE = "complete"
+    INCOMPLETE = "incomplete"  # what is there is sound, but samples are missing or out of order
+    DAMAGED = "damaged"  # the file itself is torn or altered
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Exit code of a check that ends so."""
+        codes = {Verdict.COMPLETE: ExitCode.OK, Verdict.INCOMPLETE: ExitCode.FAILED}
+        return codes.get(self, ExitCode.DATA)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Samples that are missing between two that are there.
+
+    Attributes:
+        first_sequence: Sequence number of the first missing sample.
+        last_sequence: Sequence number of the last missing sample.
+        samples: How many are missing.
+        start_s: Time of the last sample before the gap, s, in the stream's own time.
+        length_s: Time from that sample to the first one after the gap, s.
+    """
+
+    first_sequence: int
+    last_sequence: int
+    samples: int
+    start_s: float
+    length_s: float
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """What a check found in one stream.
+
+    Attributes:
+        topic: Its topic.
+        received: Samples in the file.
+        expected: Samples that should be there: the largest of the three below and of `received`.
+        expected_by_sequence: From the first sequence number to the last; None without them.
+        expected_by_plan: From the planned duration and rate; None without a plan.
+        expected_by_recorder: What the recorder had counted at the end; None if it did not say.
+        gaps: Missing stretches.
+        repeats: Samples whose sequence number does not come after the one before.
+        time_steps_back: Samples whose time does not come after the one before.
+        not_finite: Samples with a value that is not finite, all of them.
+        not_finite_unflagged: Those of them that no flag explains.
+        salvaged: Samples from the torn end of the file, which no checksum vouches for.
+    """
+
+    topic: str
+    received: int
+    expected: int
+    expected_by_sequence: int | None
+    expected_by_plan: int | None
+    expected_by_recorder: int | None
+    gaps: tuple[Gap, ...]
+    repeats: int
+    time_steps_back: int
+    not_finite: int
+    not_finite_unflagged: int
+    salvaged: int
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing is missing, repeated, out of order or unexplained."""
+        wrong = (self.gaps, self.repeats, self.time_steps_back, self.not_finite_unflagged)
+        planned = (self.expected_by_plan or 0) * (1 - PLAN_TOLERANCE) - 1
+        recorded = self.expected_by_recorder or 0
+        return not any(wrong) and self.received >= max(planned, recorded)
+
+
+@dataclass(frozen=True)
+class LogReport:
+    """What a check found.
+
+    Attributes:
+        path: The log.
+        run: Name of the run; None when that is lost.
+        verdict: Whether the log is complete, incomplete or damaged.
+        closed: Whether the recorder closed the log.
+        problems: What is wrong, in words; empty when the log is complete.
+        topics: Findings by stream.
+        damage: Damaged places of the file.
+        unchecked_chunks: Chunks that carry no checksum.
+    """
+
+    path: Path
+    run: str | None
+    verdict: Verdict
+    closed: bool
+    problems: tuple[str, ...]
+    topics: tuple[TopicReport, ...]
+    damage: tuple[Damage, ...]
+    unchecked_chunks: int
+
+
+def check_log(path: Path) -> LogReport:
+    """Check a log.
+
+    Raises:
+        NotALogError: The file is not MCAP.
+        UsageError: The file is not there.
+    """
+    return report_on(read_log(path, tolerant=True))
+
+
+def logs_in(path: Path) -> list[Path]:
+    """Return the logs at a path: the file itself, or all logs of a folder, unfinished ones too."""
+    if not path.is_dir():
+        return [path]
+    return sorted([*path.glob("*.mcap"), *path.glob(f"*.mcap{PART_SUFFIX}")])
+
+
+def looks_like_log(path: Path) -> bool:
+    """Say from name and first bytes whether a file is a log."""
+    if not path.name.endswith((".mcap", f".mcap{PART_SUFFIX}")) or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def report_on(log: LogFile) -> LogReport:
+    """Judge a log that was read tolerantly."""
+    topics = tuple(_topic_report(log, name, topic) for name, topic in log.topics.items())
+    incomplete = [problem for topic in topics for problem in _shortfalls(topic)]
+    damage = [item.what for item in log.damage]
+    if log.library.startswith(f"{LIBRARY} "):
+        if log.run is None:
+            damage.append("what was known about the run is lost")
+        if log.end is None:
+            damage.append("the recorder did not close the log")
+    if log.end is not None and not log.end.clean:
+        incomplete.append(f"the run did not end as planned: {log.end.reason or 'no reason given'}")
+    verdict = Verdict.INCOMPLETE if incomplete else Verdict.COMPLETE
+    if damage:
+        verdict = Verdict.DAMAGED
+    return LogReport(
+        path=log.path,
+        run=log.run.name if log.run else None,
+        verdict=verdict,
+        closed=log.end is not None,
+        problems=(*damage, *incomplete),
+        topics=topics,
+        damage=log.damage,
+        unchecked_chunks=log.unchecked_chunks,
+    )
+
+
+def _topic_report(log: LogFile, name: str, topic: Topic) -> TopicReport:
+    time_s = stream_time_s(topic)
+    by_sequence: int | None = None
+    gaps: tuple[Gap, ...] = ()
+    repeats = 0
+    if "sequence" in topic.columns:
+        by_sequence, gaps, repeats = _sequence_findings(topic.rows["sequence"], time_s)
+    by_plan = None
+    if log.run and log.run.duration_s is not None and topic.stream.rate_hz is not None:
+        by_plan = round(log.run.duration_s * topic.stream.rate_hz)
+    by_recorder = log.end.expected_samples.get(name) if log.end else None
+    bad = not_finite(topic)
+    flagged = topic.rows["flags"] != 0 if "flags" in topic.columns else np.zeros(len(topic), bool)
+    backwards = np.diff(time_s) <= 0 if "time_s" in topic.columns else np.diff(time_s) < 0
+    return TopicReport(
+        topic=name,
+        received=len(topic),
+        expected=max(len(topic), by_sequence or 0, by_plan or 0, by_recorder or 0),
+        expected_by_sequence=by_sequence,
+        expected_by_plan=by_plan,
+        expected_by_recorder=by_recorder,
+        gaps=gaps,
+        repeats=repeats,
+        time_steps_back=int(backwards.sum()),
+        not_finite=int(bad.sum()),
+        not_finite_unflagged=int((bad & ~flagged).sum()),
+        salvaged=log.salvaged.get(name, 0),
+    )
+
+
+def stream_time_s(topic: Topic) -> NDArray[np.float64]:
+    """Return a stream's own time, s, shape (n,): its field `time_s`, or else its log times."""
+    if "time_s" in topic.columns:
+        time_s: NDArray[np.float64] = topic.rows["time_s"]
+        return time_s
+    if not len(topic):
+        return np.empty(0)
+    elapsed_ns: NDArray[np.uint64] = topic.log_time_ns - topic.log_time_ns.min()
+    return elapsed_ns.astype(np.float64) * 1e-9
+
+
+def not_finite(topic: Topic) -> NDArray[np.bool_]:
+    """Say which messages hold a value that is not finite, shape (n,)."""
+    bad = np.zeros(len(topic), bool)
+    for field in topic.stream.fields:
+        if field.dtype.startswith("float"):
+            bad |= ~np.isfinite(topic.rows[field.name])
+    return bad
+
+
+def _sequence_findings(
+    sequence: NDArray[np.uint32], time_s: NDArray[np.float64]
+) -> tuple[int, tuple[Gap, ...], int]:
+    """Return the samples expected, the gaps, and how many samples repeat or run back."""
+    if not sequence.size:
+        return 0, (), 0
+    # differences of the 32-bit counter, so that its wrap is a step of one like any other
+    bits = sequence.dtype.itemsize * 8
+    step = np.diff(sequence).astype(np.int64) % (1 << bits)
+    forward = (step > 0) & (step < 1 << (bits - 1))
+    gaps = tuple(
+        Gap(
+            first_sequence=(int(sequence[k]) + 1) % (1 << bits),
+            last_sequence=(int(sequence[k + 1]) - 1) % (1 << bits),
+            samples=int(step[k]) - 1,
+            start_s=float(time_s[k]),
+            length_s=float(time_s[k + 1] - time_s[k]),
+        )
+        for k in np.flatnonzero(forward & (step > 1))
+    )
+    expected = int(sequence.size) + sum(gap.samples for gap in gaps)
+    return expected, gaps, int((~forward).sum())
+
+
+def _shortfalls(topic: TopicReport) -> list[str]:
+    """Say in words what one stream lacks."""
+    name = topic.topic
+    found = []
+    if topic.gaps:
+        lost = sum(gap.samples for gap in topic.gaps)
+        found.append(f"{name}: {lost} samples are missing in {len(topic.gaps)} gaps")
+    if topic.repeats:
+        found.append(f"{name}: {topic.repeats} samples repeat or run back in sequence")
+    if topic.time_steps_back:
+        found.append(f"{name}: time does not increase at {topic.time_steps_back} samples")
+    if topic.not_finite_unflagged:
+        found.append(f"{name}: {topic.not_finite_unflagged} samples are not finite and not flagged")
+    if not found and not topic.sound:
+        found.append(f"{name}: {topic.received} of {topic.expected} expected samples are there")
+    return found

@@ -1,0 +1,143 @@
+"""Export of a log as CSV, Parquet or NPZ: one file for each topic, units in the headers."""
+
+import os
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import UsageError
+from rig.log.reader import LogFile, Topic, read_log
+from rig.log.writer import PART_SUFFIX
+
+Columns = dict[str, NDArray[np.generic]]
+
+
+class ExportFormat(Enum):
+    """File formats a log can be exported to."""
+
+    CSV = "csv"
+    PARQUET = "parquet"
+    NPZ = "npz"
+
+
+class ExportExistsError(UsageError):
+    """The file to write is there already."""
+
+
+def export_log(
+    path: Path,
+    export_format: ExportFormat,
+    out: Path | None = None,
+    topic: str | None = None,
+    *,
+    force: bool = False,
+) -> list[Path]:
+    """Export a log, one file for each topic.
+
+    Every file has the column `log_time_ns` (ns since the Unix epoch, or since the run's start when
+    that is not known) and one column for each field, named with its unit.
+
+    Args:
+        path: The log; it must not be damaged.
+        export_format: Format to write.
+        out: File to write, with one topic; else the folder to write to. Beside the log when None.
+        topic: The one topic to export; all when None.
+        force: Overwrite files that are there.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ExportExistsError: A file is there already and `force` is False; nothing is written then.
+        UsageError: The log has no such topic.
+        DamagedLogError: The log is damaged.
+    """
+    log = read_log(path, None if topic is None else [topic])
+    if not log.topics:
+        raise UsageError(f"{path} has no topics to export.")
+    targets = _targets(log, export_format, out, single=topic is not None)
+    taken = [target for target in targets.values() if target.exists()]
+    if taken and not force:
+        raise ExportExistsError(
+            f"There is a file {taken[0]} already.", fix="Overwrite it with --force."
+        )
+    for name, target in targets.items():
+        _write_atomically(_WRITERS[export_format], target, log.topics[name])
+    return list(targets.values())
+
+
+def _targets(
+    log: LogFile, export_format: ExportFormat, out: Path | None, *, single: bool
+) -> dict[str, Path]:
+    """Return the file of each topic."""
+    if out is not None and single and not out.is_dir():
+        return {next(iter(log.topics)): out}
+    folder = log.path.parent if out is None else out
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(
+            f"{folder} is a file, and the log has {len(log.topics)} topics, one file each.",
+            fix="Name a folder, or one topic with --topic.",
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = log.path.name.removesuffix(PART_SUFFIX).removesuffix(".mcap")
+    return {
+        name: folder / f"{stem}.{name.strip('/').replace('/', '-')}.{export_format.value}"
+        for name in log.topics
+    }
+
+
+def _write_atomically(write: Callable[[Path, Topic], None], target: Path, topic: Topic) -> None:
+    """Write a file beside its target and rename it when it is whole."""
+    partial = target.with_name(f".{target.name}.{os.getpid()}{PART_SUFFIX}")
+    try:
+        write(partial, topic)
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _columns(topic: Topic) -> Columns:
+    fields = {name: np.ascontiguousarray(topic.rows[name]) for name in topic.columns}
+    return {"log_time_ns": topic.log_time_ns, **fields}
+
+
+def _table(topic: Topic) -> Any:
+    """Return the topic as an Arrow table whose fields carry unit and description."""
+    import pyarrow as pa
+
+    columns = {name: pa.array(values) for name, values in _columns(topic).items()}
+    notes = {
+        "log_time_ns": {"unit": "ns", "description": "log time"},
+        **{f.name: {"unit": f.unit, "description": f.description} for f in topic.stream.fields},
+    }
+    schema = [pa.field(name, values.type, metadata=notes[name]) for name, values in columns.items()]
+    return pa.table(list(columns.values()), schema=pa.schema(schema))
+
+
+def _write_csv(path: Path, topic: Topic) -> None:
+    from pyarrow import csv
+
+    options = csv.WriteOptions(quoting_style="none", quoting_header="none")
+    csv.write_csv(_table(topic), path, options)
+
+
+def _write_parquet(path: Path, topic: Topic) -> None:
+    from pyarrow import parquet
+
+    parquet.write_table(_table(topic), path, compression="zstd")
+
+
+def _write_npz(path: Path, topic: Topic) -> None:
+    with path.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **_columns(topic))
+
+
+_WRITERS: dict[ExportFormat, Callable[[Path, Topic], None]] = {
+    ExportFormat.CSV: _write_csv,
+    ExportFormat.PARQUET: _write_parquet,
+    ExportFormat.NPZ: _write_npz,
+}

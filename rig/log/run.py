@@ -1,0 +1,155 @@
+"""What is known about a run before and after it is recorded, and how it is kept in a log.
+
+Both are MCAP metadata records: one text per field, each of them JSON. `rig.run` is written first,
+so that a killed recorder does not lose it. `rig.end` is written last; its absence means that the
+recorder did not close the file.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
+
+from estimation.recording import Flag, Instrument, Mark, Stretch
+from rig.errors import DataError
+
+RUN_RECORD = "rig.run"
+END_RECORD = "rig.end"
+MARK_RECORD = "rig.mark"
+STRETCH_RECORD = "rig.stretch"
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What is known when a recording starts.
+
+    Attributes:
+        name: Name of the run, unique in its campaign.
+        rig: Name of the rig.
+        instrument: Identity of the instrument.
+        conditions: What is held constant, SI numbers with the unit in the name, or words.
+        notes: Operator's notes.
+        started_at_ns: Start of the run, ns since the Unix epoch, or None when not known.
+        duration_s: Planned duration, s, or None when open-ended.
+        calibrations: Calibration name to content hash.
+        zeros_before: Sensor zeros taken before the run, name with unit to value.
+        source: Where the data came from, when it was not recorded here.
+        excluded: Why the run is left out of evidence, or None.
+        details: Anything else that JSON can hold, such as the protocol and software versions.
+    """
+
+    name: str
+    rig: str = ""
+    instrument: Instrument = field(default_factory=Instrument)
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    notes: str = ""
+    started_at_ns: int | None = None
+    duration_s: float | None = None
+    calibrations: Mapping[str, str] = field(default_factory=dict)
+    zeros_before: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+    excluded: str | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RunEnd:
+    """What is known when a recording ends.
+
+    Attributes:
+        clean: Whether the run went as planned to its end.
+        reason: Why it did not, in words; empty when it did.
+        expected_samples: Topic to the number of samples the recorder should have received.
+        counters: What the link counted, such as `crc_errors` and `lost_frames`.
+        zeros_after: Sensor zeros taken after the run, name with unit to value.
+        drift: Zero after minus zero before, name with unit to value.
+        drift_verdict: What the drift means, in words; empty when not judged.
+        excluded: Why the run is left out of evidence, when that was found at its end.
+        details: Anything else that JSON can hold.
+    """
+
+    clean: bool = True
+    reason: str = ""
+    expected_samples: Mapping[str, int] = field(default_factory=dict)
+    counters: Mapping[str, int] = field(default_factory=dict)
+    zeros_after: Mapping[str, float] = field(default_factory=dict)
+    drift: Mapping[str, float] = field(default_factory=dict)
+    drift_verdict: str = ""
+    excluded: str | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+Record = RunInfo | RunEnd | Mark | Stretch
+R = TypeVar("R", RunInfo, RunEnd, Mark, Stretch)
+
+
+def to_metadata(record: Record) -> dict[str, str]:
+    """Return a record as MCAP metadata: field name to JSON text.
+
+    Raises:
+        DataError: A value is not finite or cannot be written as JSON.
+    """
+    metadata = {}
+    for item in fields(record):
+        try:
+            value = _plain(getattr(record, item.name))
+            metadata[item.name] = json.dumps(value, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise DataError(
+                f"{item.name} of the run cannot be written: {error}.",
+                "Metadata holds text, finite numbers, lists and tables of them.",
+                "Leave out what is not known instead of writing NaN.",
+            ) from None
+    return metadata
+
+
+def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
+    """Return the record that `to_metadata` wrote; fields it does not know are ignored.
+
+    Raises:
+        DataError: A value is not JSON, or of the wrong kind.
+    """
+    try:
+        known = {item.name for item in fields(kind)}
+        values = {name: json.loads(text) for name, text in metadata.items() if name in known}
+        if "instrument" in values:
+            values["instrument"] = Instrument(**values["instrument"])
+        if "flag" in values:
+            values["flag"] = Flag(values["flag"])
+        record = kind(**values)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            f"The {kind.__name__} record of the log is damaged: {error}.",
+            fix="Run `rig log check` on the file.",
+        ) from None
+    _check_types(record)
+    return record
+
+
+def _check_types(record: Record) -> None:
+    """Refuse a value whose kind differs from the field's default."""
+    for item in fields(record):
+        value = getattr(record, item.name)
+        wanted: type = type(item.default)
+        if callable(item.default_factory):
+            wanted = type(item.default_factory())
+        if wanted in (dict, str, bool, Instrument) and not isinstance(value, wanted):
+            raise DataError(
+                f"{item.name} in the log's metadata is {value!r}, not a {wanted.__name__}."
+            )
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as plain JSON types."""
+    if isinstance(value, Instrument):
+        return {item.name: getattr(value, item.name) for item in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):  # NumPy scalars and arrays
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{value} is not finite")
+    return value

@@ -1,0 +1,293 @@
+"""Writing a log so that a killed recorder loses at most a quarter of a second.
+
+While it is recorded a log is called `NAME.mcap.part`; a clean close renames it to `NAME.mcap`. So a
+file called `.mcap` is always whole, and a recorder that was killed leaves a `.part` that a person
+finds, `rig log check` explains and `rig log repair` makes whole. Recording to a temporary folder
+would lose the file from sight, and recording to the final name would let a torn file pass for a
+whole one.
+
+What was written is held in memory until it has waited `FLUSH_AFTER_S` or spans that much data time,
+then it goes to the operating system as one chunk for each stream. What the operating system has,
+`kill -9` cannot take away; only a power cut can, and `sync` covers that.
+"""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.recording import Mark, Stretch
+from rig import __version__
+from rig.errors import RigError, UsageError
+from rig.log.container import Attached, Container
+from rig.log.messages import Rows, message_records, packed_rows
+from rig.log.run import (
+    END_RECORD,
+    MARK_RECORD,
+    RUN_RECORD,
+    STRETCH_RECORD,
+    RunEnd,
+    RunInfo,
+    to_metadata,
+)
+from rig.log.schema import Stream
+
+PART_SUFFIX = ".part"
+
+LIBRARY = "rig"
+"""What our logs name as the writing library, before the version."""
+
+MAX_LOSS_S = 0.25
+"""The most data, s, that a killed recorder loses, if it calls `write` or `poll` every 50 ms."""
+
+FLUSH_AFTER_S = 0.2
+"""Age and data time at which a block is flushed: `MAX_LOSS_S` less the 50 ms between two calls."""
+
+CHUNK_BYTES = 1 << 20
+"""The most a chunk holds, unpacked; a recording written in one go is cut into such chunks."""
+
+
+class LogExistsError(UsageError):
+    """A log of that name is there already, and logs are never overwritten."""
+
+
+class LogWriteError(RigError):
+    """The operating system did not take the data, for example because the disk is full."""
+
+
+class LogWriter:
+    """Writes one run.
+
+    Use it as a context manager. Leaving the block closes the log as clean; leaving it by an
+    exception closes it too, with the exception as the reason why the run is not clean. `close` and
+    `discard` do it by hand.
+
+    Args:
+        path: Where the log shall be, ending in `.mcap`.
+        run: What is known about the run; written at once.
+        streams: Streams of the log.
+        attachments: Files to carry, such as the configuration and the calibrations.
+        clock: Monotonic clock, s.
+
+    Raises:
+        LogExistsError: There is a log or a part of one at the path.
+        UsageError: The path does not end in `.mcap`, or two streams share a topic.
+        DataError: The run's metadata cannot be written.
+        LogWriteError: The file cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        run: RunInfo,
+        streams: Sequence[Stream],
+        *,
+        attachments: Sequence[Attached] = (),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if path.suffix != ".mcap":
+            raise UsageError(f"A log is named NAME.mcap, not {path.name}.")
+        self.path = path
+        self.part = path.with_name(path.name + PART_SUFFIX)
+        for taken in (path, self.part):
+            if taken.exists():
+                raise LogExistsError(
+                    f"There is a log at {taken} already.",
+                    "Logs are never overwritten.",
+                    "Choose another name, or move that file away.",
+                )
+        self._streams = {stream.topic: stream for stream in streams}
+        if len(self._streams) < len(streams):
+            raise UsageError("Two streams of the log share a topic.")
+        self.received = dict.fromkeys(self._streams, 0)
+        """Topic to the number of messages written so far."""
+        run_metadata = to_metadata(run)
+        self._clock = clock
+        self._pending: dict[str, list[NDArray[np.void]]] = {}
+        self._waiting_since_s = 0.0
+        self._closed = False
+        try:
+            self._file = self.part.open("xb")
+        except OSError as error:
+            raise LogWriteError(f"The log {self.part} cannot be made.", str(error)) from None
+        try:
+            with self._giving_to_system():
+                self._container = Container(self._file, f"{LIBRARY} {__version__}")
+                self._container.add_metadata(RUN_RECORD, run_metadata)
+                self._channels = {s.topic: self._container.add_stream(s) for s in streams}
+                for attached in attachments:
+                    self._container.add_attachment(attached, run.started_at_ns or 0)
+                self._file.flush()
+        except LogWriteError:
+            self.discard()
+            raise
+
+    def __enter__(self) -> "LogWriter":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._closed:
+            return
+        if kind is not None:
+            self.close(RunEnd(clean=False, reason=f"{kind.__name__}: {error}".strip(": ")))
+        else:
+            self.close()
+
+    def write(self, topic: str, rows: Rows, log_time_ns: ArrayLike) -> None:
+        """Take a block of messages; it is in the operating system within `MAX_LOSS_S`.
+
+        A message that holds a value that is not finite must say why in its field `flags`.
+
+        Args:
+            topic: Topic of a stream of this log.
+            rows: n messages, as a structured array of shape (n,) or one array of shape (n,) for
+                each field of the stream.
+            log_time_ns: When each message was taken, ns since the Unix epoch, shape (n,).
+
+        Raises:
+            UnflaggedSampleError: A value is not finite and the message's flags are 0.
+            DataError: Fields are missing, unknown, of different lengths or out of range.
+            UsageError: The log has no such topic.
+            LogWriteError: The operating system refused the data.
+        """
+        if topic not in self._streams:
+            raise UsageError(
+                f"The log has no stream {topic!r}.", f"It has: {', '.join(self._streams)}."
+            )
+        stream = self._streams[topic]
+        payload = packed_rows(stream, rows)
+        if not payload.size:
+            return
+        messages = message_records(
+            stream, payload, log_time_ns, self._channels[topic], self.received[topic]
+        )
+        if not self._pending:
+            self._waiting_since_s = self._clock()
+        self._pending.setdefault(topic, []).append(messages)
+        self.received[topic] += payload.size
+        if self._spans_ns() >= FLUSH_AFTER_S * 1e9:
+            self.flush()
+        self.poll()
+
+    def poll(self) -> bool:
+        """Flush if the oldest message has waited long enough, and say whether it did.
+
+        A recorder's loop calls this at least every 50 ms, also while no samples arrive.
+        """
+        if not self._pending or self._clock() - self._waiting_since_s < FLUSH_AFTER_S:
+            return False
+        self.flush()
+        return True
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system.
+
+        Raises:
+            LogWriteError: It refused the data.
+        """
+        pending, self._pending = self._pending, {}
+        with self._giving_to_system():
+            for topic, blocks in pending.items():
+                messages = np.concatenate(blocks)
+                step = max(1, CHUNK_BYTES // messages.dtype.itemsize)
+                for start in range(0, messages.size, step):
+                    part = messages[start : start + step]
+                    self._container.add_chunk(self._channels[topic], part)
+            self._file.flush()
+
+    def sync(self) -> None:
+        """Flush, and wait until the disk has everything: call it on a fault."""
+        self.flush()
+        with self._giving_to_system():
+            os.fsync(self._file.fileno())
+
+    def mark(self, mark: Mark) -> None:
+        """Write an operator's mark at once."""
+        self.add_metadata(MARK_RECORD, to_metadata(mark))
+
+    def stretch(self, stretch: Stretch) -> None:
+        """Write a flagged stretch at once."""
+        self.add_metadata(STRETCH_RECORD, to_metadata(stretch))
+
+    def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
+        """Write a metadata record of any name at once.
+
+        Raises:
+            LogWriteError: The operating system refused the data.
+        """
+        with self._giving_to_system():
+            self._container.add_metadata(name, data)
+            self._file.flush()
+
+    def close(self, end: RunEnd | None = None) -> Path:
+        """Write what is known at the end, finish the file, and give it its name.
+
+        Args:
+            end: What is known at the end; a clean end when None.
+
+        Returns:
+            Path of the log.
+
+        Raises:
+            LogWriteError: The operating system refused the data; what it took is in the `.part`.
+        """
+        end_metadata = to_metadata(end or RunEnd())
+        self.flush()
+        with self._giving_to_system():
+            self._container.add_metadata(END_RECORD, end_metadata)
+            self._container.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._abandon()
+            self.part.rename(self.path)
+            _sync_folder(self.path.parent)
+        return self.path
+
+    def discard(self) -> None:
+        """Close and delete what was written: for a log that is a copy of something else."""
+        self._abandon()
+        self.part.unlink(missing_ok=True)
+
+    def _abandon(self) -> None:
+        """Close the file as it stands."""
+        self._closed = True
+        with suppress(OSError):  # what led here says more than a buffer that cannot be flushed
+            self._file.close()
+
+    @contextmanager
+    def _giving_to_system(self) -> Iterator[None]:
+        """Turn a refusal of the operating system into ours, and leave the file as it stands."""
+        try:
+            yield
+        except OSError as error:
+            self._abandon()
+            raise LogWriteError(
+                f"{self.part} could not be written: {error.strerror or error}.",
+                "What the system took before that is in the file.",
+                f"Make room, then run `rig log repair {self.part}`.",
+            ) from None
+
+    def _spans_ns(self) -> int:
+        """Data time, ns, from the first message that waits to the last."""
+        blocks = [block for blocks in self._pending.values() for block in blocks]
+        first = min(int(block["log_time"][0]) for block in blocks)
+        return max(int(block["log_time"][-1]) for block in blocks) - first
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until the disk knows the new name."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,23 @@
+"""Open the logger a configuration names: the real one, or the simulated one behind `sim://`."""
+
+from drivers.transport import Transport, open_transport
+from rig.config import Config
+
+
+def open_logger(config: Config, pace: float | None = None) -> Transport:
+    """Return an open transport to the configured logger.
+
+    Args:
+        config: The configuration.
+        pace: Simulated seconds a real second, None for as fast as possible; a real logger has its
+            own pace.
+
+    Raises:
+        DriverError: The logger cannot be reached.
+    """
+    if config.is_simulated:
+        # the plant is compiled code that a session with a real rig does not need
+        from rig.simulation.logger import open_simulated_logger
+
+        return open_simulated_logger(config.simulation, config.logger.url, pace)
+    return open_transport(config.logger.url)

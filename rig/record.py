@@ -1,0 +1,297 @@
+"""Record a campaign: every run of a protocol as one log, zeros before and after, abortable.
+
+A run goes: zero at rest, approach, the run itself (the only part that is logged), release, zero at
+rest. Each run's log is complete in itself, so an aborted campaign resumes at the first run that
+has no log.
+"""
+
+import itertools
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from calibration.zero import Drift, SensorZero, drift_verdicts
+from estimation.files import write_text_atomic
+from rig import __version__
+from rig.config import Config
+from rig.errors import UsageError
+from rig.log.container import Attached
+from rig.log.reader import read_log
+from rig.log.run import RunEnd, RunInfo
+from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
+from rig.log.writer import PART_SUFFIX, LogWriter
+from rig.motion import Motion, motion_of
+from rig.protocol import Protocol, RunPlan
+from rig.session import Reading, Session
+
+MANIFEST = "campaign.json"
+
+REST_S = 0.5
+BYTES_PER_SAMPLE = 400
+"""Upper bound of a sample's room on disk, both streams, before compression."""
+
+Progress = Callable[[str, int, int], None]
+"""Told the run's name, the samples recorded of it, and how many it will have."""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What became of one run.
+
+    Attributes:
+        name: Name of the run.
+        path: Its log.
+        samples: Samples recorded.
+        expected: Samples the plan asked for.
+        lost: Samples lost on the way from the logger.
+        drift: Zero before against zero after, for each judged sensor.
+    """
+
+    name: str
+    path: Path
+    samples: int
+    expected: int
+    lost: int
+    drift: tuple[Drift, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every planned sample is there."""
+        return self.samples == self.expected
+
+    @property
+    def remark(self) -> str:
+        """What a person should know about the run; empty when it is as planned."""
+        remarks = []
+        if not self.complete:
+            remarks.append(f"{self.samples} of {self.expected} samples, {self.lost} lost")
+        remarks += [
+            f"zero of {d.channel} moved by {d.after - d.before:+.4g} {d.unit}, limit {d.limit:g}"
+            for d in self.drift
+            if not d.passes
+        ]
+        return "; ".join(remarks)
+
+    @property
+    def drifted(self) -> tuple[str, ...]:
+        """Channels whose zero moved beyond its limit."""
+        return tuple(d.channel for d in self.drift if not d.passes)
+
+
+def check_disk_space(folder: Path, plans: Iterable[RunPlan]) -> None:
+    """Refuse to begin what the disk cannot hold.
+
+    Raises:
+        UsageError: Less is free than the campaign may need.
+    """
+    needed = sum(plan.target_angle_rad.size for plan in plans) * BYTES_PER_SAMPLE
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise UsageError(
+            f"The campaign may need {needed / 1e6:.0f} MB, {free / 1e6:.0f} MB are free.",
+            f"It would be written to {folder}.",
+            "Free some space, or name another folder with --out.",
+        )
+
+
+def open_campaign_folder(
+    folder: Path, protocol: Protocol, config: Config, resume: bool
+) -> list[RunPlan]:
+    """Prepare a campaign's folder and return the runs that are still to be made.
+
+    Raises:
+        UsageError: The folder is in use and `resume` was not asked for, or what is in it was
+            recorded with another protocol or configuration.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    manifest = folder / MANIFEST
+    described = {"protocol": protocol.model_dump(), "config": config.model_dump()}
+    if manifest.exists():
+        if not resume:
+            raise UsageError(
+                f"{folder} already holds a campaign.",
+                "Nothing recorded is ever overwritten.",
+                f"Type `rig record --resume {folder}`, or name another folder with --out.",
+            )
+        if json.loads(manifest.read_text()) != json.loads(json.dumps(described)):
+            raise UsageError(
+                f"The campaign in {folder} was begun with another protocol or configuration.",
+                "Runs made in two ways are not one campaign.",
+                "Record into another folder.",
+            )
+    elif any(folder.iterdir()):
+        raise UsageError(
+            f"{folder} is not empty and holds no campaign.", fix="Name another folder."
+        )
+    else:
+        write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
+    plans = protocol.plans()
+    check_disk_space(folder, plans)
+    return [plan for plan in plans if not _log_path(folder, plan).exists()]
+
+
+def record_campaign(
+    session: Session,
+    plans: Iterable[RunPlan],
+    folder: Path,
+    notes: str = "",
+    on_progress: Progress | None = None,
+) -> Iterator[RunResult]:
+    """Record runs one after the other; yields each as soon as its log is complete.
+
+    Args:
+        session: An open session.
+        plans: The runs.
+        folder: Where the logs go.
+        notes: Operator's notes, kept in every log.
+        on_progress: Told of the samples as they come.
+    """
+    for _ in session.rest(REST_S):
+        pass
+    session.settle()
+    epoch_ns = _epoch_ns(session, folder)
+    for plan in plans:
+        yield _record_run(session, plan, _log_path(folder, plan), epoch_ns, notes, on_progress)
+
+
+def _record_run(
+    session: Session,
+    plan: RunPlan,
+    path: Path,
+    epoch_ns: int,
+    notes: str,
+    on_progress: Progress | None,
+) -> RunResult:
+    before = session.take_zeros(REST_S)
+    motion = motion_of(plan, session.spindle_angle_rad)
+    expected = motion.last - motion.first
+    lost_before = session.counters["lost"]
+    samples = 0
+    readings = session.play(motion.target_angle_rad, motion.load_command_a)
+    first = next(r for r in readings if len(_of_run(r, motion)))
+    run_start_us = int(_of_run(first, motion).tick_us[0])
+    with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
+        for reading in itertools.chain([first], readings):
+            run = _of_run(reading, motion)
+            if len(run):
+                _write_reading(log, run, run_start_us, epoch_ns)
+                samples += len(run)
+                if on_progress:
+                    on_progress(plan.name, samples, expected)
+            log.poll()
+        after = session.take_zeros(REST_S)
+        drift = drift_verdicts(
+            before, after, session.calibrations, session.config.drift.model_dump()
+        )
+        lost = session.counters["lost"] - lost_before
+        result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
+        log.close(_end_of_run(result, after, session.counters))
+    return result
+
+
+def _of_run(reading: Reading, motion: Motion) -> Reading:
+    """Return the samples that belong to the run itself, not to its approach or release."""
+    return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
+
+
+def _new_log(
+    session: Session,
+    plan: RunPlan,
+    path: Path,
+    started_at_ns: int,
+    before: Mapping[str, SensorZero],
+    notes: str,
+) -> LogWriter:
+    config, calibrations = session.config, session.calibrations
+    info = RunInfo(
+        name=plan.name,
+        rig=config.name,
+        instrument=config.instrument.identity(),
+        conditions=plan.conditions,
+        notes=notes,
+        started_at_ns=started_at_ns,
+        duration_s=plan.duration_s,
+        calibrations={calibrations.name: calibrations.content_hash},
+        zeros_before=_mean_counts(before),
+        details={
+            "rig_version": __version__,
+            "firmware_version": session.identity.firmware_version,
+            "logger_serial": session.identity.serial,
+        },
+    )
+    settings = json.dumps(config.model_dump(), indent=1).encode()
+    attachments = [
+        Attached("config.json", "application/json", settings),
+        Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
+    ]
+    _set_aside_part(path)
+    streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
+    return LogWriter(path, info, streams, attachments=attachments)
+
+
+def _write_reading(log: LogWriter, reading: Reading, run_start_us: int, epoch_ns: int) -> None:
+    """Write a stretch of the run to both streams, with the run's own clock in `time_s`."""
+    log_time_ns = epoch_ns + reading.tick_us * 1000
+    sequence = reading.counts["sequence"]
+    time_s = (reading.tick_us - run_start_us) * 1e-6
+    log.write(
+        SAMPLE,
+        {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags},
+        log_time_ns,
+    )
+    counts = {field.name: reading.counts[field.name] for field in COUNTS_STREAM.fields}
+    log.write(COUNTS, counts, log_time_ns)
+
+
+def _end_of_run(
+    result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
+) -> RunEnd:
+    return RunEnd(
+        clean=result.complete,
+        reason="" if result.complete else result.remark,
+        expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
+        counters=counters,
+        zeros_after=_mean_counts(after),
+        drift={d.channel: d.after - d.before for d in result.drift},
+        drift_verdict="drifted: " + ", ".join(result.drifted) if result.drifted else "steady",
+    )
+
+
+def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
+    return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
+
+
+def _log_path(folder: Path, plan: RunPlan) -> Path:
+    return folder / f"{plan.name}.mcap"
+
+
+def _set_aside_part(path: Path) -> None:
+    """Rename what an aborted run left, so that the run can be made again and nothing is lost."""
+    part = path.with_name(path.name + PART_SUFFIX)
+    attempt = 1
+    while part.exists():
+        aside = path.with_name(f"{path.stem}.aborted-{attempt}.mcap{PART_SUFFIX}")
+        if not aside.exists():
+            part.rename(aside)
+        attempt += 1
+
+
+def _epoch_ns(session: Session, folder: Path) -> int:
+    """Return the host's time at the device's tick 0, ns since the Unix epoch.
+
+    A simulated rig is faster than real time, so a resumed campaign could begin before the last run
+    ended: it begins a second after what is there instead.
+    """
+    now_ns = time.time_ns() - session.newest_tick_us * 1000
+    return max([now_ns, *(_end_ns(path) + 1_000_000_000 for path in folder.glob("*.mcap"))])
+
+
+def _end_ns(path: Path) -> int:
+    """Return when a recorded run ended, ns since the Unix epoch; 0 when its log does not say."""
+    run = read_log(path, topics=(), checksums=False).run
+    if run is None or run.started_at_ns is None or run.duration_s is None:
+        return 0
+    return run.started_at_ns + round(run.duration_s * 1e9)

@@ -1,0 +1,195 @@
+"""Figures as inline SVG: functions of arrays, drawn without a display and without global state."""
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from markupsafe import Markup, escape
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from estimation.recording import FloatArray
+
+COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
+"""Told apart in light and in dark, and by eyes that mix up red and green."""
+
+_INK = "#010203"  # stands for the colour of the page's text, and is replaced by it
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",  # text stays text: small, searchable, in the page's own font
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "legend.frameon": False,
+    **dict.fromkeys(
+        ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK
+    ),
+}
+POINTS = 1500
+"""Most points a line is drawn with."""
+
+
+def _drawn(figure: Figure, caption: str) -> Markup:
+    """Return a figure as an SVG element that refers to nothing outside itself."""
+    buffer = io.StringIO()
+    salt = sha256(caption.encode()).hexdigest()[
+        :8
+    ]  # keeps the clip paths and markers of two figures apart
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+        figure.savefig(buffer, format="svg", metadata=nothing)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :].strip()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
+    text = re.sub(r' (?:width|height)="[^"]*pt"', "", text, count=2)  # the page sets the size
+    text = re.sub(r' id="[\w.]+_\d+"', "", text)  # names of groups, which nothing refers to
+    text = text.replace(_INK, "currentColor")
+    text = text.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
+    return Markup(text)  # noqa: S704 - drawn here, not taken from anyone
+
+
+def _axes(width_in: float, height_in: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        figure.patch.set_alpha(0.0)
+        axes = [figure.add_subplot(1, columns, k + 1) for k in range(columns)]
+    for ax in axes:
+        ax.patch.set_alpha(0.0)
+        ax.grid(visible=True, color="#8888", linewidth=0.4)
+    return figure, axes
+
+
+def _legend_above(ax: Axes) -> None:
+    """Put the legend on one line above the axes, where it hides no data."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=4)
+
+
+def _thin(values: FloatArray) -> FloatArray:
+    return values[:: max(1, -(-len(values) // POINTS))]
+
+
+def over_time(
+    time_s: FloatArray,
+    series: Mapping[str, FloatArray],
+    unit: str,
+    caption: str,
+    shaded: np.ndarray | None = None,
+) -> Markup:
+    """Draw signals over time.
+
+    Args:
+        time_s: Shape (n,), s.
+        series: Name to values, each of shape (n,); NaN leaves a gap.
+        unit: Unit of the values.
+        caption: What is seen, also for readers who do not see it.
+        shaded: Samples to shade, shape (n,), or None.
+    """
+    figure, (ax,) = _axes(7.2, 2.6)
+    with mpl.rc_context(_STYLE):
+        time = _thin(time_s)
+        for colour, (name, values) in zip(COLOURS, series.items(), strict=False):
+            ax.plot(time, _thin(values), color=colour, linewidth=1.1, label=name)
+        if shaded is not None:
+            ax.fill_between(
+                time,
+                0,
+                1,
+                where=_thin(shaded),
+                transform=ax.get_xaxis_transform(),
+                color="#8883",
+                linewidth=0,
+            )
+        ax.set_xlabel("time, s")
+        ax.set_ylabel(unit)
+        ax.margins(x=0)
+        _legend_above(ax)
+    return _drawn(figure, caption)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel of a figure: values against a variable.
+
+    Attributes:
+        label: Name and unit of the variable.
+        x: The variable, shape (n,).
+        y: The values, shape (n,).
+    """
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+
+
+def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24) -> Markup:
+    """Draw values against several variables: mean and the middle 90 % in each bin.
+
+    Args:
+        panels: The panels, side by side, on one scale.
+        y_label: Name and unit of the values.
+        caption: What is seen.
+        bins: Bins over the middle 98 % of each variable; bins with under ten samples are left out.
+    """
+    figure, axes = _axes(7.2, 2.5, len(panels))
+    with mpl.rc_context(_STYLE):
+        for ax, panel in zip(axes, panels, strict=True):
+            x, mean, low, high = binned(panel.x, panel.y, bins)
+            ax.fill_between(x, low, high, color=COLOURS[0], alpha=0.25, linewidth=0)
+            ax.plot(x, mean, color=COLOURS[0], linewidth=1.4)
+            ax.axhline(0, color=_INK, linewidth=0.6)
+            ax.set_xlabel(panel.label)
+        axes[0].set_ylabel(y_label)
+        limits = [ax.get_ylim() for ax in axes]
+        for ax in axes:
+            ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+    return _drawn(figure, caption)
+
+
+def binned(
+    x: FloatArray, y: FloatArray, bins: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return bin centres, mean, 5th and 95th percentile of y over bins of x."""
+    low, high = np.percentile(x, [1, 99])
+    edges = np.linspace(low, high if high > low else low + 1.0, bins + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
+    full = [k for k in range(bins) if np.count_nonzero(place == k) >= 10]
+    parts = [y[place == k] for k in full]
+    centres = (edges[:-1] + edges[1:])[full] / 2
+    mean = np.array([part.mean() for part in parts])
+    spread = np.array([np.percentile(part, [5, 95]) for part in parts]).reshape(-1, 2)
+    return centres, mean, spread[:, 0], spread[:, 1]
+
+
+def bars(
+    values: Mapping[str, float],
+    unit: str,
+    caption: str,
+    line: tuple[str, float] | None = None,
+) -> Markup:
+    """Draw one bar a name.
+
+    Args:
+        values: Name to value.
+        unit: Name and unit of the values.
+        caption: What is seen.
+        line: Name and height of a level to compare with, or None.
+    """
+    figure, (ax,) = _axes(7.2, 2.2)
+    with mpl.rc_context(_STYLE):
+        ax.bar(range(len(values)), list(values.values()), color=COLOURS[0], width=0.7)
+        if line is not None:
+            ax.axhline(line[1], color=COLOURS[1], linewidth=1.2, label=line[0])
+            _legend_above(ax)
+        many = len(values) > 12
+        names = [name.replace("_", " ") for name in values]
+        ax.set_xticks(range(len(values)), names, rotation=90 if many else 0, fontsize=7)
+        ax.grid(visible=False, axis="x")
+        ax.set_ylabel(unit)
+        ax.margins(x=0.01)
+    return _drawn(figure, caption)

@@ -1,0 +1,167 @@
+"""The study of O'Neill et al. 2018 as tables for any medium, as Markdown and as a page."""
+
+import numpy as np
+from markupsafe import Markup
+
+from estimation import oneill
+from estimation.scores import Score
+from rig.reports import figures
+from rig.reports.render import render
+from rig.reports.table import TextTable, to_markdown
+from rig.studies.oneill import PROTOCOLS, PaperRow, Result, Study
+
+TITLE = "Linear torque surrogates: Table I of O'Neill et al. 2018, made again"
+
+
+HEADINGS = {
+    "random": "samples at random",
+    "run-wise": "runs",
+    "lofo": "a frequency (LOFO)",
+    "lopo": "a power level (LOPO)",
+}
+"""Heading of each protocol that holds something out."""
+
+
+def _mn_m(torque_n_m: float) -> str:
+    return f"{1e3 * torque_n_m:.2f}"
+
+
+def lead(study: Study) -> str:
+    """Return the study's result in one sentence or two."""
+    kept = {row.surrogate: row for row in study.rows if row.protocol == "run-wise"}
+    best = min(kept.values(), key=lambda row: row.score.rmse)
+    return (
+        f"A straight line through the {best.surrogate} estimates the proximal torque to"
+        f" {_mn_m(best.score.rmse)} mN m on whole runs it has not seen (RMSE over"
+        f" {best.score.samples:,} closing samples of {best.runs} runs)."
+    )
+
+
+def notes(study: Study) -> list[str]:
+    """Return what a reader must know: the sample counts, runs left out, and the study's notes."""
+    counts = (
+        f"The paper's processing leaves {study.closing_samples:,} closing samples; the paper states"
+        f" {study.paper_samples:,}, the public data is known to give {study.public_samples:,}."
+    )
+    if study.measured:
+        same = study.closing_samples == study.public_samples
+        counts += (
+            " This is the public data's count, so the processing is the published one; the public"
+            " set is probably not the paper's exact set."
+            if same
+            else " This is neither count: files are missing or were changed."
+        )
+    left_out = [f"Run {name} left out: {why}." for name, why in study.left_out.items()]
+    return [counts, *left_out, *study.notes]
+
+
+def tables(study: Study) -> list[TextTable]:
+    """Return the study's tables."""
+    return [_table_i(study), _held_out_table(study)]
+
+
+def _table_i(study: Study) -> TextTable:
+    """Return our linear rows beside the paper's and beside others' reproduction."""
+    rows = []
+    for name in dict.fromkeys(row.surrogate for row in study.rows):
+        for row in study.rows:
+            if row.surrogate == name and row.protocol in ("authors", "random"):
+                cells = [*_errors(row.score), f"{row.score.samples:,}"]
+                rows.append([f"{name}, {row.protocol}", *cells])
+        rows.append([f"{name}, paper", *_errors(study.paper[name]), ""])
+        rows.append([f"{name}, others", "", "", _mn_m(study.others_reach_n_m[name]), "", "", ""])
+    columns = ["linear fit, mN m", "MAE", "95th pct", "RMSE", "R", "rho", "samples"]
+    note = "; ".join(f"{name}: {PROTOCOLS[name]}" for name in ("authors", "random"))
+    note += "; paper: Table I as printed; others: the authors' way on the public data, published."
+    if not study.measured:
+        note += " The paper's rows are of its own instrument, not of this data."
+    return TextTable("Proximal torque, linear rows of Table I", columns, rows, note)
+
+
+def _errors(row: Score | PaperRow) -> list[str]:
+    cells = [_mn_m(row.mae), _mn_m(row.p95), _mn_m(row.rmse)]
+    return [*cells, f"{row.pearson_r:.2f}", f"{row.spearman_rho:.2f}"]
+
+
+def _held_out_table(study: Study) -> TextTable:
+    """Return the errors on runs, frequencies and power levels that were not fitted."""
+    found: dict[str, dict[str, float]] = {}
+    for row in study.rows:
+        found.setdefault(row.surrogate, {})[row.protocol] = row.score.rmse
+    tried = [name for name in PROTOCOLS if name != "authors"]
+    protocols = [name for name in tried if any(name in by for by in found.values())]
+    rows = [
+        [name, *(_mn_m(by[p]) if p in by else "" for p in protocols)] for name, by in found.items()
+    ]
+    note = "; ".join(f"{HEADINGS[name]}: {PROTOCOLS[name]}" for name in protocols) + "."
+    columns = ["surrogate", *(HEADINGS[name] for name in protocols)]
+    return TextTable("RMSE by what was held out, mN m", columns, rows, note)
+
+
+def markdown(study: Study) -> str:
+    """Return the study as a Markdown page."""
+    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *notes(study)]
+    parts += [to_markdown(table).rstrip() for table in tables(study)]
+    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+
+
+def page(result: Result) -> str:
+    """Return the study as a page of HTML."""
+    study = result.study
+    return render(
+        "study.html",
+        {
+            "title": TITLE,
+            "lead": lead(study),
+            "source": study.source,
+            "notes": notes(study),
+            "tables": tables(study),
+            "figures": _figures(result),
+            "provenance": study.provenance,
+        },
+    )
+
+
+def _figures(result: Result) -> list[tuple[str, Markup]]:
+    run = result.example
+    channel = oneill.SURROGATES[result.surrogate]
+    sensor = 1e3 * run[oneill.TARGET]
+    estimate = 1e3 * result.line(run[channel])
+    time_caption = (
+        f"Run {run.name}, the run of median error: sensor, and the line through the"
+        f" {result.surrogate} fitted on all other runs. Shaded: closing samples."
+    )
+    columns = result.held_out.columns
+    error = 1e3 * (columns[oneill.ESTIMATE] - columns[oneill.TARGET])
+    variables = {
+        "spindle angle, rad": "spindle_angle_rad",
+        "spindle speed, rad/s": oneill.SPEED,
+        "torque at the jaw, mN m": "distal_torque_n_m",
+    }
+    panels = [
+        figures.Panel(label, columns[name] * (1e3 if "mN m" in label else 1.0), error)
+        for label, name in variables.items()
+        if name in columns
+    ]
+    against_caption = (
+        "Error of the run-wise estimate: mean and the middle 90 % of the closing samples."
+    )
+    by_run = {name: 1e3 * value for name, value in result.study.rmse_by_run_n_m.items()}
+    median = float(np.median(list(by_run.values())))
+    return [
+        (
+            time_caption,
+            figures.over_time(
+                run.time_s,
+                {"sensor": sensor, "estimate": estimate},
+                "proximal torque, mN m",
+                time_caption,
+                oneill.is_closing(run),
+            ),
+        ),
+        (against_caption, figures.against(panels, "error, mN m", against_caption)),
+        (
+            "Run-wise RMSE of each run.",
+            figures.bars(by_run, "RMSE, mN m", "Run-wise RMSE of each run.", ("median", median)),
+        ),
+    ]

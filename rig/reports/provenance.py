@@ -1,0 +1,72 @@
+"""Where a result comes from: the day, the commit, the seed and the command that made it."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import rig
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What is needed to make a result again.
+
+    Attributes:
+        date: Day and time, UTC, ISO 8601 to the minute.
+        commit: Commit of the source tree, with `+changes` when files differ from it; `unknown`
+            outside a git tree.
+        version: Version of rig.
+        seed: Seed of everything random.
+        command: Command line; of a path only the last part, since the others are the machine's own.
+    """
+
+    date: str
+    commit: str
+    version: str
+    seed: int
+    command: str
+
+    @classmethod
+    def now(cls, seed: int) -> "Provenance":
+        """Return the provenance of what this process makes now."""
+        words = [Path(word).name if "/" in word else word for word in sys.argv]
+        return cls(
+            date=datetime.now(UTC).strftime("%Y-%m-%dT%H:%MZ"),
+            commit=commit(Path(rig.__file__).parents[1]),
+            version=rig.__version__,
+            seed=seed,
+            command=" ".join(words),
+        )
+
+    def line(self) -> str:
+        """Return it as one line of text."""
+        return (
+            f"Made {self.date} by `{self.command}`, rig {self.version}, commit {self.commit}, "
+            f"seed {self.seed}."
+        )
+
+
+def commit(tree: Path) -> str:
+    """Return the short commit of a source tree, or `unknown` when it is not a git tree.
+
+    Args:
+        tree: Root of the source tree.
+    """
+    git = shutil.which("git")
+    if git is None or not (tree / ".git").exists():
+        return "unknown"
+    head = _ask(git, tree, "rev-parse", "--short", "HEAD")
+    if head is None:
+        return "unknown"
+    changes = _ask(git, tree, "status", "--porcelain", "--untracked-files=no")
+    return head + ("+changes" if changes else "")
+
+
+def _ask(git: str, tree: Path, *words: str) -> str | None:
+    answer = subprocess.run(  # noqa: S603 - git itself, with fixed words
+        [git, "-C", str(tree), *words], capture_output=True, text=True, check=False, timeout=20
+    )
+    return answer.stdout.strip() if answer.returncode == 0 else None

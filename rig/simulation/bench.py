@@ -1,0 +1,263 @@
+"""The simulated bench: plant, sensors and controller in one compiled loop.
+
+Order within a tick: sensors are sampled, the controller computes this tick's command from them, the
+row is written, then the physics moves 1 ms with that command.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from drivers.teensy import control
+from drivers.teensy import limits as board_limits
+from rig.errors import UsageError
+from rig.simulation import hidden, noise, parameters, plant, sensors
+from rig.simulation.parameters import PlantParameters, SensorParameters
+
+REFERENCE_START_COUNT = 1366
+"""Spindle count at which the reference campaign's runs start: 60 degrees open."""
+
+UNBOUNDED = np.array([2**31 - 1] * 4 + [-(2**31), 2**31 - 1], np.int32)
+"""Limits that no count is beyond, in the order of `drivers.teensy.limits`."""
+
+
+class BenchInputError(UsageError):
+    """The bench was asked for something it cannot run."""
+
+
+def _fingerprint() -> str:
+    """Return a hash of every source the compiled loops are made of.
+
+    Numba's cache looks only at the file a function is written in. The loops hold this hash as a
+    closure variable, which is part of the cache's key, so a change in any of the files recompiles.
+    It is the only closure variable: a function held that way would change the key in each process.
+    """
+    digest = hashlib.sha256()
+    for module in (control, board_limits, hidden, noise, parameters, plant, sensors):
+        digest.update(Path(str(module.__file__)).read_bytes())
+    return digest.hexdigest()
+
+
+def _board_call(
+    typing_context: Any, function: Any, board: Any, tick_us: Any, inputs: Any, outputs: Any
+) -> Any:
+    """Call `void tick(void *board, uint32_t us, const int32_t *inputs, int32_t *outputs)`."""
+    from llvmlite import ir  # type: ignore[import-untyped]
+
+    signature = types.void(types.intp, types.intp, types.uint32, types.intp, types.intp)
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [pointer, ir.IntType(32), pointer, pointer])
+        callee = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(
+            callee,
+            [
+                builder.inttoptr(arguments[1], pointer),
+                arguments[2],
+                builder.inttoptr(arguments[3], pointer),
+                builder.inttoptr(arguments[4], pointer),
+            ],
+        )
+        return context.get_dummy_value()
+
+    return signature, build
+
+
+_call_board_tick: Any = intrinsic(_board_call)
+
+
+def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Return the compiled loops: with the controller inside, and with a board called by pointer."""
+
+    @numba.njit(cache=True)
+    def with_controller(  # type: ignore[no-untyped-def]
+        state,
+        p,
+        s,
+        effects,
+        seed,
+        first_tick,
+        target,
+        load_ma,
+        armed,
+        control_state,
+        gains,
+        bounds,
+        rows,
+    ):
+        _ = source
+        for k in range(rows.shape[0]):
+            row = rows[k]
+            sensors.sample(state, s, effects, seed, first_tick + k, row)
+            command, load = 0, 0
+            if armed:
+                armed = not board_limits.beyond_limits(
+                    bounds,
+                    row[sensors.SPINDLE],
+                    row[sensors.PROXIMAL],
+                    row[sensors.DISTAL],
+                    row[sensors.CURRENT],
+                )
+            if armed:
+                command = control.control_tick(
+                    control_state, gains, target[k], row[sensors.SPINDLE], row[sensors.MOTOR]
+                )
+                load = load_ma[k]
+            row[sensors.COMMAND_E4] = command
+            row[sensors.LOAD_MA] = load
+            current = -p.command_full_scale_a * 1e-4 * command
+            plant.step_tick(state, p, effects, current, 1e-3 * load)
+
+    @numba.njit(cache=True)
+    def with_board(  # type: ignore[no-untyped-def]
+        state, p, s, effects, seed, first_tick, ticks, function, board, tick_us
+    ):
+        _ = source
+        inputs = np.zeros(7, np.int32)
+        outputs = np.zeros(2, np.int32)
+        for k in range(ticks):
+            sensors.sample(state, s, effects, seed, first_tick + k, inputs)
+            _call_board_tick(
+                function,
+                board,
+                np.uint32(tick_us + 1000 * k),
+                inputs.ctypes.data,
+                outputs.ctypes.data,
+            )
+            current = -p.command_full_scale_a * 1e-4 * outputs[0]
+            plant.step_tick(state, p, effects, current, 1e-3 * outputs[1])
+
+    return with_controller, with_board
+
+
+_run_with_controller, _run_with_board = _build_loops(_fingerprint())
+
+
+class SimulatedBench:
+    """A rig in virtual time: the same seed gives the same counts however the calls are cut.
+
+    Args:
+        parameters: The plant.
+        sensors: The sensors.
+        effects: Hidden effects that are switched on.
+        seed: Seed of the sensors' noise and drift.
+        start_count: Spindle encoder count at which the rig stands at rest, with no torque.
+    """
+
+    def __init__(
+        self,
+        parameters: PlantParameters | None = None,
+        sensors_parameters: SensorParameters | None = None,
+        effects: Iterable[hidden.HiddenEffect] = (),
+        seed: int = 0,
+        start_count: int = REFERENCE_START_COUNT,
+    ) -> None:
+        self.parameters = parameters or PlantParameters()
+        self.sensors = sensors_parameters or SensorParameters()
+        self.effects = tuple(effects)
+        self.ticks_done = 0
+        start_rad = -(start_count + 0.5) * sensors.TURN_RAD / self.sensors.spindle_count_per_turn
+        self._state = plant.rest_state(self.parameters, start_rad)
+        self._constants = plant.constants_of(self.parameters)
+        self._scales = sensors.scales_of(self.sensors)
+        self._table = hidden.table(self.effects)
+        self._seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """A copy of the plant's true state, places as in `rig.simulation.plant`."""
+        return self._state.copy()
+
+    def advance(
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        armed: bool,
+        control_state: NDArray[np.float64],
+        gains: NDArray[np.float64],
+        limits: NDArray[np.int32] | None = None,
+    ) -> NDArray[np.int32]:
+        """Run closed-loop ticks with the controller of `drivers.teensy.control`.
+
+        Args:
+            ticks: Number of ticks of 1 ms.
+            target: Target of the spindle, encoder counts, shape (ticks,).
+            load_ma: Current of the load motor, mA, shape (ticks,).
+            armed: When false, command and load are 0 and the controller does not run.
+            control_state: State of the controller, changed in place.
+            gains: Gains of the controller, shape (5,).
+            limits: Limits as in `drivers.teensy.limits`, shape (6,); none when None. From the first
+                tick on whose counts are beyond them, command and load are 0.
+
+        Returns:
+            Counts with raw signs, shape (ticks, 9), int32, columns as in `rig.simulation.sensors`.
+
+        Raises:
+            BenchInputError: A shape does not fit.
+        """
+        for name, array in (("target", target), ("load_ma", load_ma)):
+            if array.shape != (ticks,):
+                raise BenchInputError(
+                    f"{name} has shape {array.shape}.", f"{ticks} ticks need shape ({ticks},)."
+                )
+        rows = np.empty((ticks, 9), np.int32)
+        _run_with_controller(
+            self._state,
+            self._constants,
+            self._scales,
+            self._table,
+            self._seed,
+            self.ticks_done,
+            np.ascontiguousarray(target, np.int32),
+            np.ascontiguousarray(load_ma, np.int32),
+            armed,
+            control_state,
+            np.ascontiguousarray(gains, np.float64),
+            UNBOUNDED if limits is None else np.ascontiguousarray(limits, np.int32),
+            rows,
+        )
+        self.ticks_done += ticks
+        return rows
+
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        """Run ticks with a board in the loop, called by pointer from the compiled loop.
+
+        Args:
+            ticks: Number of ticks of 1 ms.
+            tick_address: Address of `void tick(void *board, uint32_t tick_us, const int32_t
+                *inputs, int32_t *outputs)`: seven counts in, command_e4 and load_ma out.
+            board_address: First argument of that function; may be 0 if the function takes that.
+            tick_us: Device clock at the first tick; 1000 is added each tick, wrapping at 2^32.
+
+        Raises:
+            BenchInputError: The function's address is null or the number of ticks negative.
+        """
+        if tick_address == 0 or ticks < 0:
+            raise BenchInputError(
+                f"A board cannot be run for {ticks} ticks through address {tick_address:#x}.",
+                fix="Pass the address of the loaded library's `rig_board_tick`.",
+            )
+        _run_with_board(
+            self._state,
+            self._constants,
+            self._scales,
+            self._table,
+            self._seed,
+            self.ticks_done,
+            ticks,
+            tick_address,
+            board_address,
+            tick_us,
+        )
+        self.ticks_done += ticks

@@ -1,0 +1,48 @@
+"""A campaign of the simulated rig without logs in between: each run is simulated when it is read.
+
+For studies that need many runs and no bytes. `rig record` goes the whole way instead, through the
+logger's frames, its driver and the log.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from estimation.campaign import Campaign, Run
+from estimation.recording import Instrument, Recording
+from rig.motion import motion_of
+from rig.protocol import RunPlan, load_protocol
+from rig.simulation.bench import SimulatedBench
+from rig.simulation.play import play
+from rig.trajectory import SAMPLE_RATE_HZ
+
+
+def simulate_reference_campaign(seed: int = 0, protocol: str = "reference") -> Campaign:
+    """Return a campaign of the simulated rig, no hidden effect switched on.
+
+    Args:
+        seed: Seed of the sensors' noise; each run has its own, made of this and its number.
+        protocol: Protocol file or the name of a shipped one.
+
+    Raises:
+        UsageError: There is no such protocol.
+    """
+    plans = load_protocol(protocol).plans()
+    return Campaign(tuple(Run(p.name, partial(_simulate, p, seed, i)) for i, p in enumerate(plans)))
+
+
+def _simulate(plan: RunPlan, seed: int, index: int) -> Recording:
+    bench = SimulatedBench(seed=seed * 100_003 + index)
+    motion = motion_of(plan, float(plan.target_angle_rad[0]))
+    columns = play(bench, motion.target_angle_rad, motion.load_command_a)
+    run = slice(motion.first, motion.last)
+    columns = {name: values[run] for name, values in columns.items()}
+    return Recording(
+        plan.name,
+        np.arange(motion.last - motion.first) / SAMPLE_RATE_HZ,
+        columns,
+        conditions=plan.conditions,
+        rig="simulated rig",
+        instrument=Instrument(model="Maryland", serial="SIM-TOOL-1", side="left"),
+        source=f"simulated, seed {seed}",
+    )

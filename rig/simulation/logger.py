@@ -1,0 +1,48 @@
+"""Open the simulated logger: plant, board and a transport in virtual time."""
+
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
+from drivers.transport.simulated import Board, SimulatedTransport
+from rig.config import SimulationSection
+from rig.simulation import hidden, parameters
+from rig.simulation.bench import SimulatedBench
+
+PACED_STEP_S = 0.05
+UNPACED_STEP_S = 0.2
+
+
+def open_simulated_logger(
+    simulation: SimulationSection, url: str = "sim://", pace: float | None = None
+) -> SimulatedTransport:
+    """Return the transport of a simulated rig.
+
+    Args:
+        simulation: Seed, spread, hidden effects, and whether the compiled firmware is in the loop.
+        url: Name for messages.
+        pace: Virtual seconds a real second, None for as fast as possible.
+
+    Raises:
+        UnknownHiddenEffectError: A hidden effect has no such name.
+    """
+    effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
+    if simulation.draw_hidden is not None:
+        effects.append(hidden.draw(simulation.draw_hidden))
+    plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
+    if simulation.spread:
+        plant = parameters.vary(plant, simulation.seed, simulation.spread)
+        sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
+    bench = SimulatedBench(plant, sensors, effects, simulation.seed)
+    if uses_firmware(simulation):
+        return _transport(FirmwareBoard(bench), url, pace)
+    return _transport(TeensyFake(bench), url, pace)
+
+
+def _transport(board: Board, url: str, pace: float | None) -> SimulatedTransport:
+    # nobody watches a rig that is faster than real time, so it may move in larger steps
+    step_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
+    return SimulatedTransport(board, url, step_s=step_s, pace=pace)
+
+
+def uses_firmware(simulation: SimulationSection) -> bool:
+    """Say whether the compiled firmware core is in the loop, rather than the Python fake."""
+    return simulation.firmware and firmware_library() is not None

@@ -1,0 +1,233 @@
+"""The physics of the simulated rig: three inertias, two springs, Coulomb friction, compiled.
+
+Motor shaft, spindle and jaw, all closing-positive:
+
+    Jm m'' = Kt i - bm m' - T / N - friction(Fm)                    motor shaft
+    Js s'' = T - r C - bs s' - friction(Fs + mu |C|)                spindle
+    Jq q'' = C - bq q' - kL iL - stop - friction(Fq + FL)           jaw and load motor
+    T = kg (m / N - s) + cg (m' / N - s')                           twist of the gearhead
+    C = kc (r s + q0 - q) + cc (r s' - q')                          cable, torque at the jaw
+
+Both currents follow their commands with a first-order lag. Velocities are stepped first and
+positions with the new velocities (semi-implicit Euler). Coulomb friction is solved, not smoothed:
+in each step it takes the velocity the other torques would give towards zero by at most F dt / J, so
+a body sticks exactly while the rest of the torques stay below F, and cannot chatter (time stepping
+for dry friction; J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics",
+1988). Nothing in the loop allocates and floating point is strict, so results repeat to the bit.
+"""
+
+from collections import namedtuple
+from dataclasses import astuple, fields
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.simulation import hidden
+from rig.simulation.parameters import PlantParameters
+
+TICK_S = 1e-3
+"""One tick of the logger, s."""
+
+(
+    MOTOR_ANGLE,
+    MOTOR_SPEED,
+    SPINDLE_ANGLE,
+    SPINDLE_SPEED,
+    JAW_ANGLE,
+    JAW_SPEED,
+    CURRENT,
+    LOAD_CURRENT,
+    PROXIMAL_TORQUE,
+    DISTAL_TORQUE,
+    BRISTLE,
+    CREEP_STRAIN,
+    PROXIMAL_DRIFT,
+    DISTAL_DRIFT,
+    STATE_SIZE,
+) = range(15)
+"""Places in the state, SI units: motion, currents, what the torque sensors see, the states of two
+hidden effects and the drift of the two torque zeros."""
+
+_Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
+
+
+def constants_of(parameters: PlantParameters) -> Any:
+    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
+    return _Constants(*(float(value) for value in astuple(parameters)))
+
+
+def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray[np.float64]:
+    """Return the state of a rig at rest with no torque anywhere, shape (`STATE_SIZE`,).
+
+    Args:
+        parameters: Parameters of the plant.
+        spindle_angle_rad: Where the spindle stands, closing positive.
+    """
+    state = np.zeros(STATE_SIZE)
+    state[MOTOR_ANGLE] = parameters.gear_ratio * spindle_angle_rad
+    state[SPINDLE_ANGLE] = spindle_angle_rad
+    state[JAW_ANGLE] = parameters.cable_ratio * spindle_angle_rad + parameters.jaw_zero_rad
+    return state
+
+
+@numba.njit()
+def clip(value: float, limit: float) -> float:
+    """Return the value brought into plus and minus the limit."""
+    return min(max(value, -limit), limit)
+
+
+@numba.njit()
+def step_tick(
+    state: NDArray[np.float64],
+    p: Any,
+    effects: NDArray[np.float64],
+    current_target_a: float,
+    load_target_a: float,
+) -> None:
+    """Move the plant by one tick under constant commands.
+
+    The proximal sensor carries the drive unit: it sees the gear's output torque and the reaction to
+    the rotor's acceleration. The distal sensor carries the load motor: it sees that motor's torque
+    and its friction. Both are left in the state as of the last substep.
+
+    Args:
+        state: Shape (`STATE_SIZE`,), changed in place.
+        p: From `constants_of`.
+        effects: From `hidden.table`.
+        current_target_a: Commanded motor current.
+        load_target_a: Commanded load current.
+    """
+    steps = int(p.substeps_ratio)
+    dt = TICK_S / steps
+    target = clip(current_target_a, p.current_limit_a)
+    current_gain = min(dt / p.current_lag_s, 1.0)
+    load_gain = min(dt / p.load_lag_s, 1.0)
+    dt_motor, dt_spindle, dt_jaw = (
+        dt / p.rotor_inertia_kg_m2,
+        dt / p.spindle_inertia_kg_m2,
+        dt / p.jaw_inertia_kg_m2,
+    )
+    gear = 1.0 / p.gear_ratio
+    jaw_friction = p.jaw_friction_n_m + p.load_friction_n_m
+    load_share = p.load_friction_n_m / jaw_friction if jaw_friction > 0.0 else 0.0
+    strength = effects[:, hidden.STRENGTH]
+    ripple = strength[hidden.MOTOR_RIPPLE] != 0.0
+    load_friction = strength[hidden.GEAR_LOAD_FRICTION] != 0.0
+    stribeck = strength[hidden.GEAR_STRIBECK] != 0.0
+    backlash = strength[hidden.GEAR_BACKLASH] != 0.0
+    eccentric = strength[hidden.GEAR_ECCENTRICITY] != 0.0
+    sag = strength[hidden.TORQUE_CONSTANT_SAG] != 0.0
+    tight = strength[hidden.CABLE_POSITION_FRICTION] != 0.0
+    presliding = strength[hidden.CABLE_PRESLIDING] != 0.0
+    creep = strength[hidden.CABLE_CREEP] != 0.0
+    spring = strength[hidden.JAW_SPRING] != 0.0
+    end_stop = strength[hidden.END_STOP_SPRING] != 0.0
+
+    motor, motor_speed = state[MOTOR_ANGLE], state[MOTOR_SPEED]
+    spindle, spindle_speed = state[SPINDLE_ANGLE], state[SPINDLE_SPEED]
+    jaw, jaw_speed = state[JAW_ANGLE], state[JAW_SPEED]
+    current, load_current = state[CURRENT], state[LOAD_CURRENT]
+    bristle, strain = state[BRISTLE], state[CREEP_STRAIN]
+    proximal, distal = state[PROXIMAL_TORQUE], state[DISTAL_TORQUE]
+
+    for _ in range(steps):
+        current += current_gain * (target - current)
+        load_current += load_gain * (load_target_a - load_current)
+        motor_torque = p.torque_constant_n_m_a * current
+        if sag:
+            motor_torque *= hidden.torque_constant_sag_ratio(
+                effects[hidden.TORQUE_CONSTANT_SAG], current
+            )
+        if ripple:
+            motor_torque += hidden.motor_ripple_n_m(effects[hidden.MOTOR_RIPPLE], motor)
+
+        twist = gear * motor - spindle
+        twist_rate = gear * motor_speed - spindle_speed
+        spindle_per_twist = 1.0
+        if eccentric:
+            row = effects[hidden.GEAR_ECCENTRICITY]
+            slope = hidden.gear_eccentricity_slope(row, spindle)
+            twist += hidden.gear_eccentricity_rad(row, spindle)
+            twist_rate += slope * spindle_speed
+            spindle_per_twist -= slope
+        if backlash:
+            twist_torque = hidden.gear_backlash_n_m(
+                effects[hidden.GEAR_BACKLASH], twist, twist_rate, p.gear_stiffness_n_m_rad
+            )
+        else:
+            twist_torque = p.gear_stiffness_n_m_rad * twist
+        twist_torque += p.gear_damping_n_m_s_rad * twist_rate
+
+        stretch = p.cable_ratio * spindle + p.jaw_zero_rad - jaw
+        stretch_rate = p.cable_ratio * spindle_speed - jaw_speed
+        cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
+        if creep:
+            row = effects[hidden.CABLE_CREEP]
+            cable += hidden.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
+            strain += dt * (stretch_rate - hidden.cable_creep_rate(row, strain))
+
+        motor_limit = p.motor_friction_n_m
+        if load_friction:
+            row = effects[hidden.GEAR_LOAD_FRICTION]
+            motor_limit += gear * hidden.gear_load_friction_n_m(row, twist_torque)
+        if stribeck:
+            motor_limit += hidden.gear_stribeck_n_m(effects[hidden.GEAR_STRIBECK], motor_speed)
+        before = motor_speed
+        motor_speed += dt_motor * (
+            motor_torque - p.motor_viscous_n_m_s_rad * motor_speed - gear * twist_torque
+        )
+        motor_speed -= clip(motor_speed, dt_motor * motor_limit)
+        rotor_torque = (motor_speed - before) / dt_motor
+        motor += dt * motor_speed
+
+        spindle_limit = p.spindle_friction_n_m + p.cable_load_friction_ratio * abs(cable)
+        spindle_torque = (
+            spindle_per_twist * twist_torque
+            - p.cable_ratio * cable
+            - p.spindle_viscous_n_m_s_rad * spindle_speed
+        )
+        if tight:
+            spindle_limit += hidden.cable_position_friction_n_m(
+                effects[hidden.CABLE_POSITION_FRICTION], spindle
+            )
+        if presliding:
+            row = effects[hidden.CABLE_PRESLIDING]
+            spindle_torque -= hidden.cable_presliding_n_m(row, bristle)
+            bristle += dt * hidden.cable_presliding_rate(row, bristle, spindle_speed)
+        spindle_speed += dt_spindle * spindle_torque
+        spindle_speed -= clip(spindle_speed, dt_spindle * spindle_limit)
+        proximal = spindle_per_twist * twist_torque + rotor_torque
+        spindle += dt * spindle_speed
+
+        load = p.load_torque_n_m_a * load_current
+        jaw_torque = cable - p.jaw_viscous_n_m_s_rad * jaw_speed - load
+        if jaw < p.stop_open_rad:
+            jaw_torque += max(
+                p.stop_stiffness_n_m_rad * (p.stop_open_rad - jaw)
+                - p.stop_damping_n_m_s_rad * jaw_speed,
+                0.0,
+            )
+        elif jaw > p.stop_closed_rad:
+            jaw_torque -= max(
+                p.stop_stiffness_n_m_rad * (jaw - p.stop_closed_rad)
+                + p.stop_damping_n_m_s_rad * jaw_speed,
+                0.0,
+            )
+        if spring:
+            jaw_torque -= hidden.jaw_spring_n_m(effects[hidden.JAW_SPRING], jaw)
+        if end_stop:
+            jaw_torque -= hidden.end_stop_spring_n_m(effects[hidden.END_STOP_SPRING], jaw)
+        jaw_speed += dt_jaw * jaw_torque
+        impulse = clip(jaw_speed, dt_jaw * jaw_friction)
+        jaw_speed -= impulse
+        distal = load + load_share * impulse / dt_jaw
+        jaw += dt * jaw_speed
+
+    state[MOTOR_ANGLE], state[MOTOR_SPEED] = motor, motor_speed
+    state[SPINDLE_ANGLE], state[SPINDLE_SPEED] = spindle, spindle_speed
+    state[JAW_ANGLE], state[JAW_SPEED] = jaw, jaw_speed
+    state[CURRENT], state[LOAD_CURRENT] = current, load_current
+    state[BRISTLE], state[CREEP_STRAIN] = bristle, strain
+    state[PROXIMAL_TORQUE], state[DISTAL_TORQUE] = proximal, distal

@@ -1,0 +1,137 @@
+"""From physical quantities to counts, raw signs, and back with the nominal scales.
+
+All channels of a tick are sampled at the same instant, the start of the tick, before the controller
+runs; there is no delay between channels. Angles and the current are the state at that instant. The
+two torques are those of the physics step that ends there (0.05 ms long), which puts them 0.025 ms
+earlier. The command logged in a row acts from that row's instant on, so the current answers it in
+the next row.
+"""
+
+from collections import namedtuple
+from dataclasses import astuple, fields
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.simulation import hidden, plant
+from rig.simulation.noise import normal
+from rig.simulation.parameters import SensorParameters
+
+MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
+"""Columns of a row of counts; the board is given the first seven."""
+
+_Scales = namedtuple("_Scales", [item.name for item in fields(SensorParameters)])  # type: ignore[misc]
+
+TURN_RAD = 2.0 * np.pi
+
+
+def scales_of(parameters: SensorParameters) -> Any:
+    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
+    return _Scales(*(float(value) for value in astuple(parameters)))
+
+
+@numba.njit()
+def _converted(value: float, quantum: float, low: float, high: float) -> int:
+    """Return the count a converter gives: rounded to its quantum, held at its limits."""
+    return int(min(max(np.floor(value / quantum + 0.5) * quantum, low), high))
+
+
+@numba.njit()
+def sample(
+    state: NDArray[np.float64],
+    s: Any,
+    effects: NDArray[np.float64],
+    seed: np.uint64,
+    tick: int,
+    counts: NDArray[np.int32],
+) -> None:
+    """Write the seven sampled counts of this tick and let the torque zeros drift by one tick.
+
+    Args:
+        state: State of the plant, shape (`plant.STATE_SIZE`,); only its drifts are changed.
+        s: From `scales_of`.
+        effects: From `hidden.table`.
+        seed: Scrambled seed of the bench.
+        tick: Tick number since the bench was made.
+        counts: Where to write, shape (7,) or longer, int32.
+    """
+    walk = s.torque_walk_n_m_s * np.sqrt(plant.TICK_S)
+    state[plant.PROXIMAL_DRIFT] += s.proximal_ramp_n_m_s * plant.TICK_S + walk * normal(
+        seed, tick, 0
+    )
+    state[plant.DISTAL_DRIFT] += s.distal_ramp_n_m_s * plant.TICK_S + walk * normal(seed, tick, 1)
+
+    counts[MOTOR] = int(np.floor(state[plant.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
+    counts[SPINDLE] = int(
+        np.floor(-state[plant.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
+    )
+    counts[JAW] = int(np.floor(state[plant.JAW_ANGLE] / TURN_RAD * s.jaw_count_per_turn))
+
+    per_count = 1.0 / s.torque_n_m_per_count
+    limit = s.torque_limit_count
+    proximal = (
+        state[plant.PROXIMAL_TORQUE]
+        + s.proximal_offset_n_m
+        + state[plant.PROXIMAL_DRIFT]
+        + s.proximal_noise_n_m * normal(seed, tick, 2)
+    )
+    distal = (
+        state[plant.DISTAL_TORQUE]
+        + s.distal_offset_n_m
+        + state[plant.DISTAL_DRIFT]
+        + s.distal_noise_n_m * normal(seed, tick, 3)
+    )
+    counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
+    counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
+
+    current = state[plant.CURRENT]
+    if effects[hidden.CURRENT_SENSOR_BEND, hidden.STRENGTH] != 0.0:
+        current *= hidden.current_sensor_bend_ratio(effects[hidden.CURRENT_SENSOR_BEND], current)
+    current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
+    counts[CURRENT] = _converted(
+        current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count
+    )
+
+    grip = max(state[plant.DISTAL_TORQUE], 0.0) / s.lever_arm_m
+    fsr = grip / s.fsr_n_per_count + s.fsr_offset_count + s.fsr_noise_count * normal(seed, tick, 5)
+    counts[FSR] = _converted(fsr, 1.0, 0.0, s.fsr_limit_count)
+
+
+def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:
+    """Return the spindle encoder's count at an angle, closing positive."""
+    return int(np.floor(-angle_rad / TURN_RAD * sensors.spindle_count_per_turn))
+
+
+def columns_of(
+    counts: NDArray[np.int32],
+    target_count: NDArray[np.int32],
+    sensors: SensorParameters,
+) -> dict[str, NDArray[np.float64]]:
+    """Return counts as channels in SI units, closing positive, with the nominal scales.
+
+    Zeros are left as they are: offsets and drift of the sensors stay in the channels.
+
+    Args:
+        counts: Rows of counts, shape (n, 9).
+        target_count: Target of the spindle, shape (n,).
+        sensors: Scales of the sensors.
+
+    Returns:
+        Channel name to values of shape (n,).
+    """
+    rows = counts.astype(np.float64)
+    spindle_rad = TURN_RAD / sensors.spindle_count_per_turn
+    return {
+        "motor_angle_rad": rows[:, MOTOR] * TURN_RAD / sensors.motor_count_per_turn,
+        "spindle_angle_rad": -rows[:, SPINDLE] * spindle_rad,
+        "jaw_angle_rad": rows[:, JAW] * TURN_RAD / sensors.jaw_count_per_turn,
+        "target_angle_rad": -target_count.astype(np.float64) * spindle_rad,
+        "proximal_torque_n_m": rows[:, PROXIMAL] * sensors.torque_n_m_per_count,
+        "distal_torque_n_m": -rows[:, DISTAL] * sensors.torque_n_m_per_count,
+        "motor_current_a": rows[:, CURRENT] * sensors.current_a_per_count,
+        "motor_command_ratio": -rows[:, COMMAND_E4] * 1e-4,
+        "load_command_a": rows[:, LOAD_MA] * 1e-3,
+        "fsr_v": rows[:, FSR] * 3.3 / 4095.0,
+    }

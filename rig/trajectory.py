@@ -1,0 +1,86 @@
+"""Trajectories of the spindle and of the load motor, sampled at the logger's rate.
+
+Angles are closing-positive. A trajectory starts and ends at rest where its kind allows it.
+"""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+SAMPLE_RATE_HZ = 1000.0
+
+DECAYS = 4.0
+"""Time constants of a relaxation's decay."""
+
+FloatArray = NDArray[np.float64]
+
+
+def times(duration_s: float) -> FloatArray:
+    """Return the sample times of a duration, s."""
+    return np.arange(round(duration_s * SAMPLE_RATE_HZ)) / SAMPLE_RATE_HZ
+
+
+def sine(
+    duration_s: float, start_rad: float, amplitude_rad: float, frequency_hz: float
+) -> FloatArray:
+    """Return grasps as a raised cosine: open at `start_rad`, closed at start + 2 amplitude, rad."""
+    phase = 2.0 * np.pi * frequency_hz * times(duration_s)
+    return start_rad + amplitude_rad * (1.0 - np.cos(phase))
+
+
+def fourier(
+    duration_s: float,
+    start_rad: float,
+    base_frequency_hz: float,
+    cosine_rad: Sequence[float],
+    sine_rad: Sequence[float],
+) -> FloatArray:
+    """Return a finite Fourier series about its mean, shifted to start at `start_rad`, rad."""
+    phase = 2.0 * np.pi * base_frequency_hz * times(duration_s)
+    angle = np.zeros_like(phase)
+    for order, (a, b) in enumerate(zip(cosine_rad, sine_rad, strict=True), start=1):
+        angle += a * np.cos(order * phase) + b * np.sin(order * phase)
+    return start_rad + angle - angle[0] if angle.size else angle
+
+
+def speed_staircase(
+    start_rad: float, travel_rad: float, speeds_rad_s: Sequence[float], pause_s: float
+) -> FloatArray:
+    """Return closing and opening at each constant speed in turn, with a rest at each end, rad."""
+    pause = np.zeros(round(pause_s * SAMPLE_RATE_HZ))
+    parts = [pause]
+    for speed in speeds_rad_s:
+        ramp = speed * times(travel_rad / speed)
+        parts += [ramp, pause + travel_rad, ramp[::-1], pause]
+    return start_rad + np.concatenate(parts)
+
+
+def steps(levels: Sequence[float], hold_s: float, ramp_s: float) -> FloatArray:
+    """Return levels held in turn, joined by straight ramps; the first level has no ramp."""
+    ramp = np.linspace(0.0, 1.0, max(round(ramp_s * SAMPLE_RATE_HZ), 1), endpoint=False)
+    hold = np.ones(round(hold_s * SAMPLE_RATE_HZ))
+    parts = [hold * levels[0]]
+    for previous, level in itertools.pairwise(levels):
+        parts += [previous + (level - previous) * ramp, hold * level]
+    return np.concatenate(parts)
+
+
+def minimum_jerk(start: float, stop: float, duration_s: float) -> FloatArray:
+    """Return the minimum-jerk move between two rests (Flash and Hogan 1985, the quintic)."""
+    s = np.linspace(0.0, 1.0, max(round(duration_s * SAMPLE_RATE_HZ), 1))
+    return start + (stop - start) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
+
+
+def relaxation(
+    centre_rad: float, amplitude_rad: float, frequency_hz: float, cycles: int
+) -> FloatArray:
+    """Return an oscillation that dies out at its centre; friction gives up the torque it holds.
+
+    The amplitude decays exponentially to nothing, as in demagnetising: each reversal is a little
+    smaller than the one before, so that what friction still holds at the end is small too.
+    """
+    t = times(cycles / frequency_hz)
+    decay: FloatArray = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
+    return centre_rad + amplitude_rad * decay * np.sin(2.0 * np.pi * frequency_hz * t)

@@ -1,0 +1,212 @@
+"""Filters and the noise-robust derivative."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.filters import (
+    CausalFilter,
+    FilterError,
+    LowPass,
+    filter_recording,
+    holoborodko_coefficients,
+    holoborodko_derivative,
+    zero_phase,
+)
+from estimation.recording import Flag, Recording, Stretch
+
+RATE_HZ = 1000.0
+PERIOD_S = 1e-3
+
+
+def tone(frequency_hz: float, n: int = 4000) -> np.ndarray:
+    return np.sin(2 * np.pi * frequency_hz * np.arange(n) * PERIOD_S)
+
+
+@pytest.mark.parametrize(
+    ("points", "degree", "expected"),
+    [
+        (3, 2, np.array([1]) / 2),
+        (5, 2, np.array([2, 1]) / 8),
+        (11, 2, np.array([42, 48, 27, 8, 1]) / 512),
+        (5, 4, np.array([8, -1]) / 12),
+        (7, 4, np.array([39, 12, -5]) / 96),
+        (11, 4, np.array([322, 256, 39, -32, -11]) / 1536),
+    ],
+)
+def test_coefficients_are_the_published_ones(points, degree, expected):
+    assert holoborodko_coefficients(points, degree) == pytest.approx(expected, abs=1e-15)
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    degree=st.sampled_from([2, 4]),
+    factors=st.lists(st.floats(-3, 3), min_size=5, max_size=5),
+)
+def test_derivative_is_exact_on_polynomials_and_at_the_edges_on_parabolas(degree, factors):
+    x = np.linspace(-1, 1, 60)
+    polynomial = np.polynomial.Polynomial(factors[: degree + 1])
+    found = holoborodko_derivative(polynomial(x), x[1] - x[0], exact_degree=degree)
+    assert found[5:-5] == pytest.approx(polynomial.deriv()(x)[5:-5], abs=1e-9)
+    parabola = np.polynomial.Polynomial(factors[:3])
+    found = holoborodko_derivative(parabola(x), x[1] - x[0], exact_degree=degree)
+    assert found == pytest.approx(parabola.deriv()(x), abs=1e-9)
+
+
+@pytest.mark.parametrize("frequency_hz", [1.0, 40.0, 150.0, 350.0])
+def test_derivative_has_the_frequency_response_of_its_closed_form(frequency_hz):
+    w = 2 * np.pi * frequency_hz * PERIOD_S
+    cos, sin = np.cos(w), np.sin(w)
+    expected = sin * ((1 + cos) / 2) ** 3 * (1 + 11 / 6 * (1 - cos))
+    t = np.arange(400)
+    found = holoborodko_derivative(np.sin(w * t), 1.0)[20:-20]
+    assert found == pytest.approx(expected * np.cos(w * t)[20:-20], abs=1e-12)
+
+
+def test_derivative_of_three_samples_and_of_fewer():
+    assert holoborodko_derivative([0.0, 1.0, 4.0], 1.0) == pytest.approx([0.0, 2.0, 4.0])
+    with pytest.raises(FilterError, match="three are needed"):
+        holoborodko_derivative([0.0, 1.0], 1.0)
+    with pytest.raises(FilterError, match="odd"):
+        holoborodko_coefficients(10)
+
+
+def test_filter_passes_low_tones_without_lag_and_halves_amplitude_at_the_cutoff():
+    middle = slice(500, -500)
+    assert zero_phase(tone(2), RATE_HZ)[middle] == pytest.approx(tone(2)[middle], abs=1e-4)
+    at_cutoff = zero_phase(tone(50), RATE_HZ)[middle]
+    assert at_cutoff == pytest.approx(0.5 * tone(50)[middle], abs=1e-3)
+    assert np.abs(zero_phase(tone(300), RATE_HZ)[middle]).max() < 1e-3
+
+
+def test_filter_names_what_it_cannot_do():
+    with pytest.raises(FilterError, match="too few"):
+        zero_phase(np.zeros(10), RATE_HZ)
+    with pytest.raises(FilterError, match="half the sample rate"):
+        zero_phase(np.zeros(100), 80.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(cuts=st.lists(st.integers(0, 300), max_size=6))
+def test_causal_filter_does_not_care_how_samples_are_cut(cuts):
+    rows = np.random.default_rng(1).normal(size=(300, 2))
+    whole = CausalFilter(RATE_HZ).step(rows)
+    stepper = CausalFilter(RATE_HZ)
+    pieces = [stepper.step(part) for part in np.split(rows, sorted(cuts))]
+    assert np.array_equal(np.concatenate(pieces), whole)
+
+
+def test_causal_filter_starts_settled_and_looks_only_back():
+    rows = np.full((50, 1), 7.0)
+    assert CausalFilter(RATE_HZ).step(rows) == pytest.approx(rows)
+    changed = rows.copy()
+    changed[30:] = 9.0
+    assert np.array_equal(
+        CausalFilter(RATE_HZ).step(changed)[:30], CausalFilter(RATE_HZ).step(rows)[:30]
+    )
+
+
+def run_of(n: int = 3000, keep: np.ndarray | None = None, **flags: object) -> Recording:
+    time_s = np.arange(n) * PERIOD_S
+    keep = np.ones(n, bool) if keep is None else keep
+    angle = 0.5 * np.sin(2 * np.pi * time_s)
+    return Recording(
+        "r",
+        time_s[keep],
+        {
+            "spindle_angle_rad": angle[keep],
+            "motor_angle_rad": 35 * angle[keep],
+            "motor_current_a": np.cos(2 * np.pi * time_s)[keep],
+        },
+    )
+
+
+def test_every_channel_of_a_recording_gets_the_same_filter():
+    rows = np.random.default_rng(0).normal(size=2000)
+    run = Recording("r", np.arange(2000) * PERIOD_S, {"fsr_v": rows, "motor_current_a": 3 * rows})
+    filtered = filter_recording(run, LowPass(20.0))
+    assert filtered["motor_current_a"] == pytest.approx(3 * filtered["fsr_v"])
+    assert filtered["fsr_v"].std() < 0.3 * rows.std()
+
+
+def test_flags_spread_over_what_the_filter_smears():
+    run = run_of().with_stretch(Stretch(1.0, 1.1, Flag.SATURATED, "clipped"))
+    flagged = np.flatnonzero(~filter_recording(run).valid)
+    assert (flagged[0], flagged[-1]) == (980, 1120)
+
+
+def test_lost_and_missing_samples_are_bridged():
+    keep = np.ones(3000, bool)
+    keep[1000:1010] = False
+    whole, gappy = filter_recording(run_of()), filter_recording(run_of(keep=keep))
+    assert len(gappy) == 2990
+    assert gappy["spindle_angle_rad"] == pytest.approx(whole["spindle_angle_rad"][keep], abs=2e-4)
+    broken = run_of().with_columns(
+        spindle_angle_rad=np.where(keep, run_of()["spindle_angle_rad"], np.nan)
+    )
+    with pytest.raises(FilterError, match="carry no flag"):
+        filter_recording(broken)
+    flagged = broken.with_stretch(Stretch(1.0, 1.0091, Flag.MISSING, "lost"))
+    bridged = filter_recording(flagged)
+    assert bridged["spindle_angle_rad"] == pytest.approx(whole["spindle_angle_rad"], abs=2e-4)
+
+
+def test_a_clock_that_jumps_is_named():
+    time_s = np.concatenate([np.arange(100), 1e6 + np.arange(100)]) * PERIOD_S
+    with pytest.raises(FilterError, match="does not tick evenly"):
+        filter_recording(Recording("r", time_s, {"fsr_v": np.zeros(200)}))
+
+
+WANTED = ["motor_velocity_rad_s", "spindle_acceleration_rad_s2", "gearbox_differential_rad"]
+
+
+@pytest.mark.parametrize(
+    ("source", "tolerance"), [(zero_phase_channels, 1e-3), (causal_channels, 0.07)]
+)
+def test_derived_channels_are_the_derivatives(source, tolerance):
+    run = run_of()
+    found = source(run, WANTED)
+    w, t, middle = 2 * np.pi, run.time_s, slice(200, -200)
+    speed = 35 * 0.5 * w * np.cos(w * t)
+    acceleration = -0.5 * w**2 * np.sin(w * t)
+    assert np.abs(found["motor_velocity_rad_s"] - speed)[middle].max() < tolerance * 110
+    assert (
+        np.abs(found["spindle_acceleration_rad_s2"] - acceleration)[middle].max() < tolerance * 20
+    )
+    assert found["gearbox_differential_rad"] == pytest.approx(np.zeros(3000), abs=1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(cuts=st.lists(st.integers(0, 500), max_size=8), seed=st.integers(0, 5))
+def test_causal_channels_do_not_care_how_samples_are_cut(cuts, seed):
+    random = np.random.default_rng(seed)
+    time_s = (
+        np.cumsum(random.choice([1, 2, 7, 400], size=500, p=[0.9, 0.05, 0.04, 0.01])) * PERIOD_S
+    )
+    angle = np.cumsum(random.normal(size=500))
+    angle[random.integers(0, 500, 10)] = np.nan
+    run = {"motor_angle_rad": angle, "spindle_angle_rad": angle / 7}
+    whole = CausalChannels(WANTED, RATE_HZ).step(time_s, run)
+    stepper = CausalChannels(WANTED, RATE_HZ)
+    pieces = [
+        stepper.step(time_s[part], {name: values[part] for name, values in run.items()})
+        for part in np.split(np.arange(500), sorted(cuts))
+    ]
+    for name in WANTED:
+        joined = np.concatenate([piece[name] for piece in pieces])
+        assert np.array_equal(joined, whole[name], equal_nan=True)
+        assert np.array_equal(np.isnan(joined), np.isnan(angle))
+
+
+def test_a_lost_sample_makes_no_spike_and_a_long_silence_starts_anew():
+    keep = np.ones(3000, bool)
+    keep[1000:1003] = False
+    whole, gappy = causal_channels(run_of(), WANTED), causal_channels(run_of(keep=keep), WANTED)
+    speeds = [r["motor_velocity_rad_s"] for r in (whole, gappy)]
+    assert speeds[1] == pytest.approx(speeds[0][keep], abs=0.1)
+    keep[1000:1600] = False
+    after = causal_channels(run_of(keep=keep), WANTED)["motor_velocity_rad_s"]
+    assert after[1000] == 0.0
+    assert after[1100:] == pytest.approx(speeds[0][1700:], abs=0.1)

@@ -1,0 +1,144 @@
+"""Fitting a declared model, predicting with it, and running it live."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimation.campaign import Campaign
+from estimation.effects import effect
+from estimation.fitting import FitError, fit
+from estimation.model import Model, NotFittedError, Term, predict
+from estimation.model_file import read, shipped
+from estimation.recording import Flag, MissingChannelError, Stretch
+from estimation.stream import Stream
+from tests.estimation.synthetic import TRUE, campaign, run
+
+
+@pytest.fixture(scope="module")
+def motor() -> Model:
+    return fit(read(shipped()["motor"]), campaign())
+
+
+def numbers(model: Model) -> dict[str, float]:
+    return {name: e.value for term in model.terms for name, e in term.values.items()}
+
+
+def test_a_declared_model_finds_the_true_parameters(motor):
+    found = numbers(motor)
+    assert {name: found[name] for name in TRUE} == pytest.approx(TRUE, rel=0.01)
+    assert motor.is_fitted
+    assert motor.evidence.rmse == pytest.approx(1e-3 * np.sqrt(2 * 50 / 1000), rel=0.2)
+    assert len(motor.evidence.runs) == 9
+
+
+def test_spreads_cover_the_truth(motor):
+    for term in motor.terms:
+        for name, estimate in term.values.items():
+            if name in TRUE:
+                assert estimate.spread > 0
+                assert abs(estimate.value - TRUE[name]) < 6 * estimate.spread
+
+
+def test_run_offsets_are_a_nuisance_only_when_they_are_told_to_be(motor):
+    together = fit(read(shipped()["motor"]), campaign(), run_offsets=False, bootstrap=0)
+    assert together.evidence.rmse_with_means < motor.evidence.rmse_with_means
+    assert abs(numbers(motor)["gain"] - 0.94) < abs(numbers(together)["gain"] - 0.94)
+    assert numbers(together)["offset"] == pytest.approx(numbers(motor)["offset"], abs=2e-3)
+
+
+def test_a_fit_is_repeatable_and_starts_from_known_shapes(motor):
+    assert fit(read(shipped()["motor"]), campaign()) == motor
+    again = numbers(fit(motor, campaign(), bootstrap=0))
+    assert again == pytest.approx(numbers(motor), rel=1e-3)
+
+
+def test_friction_never_comes_out_negative():
+    runs = campaign(extra=lambda angle, speed, load: -8e-4 * speed)  # drives instead of braking
+    damping = fit(read(shipped()["motor"]), runs).terms[2].values["damping"]
+    assert damping.value == 0.0
+    assert damping.spread is None
+
+
+def test_one_run_gives_values_without_spreads():
+    model = fit(read(shipped()["motor"]), Campaign.of([run("a", 0.3, 0.1, seed=1)]))
+    assert numbers(model)["gain"] == pytest.approx(0.94, rel=0.01)
+    assert all(e.spread is None for term in model.terms for e in term.values.values())
+
+
+def test_excluded_runs_and_flagged_samples_do_not_count(motor):
+    bad = run("bad", 0.3, 0.1, seed=1).with_columns(motor_current_a=np.full(8000, 9.0))
+    good = list(campaign())
+    broken = good[0].with_columns(
+        motor_current_a=np.where(good[0].time_s > 7, 5.0, good[0]["motor_current_a"])
+    )
+    flagged = broken.with_stretch(Stretch(6.99, 8.0, Flag.SUSPECT, "runaway"))
+    runs = Campaign.of([flagged, *good[1:], bad.exclude("for the test")])
+    model = fit(read(shipped()["motor"]), runs, bootstrap=0)
+    assert numbers(model) == pytest.approx(numbers(motor), rel=0.02)
+    assert "bad" not in model.evidence.runs
+
+
+def test_columns_that_cannot_be_told_apart_are_named():
+    twice = Model(
+        "twice",
+        "motor",
+        "proximal_torque_n_m",
+        (Term(effect("motor.torque_constant")), Term(effect("motor.torque_constant"))),
+    )
+    with pytest.raises(FitError, match=r"do not tell motor\.torque_constant\.gain"):
+        fit(twice, campaign())
+    still = run("still", 0.3, 0.1, seed=1).with_columns(motor_current_a=np.zeros(8000))
+    with pytest.raises(FitError, match="do not tell"):
+        fit(read(shipped()["linear"]), Campaign.of([still]))
+
+
+def test_a_model_says_what_is_missing(motor):
+    recording = run("a", 0.3, 0.1, seed=1)
+    with pytest.raises(NotFittedError, match="declared but not fitted"):
+        predict(read(shipped()["motor"]), recording)
+    with pytest.raises(MissingChannelError, match="motor_angle_rad"):
+        predict(
+            motor, type(recording)("b", recording.time_s, {"motor_current_a": recording.time_s})
+        )
+
+
+def test_prediction_needs_no_target_and_finds_the_torque(motor):
+    recording = run("new", 0.27, 0.12, seed=99, noise_n_m=0.0, offset_n_m=0.02)
+    truth = recording["proximal_torque_n_m"]
+    blind = type(recording)(
+        "blind",
+        recording.time_s,
+        {name: recording[name] for name in ("motor_current_a", "motor_angle_rad")},
+    )
+    error = predict(motor, blind) - truth
+    assert np.abs(error)[100:-100].max() < 2e-3
+    lagging = predict(motor, blind, causal=True) - truth
+    assert np.abs(lagging)[100:].max() < 2e-2
+
+
+@settings(deadline=None, max_examples=15)
+@given(cuts=st.lists(st.integers(0, 400), max_size=8))
+def test_live_is_offline_to_rounding_however_the_batches_are_cut(motor, cuts):
+    recording = run("live", 0.4, 0.1, seed=5, seconds=0.4)
+    offline = predict(motor, recording, causal=True)
+    stream = Stream(motor, recording.sample_rate_hz)
+    pieces = [
+        stream.step(part_time, {name: recording[name][part] for name in stream.channels})
+        for part in np.split(np.arange(400), sorted(cuts))
+        for part_time in [recording.time_s[part]]
+    ]
+    assert np.concatenate(pieces) == pytest.approx(offline, rel=1e-12, abs=1e-15)
+
+
+def test_live_takes_single_samples_and_says_nan_where_an_input_is_lost(motor):
+    recording = run("live", 0.4, 0.1, seed=5, seconds=0.1)
+    current = recording["motor_current_a"].copy()
+    current[50] = np.nan
+    stream = Stream(motor, 1000.0)
+    live = [
+        stream.step(t, {"motor_current_a": i, "motor_angle_rad": a})
+        for t, i, a in zip(recording.time_s, current, recording["motor_angle_rad"], strict=True)
+    ]
+    assert all(part.shape == (1,) for part in live)
+    assert np.flatnonzero(np.isnan(np.concatenate(live))).tolist() == [50]

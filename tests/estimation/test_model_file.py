@@ -1,0 +1,114 @@
+"""The model file: what is written is read back, what is wrong is named."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimation.effects import catalogue
+from estimation.filters import LowPass
+from estimation.model import Estimate, Evidence, Model, Term
+from estimation.model_file import ModelFileError, parse, read, shipped, to_toml, write
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+ESTIMATES = st.builds(
+    Estimate,
+    value=NUMBERS,
+    spread=st.none() | NUMBERS,
+    ci95=st.none() | st.tuples(NUMBERS, NUMBERS),
+)
+
+
+@st.composite
+def models(draw: st.DrawFn) -> Model:
+    terms = []
+    for kind in draw(st.lists(st.sampled_from(list(catalogue().values())), min_size=1, max_size=4)):
+        names = [p.name for p in (*kind.amplitudes, *kind.shape)]
+        values = draw(st.dictionaries(st.sampled_from(names), ESTIMATES))
+        terms.append(Term(kind, draw(st.sampled_from([1, -1])), values=values))
+    evidence = st.builds(
+        Evidence,
+        runs=st.lists(st.text()).map(tuple),
+        samples=st.integers(0, 10**9),
+        rmse=NUMBERS,
+        rmse_with_means=NUMBERS,
+        seed=st.integers(0, 2**31),
+    )
+    return Model(
+        name=draw(st.text()),
+        balance=draw(st.sampled_from(["motor", "cable", "joint.3", "calibration.torque"])),
+        target="proximal_torque_n_m",
+        terms=tuple(terms),
+        description=draw(st.text()),
+        run_offsets=draw(st.booleans()),
+        low_pass=LowPass(draw(st.floats(0.1, 400)), draw(st.integers(1, 8))),
+        evidence=draw(st.none() | evidence),
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(model=models())
+def test_what_is_written_is_read_back(model):
+    assert parse(to_toml(model)) == model
+
+
+def test_shipped_models_are_declared_and_not_fitted():
+    assert set(shipped()) == {"grip", "linear", "motor"}
+    for name, target in (("grip", "distal"), ("linear", "proximal"), ("motor", "proximal")):
+        model = read(Path(name))
+        assert (model.name, model.target) == (name, f"{target}_torque_n_m")
+        assert not model.is_fitted
+    assert [term.sign for term in read(Path("motor")).terms] == [1, -1, -1, -1, 1]
+
+
+def test_a_file_is_replaced_in_one_step(tmp_path):
+    model = read(Path("motor"))
+    path = tmp_path / "new" / "mine.toml"
+    write(model, path)
+    write(replace(model, name="again"), path)
+    assert read(path) == replace(model, name="again")
+    assert [p.name for p in path.parent.iterdir()] == ["mine.toml"]
+
+
+DECLARED = shipped()["motor"].read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("balance =", "balanse =", "lacks the key 'balance'.*Did you mean 'balanse'"),
+        ("cutoff_hz", "cutof_hz", "unknown key 'cutof_hz'.*Did you mean 'cutoff_hz'"),
+        ("\nsign = -1", "\nsing = -1", "unknown key 'sing'.*Did you mean 'sign'"),
+        ("friction.viscous", "friction.viscos", "Did you mean 'friction.viscous'"),
+        ("channels.speed", "channels.sped", "no role 'sped'.*Did you mean 'speed'"),
+        ('"motor_velocity_rad_s"', '"motor_velocity"', "carries no unit"),
+        ("sign = -1", "sign = 2", "it is 1 or -1"),
+        ("sign = -1", 'sign = "minus"', "is not int"),
+        ('balance = "motor"', 'balance = "moter"', "Did you mean 'motor'"),
+        ("run_offsets = true", "run_offsets = 1", "is not bool"),
+        ("order = 3", "order = true", "is not int"),
+        ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),
+        ("rig.model/1", "rig.model/2", "not a model of schema"),
+        ("[processing]", "[processing", "is not TOML"),
+        (
+            'channels.speed = "motor_velocity_rad_s"',
+            'parameters.damping = { value = 1.0, unit = "N m" }',
+            "stated in 'N m', not in 'N m s/rad'",
+        ),
+        (
+            'channels.speed = "motor_velocity_rad_s"',
+            'parameters.dampng = { value = 1.0, unit = "N m" }',
+            "no parameter 'dampng'.*Did you mean 'damping'",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named(old, new, message):
+    with pytest.raises(ModelFileError, match=message):
+        parse(DECLARED.replace(old, new, 1), "mine.toml")
+
+
+def test_a_missing_file_names_the_shipped_ones(tmp_path):
+    with pytest.raises(ModelFileError, match="grip, linear, motor"):
+        read(tmp_path / "none.toml")

@@ -1,0 +1,102 @@
+"""Recordings: immutable columns with units, flags and slices."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.channels import CHANNELS, UnknownUnitError, unit_of
+from estimation.recording import (
+    Flag,
+    Mark,
+    MissingChannelError,
+    Recording,
+    RecordingError,
+    Stretch,
+)
+
+
+def make(count: int = 100, **changes: object) -> Recording:
+    time_s = np.arange(count) * 1e-3
+    fields: dict[str, object] = {
+        "name": "run",
+        "time_s": time_s,
+        "columns": {"motor_current_a": np.sin(time_s), "jaw_angle_rad": time_s},
+    }
+    return Recording(**{**fields, **changes})  # type: ignore[arg-type]
+
+
+def test_columns_cannot_be_written_to():
+    recording = make()
+    with pytest.raises(ValueError, match="read-only"):
+        recording["motor_current_a"][0] = 1.0
+    with pytest.raises(TypeError):
+        recording.columns["motor_current_a"] = np.zeros(100)  # type: ignore[index]
+    with pytest.raises(ValueError, match="read-only"):
+        recording.flags[0] = 1
+
+
+def test_the_caller_cannot_change_a_recording_through_its_own_array():
+    current = np.zeros(100)
+    recording = make(columns={"motor_current_a": current})
+    current[0] = 5.0
+    assert recording["motor_current_a"][0] == 0.0
+
+
+def test_a_missing_channel_names_the_nearest_one():
+    with pytest.raises(MissingChannelError, match="Did you mean 'motor_current_a'"):
+        make()["motor_curent_a"]
+
+
+@pytest.mark.parametrize("name", ["current", "jaw", "torque_mnm"])
+def test_a_name_without_a_unit_is_refused(name):
+    with pytest.raises(UnknownUnitError):
+        make(columns={name: np.zeros(100)})
+
+
+def test_every_registered_channel_names_its_unit():
+    assert {c.unit for c in CHANNELS.values()} >= {"rad", "N m", "A", "s"}
+    assert all(unit_of(name) == channel.unit for name, channel in CHANNELS.items())
+
+
+@pytest.mark.parametrize("times", [[0.0, 0.0, 1.0], [0.0, 2.0, 1.0], [0.0, np.nan, 1.0]])
+def test_time_must_increase(times):
+    with pytest.raises(RecordingError, match="time does not increase"):
+        make(time_s=np.array(times), columns={})
+
+
+def test_columns_must_have_the_length_of_time():
+    with pytest.raises(RecordingError, match="jaw_angle_rad has shape"):
+        make(columns={"jaw_angle_rad": np.zeros(7)})
+
+
+@given(st.floats(-0.05, 0.15), st.floats(-0.05, 0.15))
+def test_a_slice_holds_just_the_samples_inside(start_s, stop_s):
+    recording = make(marks=(Mark(0.02, "touch"),))
+    part = recording.slice_time(start_s, stop_s)
+    expected = recording.time_s[(recording.time_s >= start_s) & (recording.time_s < stop_s)]
+    np.testing.assert_array_equal(part.time_s, expected)
+    np.testing.assert_array_equal(part["jaw_angle_rad"], expected)
+    assert (len(part.marks) == 1) == (start_s <= 0.02 < stop_s)
+
+
+def test_a_stretch_flags_its_samples_and_keeps_its_reason():
+    recording = make().with_stretch(Stretch(0.010, 0.019, Flag.SATURATED, "current clipped"))
+    assert recording.valid.sum() == 90
+    assert recording.stretches[0].reason == "current clipped"
+    assert make().valid.all()
+
+
+def test_with_columns_adds_without_touching_the_original():
+    recording = make()
+    longer = recording.with_columns(proximal_torque_n_m=np.ones(100))
+    assert "proximal_torque_n_m" in longer
+    assert "proximal_torque_n_m" not in recording
+    assert longer["jaw_angle_rad"] is recording["jaw_angle_rad"]
+
+
+def test_rate_and_duration():
+    assert make().sample_rate_hz == pytest.approx(1000.0)
+    assert make().duration_s == pytest.approx(0.099)
+    with pytest.raises(RecordingError, match="no sample rate"):
+        _ = make(1).sample_rate_hz

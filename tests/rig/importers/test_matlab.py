@@ -1,0 +1,217 @@
+"""MATLAB files: names that are channels, structs that are runs, sidecars that map the rest."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io.matlab
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.io import loadmat, savemat
+
+from rig.errors import DataError
+from rig.importers.mat5 import Mat5Error, Unread, read_mat5
+from rig.importers.matlab import IMPORTER
+
+N = 50
+TIME = np.arange(N) / 1000
+CURRENT = np.linspace(0, 0.3, N)
+
+
+@pytest.fixture
+def save(tmp_path):
+    def _save(variables, name="run.mat", **options):
+        path = tmp_path / name
+        savemat(path, variables, **options)
+        return path
+
+    return _save
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("as_column", ["row", "column"])
+def test_vectors_are_channels_scalars_conditions_text_notes(save, compressed, as_column):
+    path = save(
+        {
+            "time_s": TIME,
+            "motor_current_a": CURRENT,
+            "finger_force_n": 2 * CURRENT,  # not registered, but it carries a unit
+            "load_command_a": 0.4,
+            "notes": "a quiet morning",
+            "grasper": "Maryland",
+        },
+        do_compression=compressed,
+        oned_as=as_column,
+    )
+    (recording,) = IMPORTER.open(path)
+    assert recording.name == "run"
+    np.testing.assert_array_equal(recording.time_s, TIME)
+    np.testing.assert_array_equal(recording["motor_current_a"], CURRENT)
+    assert set(recording.columns) == {"motor_current_a", "finger_force_n"}
+    assert dict(recording.conditions) == {"load_command_a": 0.4, "grasper": "Maryland"}
+    assert recording.notes == "a quiet morning"
+
+
+def test_integers_become_floats(save):
+    path = save({"time_s": TIME, "motor_current_a": np.arange(N, dtype=np.int16)})
+    assert IMPORTER.open(path).runs[0].recording()["motor_current_a"].dtype == np.float64
+
+
+def test_each_struct_is_a_run(save):
+    run = {"time_s": TIME, "motor_current_a": CURRENT}
+    campaign = IMPORTER.open(save({"first": run, "second": {**run, "load_command_a": 0.1}}))
+    assert campaign.names == ("run/first", "run/second")
+    first, second = campaign
+    assert first.source.endswith("run.mat:first")
+    assert second.conditions["load_command_a"] == 0.1
+    np.testing.assert_array_equal(first["motor_current_a"], CURRENT)
+
+
+@pytest.mark.parametrize(
+    ("variables", "message"),
+    [
+        ({"t": TIME, "i": CURRENT}, r"not understood: t, i.*Found: t \(50,\), i \(50,\).*time_s"),
+        ({"motor_current_a": CURRENT}, r"Found: motor_current_a.*Expected time_s"),
+        ({"time_s": TIME, "current": CURRENT}, r"not understood: current"),
+        ({"time_s": TIME, "motor_current_a": CURRENT[:9]}, r"not understood: motor_current_a"),
+        ({"time_s": TIME, "torque_n_m": np.ones((N, 2))}, r"torque_n_m \(50, 2\)"),
+        ({"time_s": TIME, "motor_current_a": CURRENT * 1j}, r"not understood: motor_current_a"),
+        ({"time_s": TIME, "a_a": {"b": 1.0}}, r"a_a \(struct of b\)"),
+        ({"run": {"time_s": TIME}, "x": CURRENT}, r"not understood: x"),
+        ({"run": {"time_s": TIME, "x": CURRENT}}, r"not understood: x"),
+        (
+            {"time_s": TIME, "a_a": np.where(TIME > 0.02, np.nan, 0)},
+            r"a_a is not finite at sample 22",
+        ),
+        ({}, "Found: nothing"),
+    ],
+)
+def test_names_that_cannot_be_understood_are_listed(save, variables, message):
+    with pytest.raises(DataError, match=message) as error:
+        IMPORTER.open(save(variables))
+    assert "run.mat" in error.value.what
+
+
+def test_time_that_runs_back_is_refused(save):
+    path = save({"time_s": TIME[::-1], "motor_current_a": CURRENT})
+    with pytest.raises(DataError, match="time does not increase"):
+        IMPORTER.open(path).runs[0].recording()
+
+
+@pytest.mark.parametrize("header", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"MATLAB 7.0"])
+def test_version_7_3_says_how_to_save_again(tmp_path, header):
+    path = tmp_path / "run.mat"
+    path.write_bytes(header.ljust(512) + b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(DataError, match=r"version 7\.3.*'-v7'"):
+        IMPORTER.open(path)
+
+
+SIDECAR = """
+sample_rate_hz = 200
+[channels.spindle_angle_rad]
+variable = "data.enc"
+scale = -0.5
+offset = 0.25
+[channels.motor_current_a]
+variable = "current"
+[conditions]
+load_command_a = 0.2
+"""
+
+
+def test_a_sidecar_maps_and_scales_other_names(save):
+    encoder = np.arange(N, dtype=float)
+    path = save({"data": {"enc": encoder, "junk": "x"}, "current": CURRENT})
+    path.with_name("run.mat.toml").write_text(SIDECAR)
+    (recording,) = IMPORTER.open(path)
+    np.testing.assert_allclose(recording["spindle_angle_rad"], 0.25 - 0.5 * encoder)
+    np.testing.assert_array_equal(recording["motor_current_a"], CURRENT)
+    np.testing.assert_allclose(recording.time_s, np.arange(N) / 200)
+    assert dict(recording.conditions) == {"load_command_a": 0.2}
+    assert IMPORTER.recognises(path.parent)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"data.enc"', '"data.gone"', r"'data\.gone', which the sidecar maps to spindle_angle_rad"),
+        ('"current"', '"short"', r"differ in length"),
+        ("spindle_angle_rad", "spindle", "does not map"),
+        ("sample_rate_hz = 200", "", "does not map"),
+        ("sample_rate_hz = 200", "sample_rate_hz = -1", "does not map"),
+        ("scale = -0.5", 'scale = "x"', "does not map"),
+        ("scale = -0.5", "gain = 2", "does not map"),
+        ("[conditions]", "[condition]", "does not map"),
+        ("[conditions]", "[conditions", "is no TOML"),
+    ],
+)
+def test_a_wrong_sidecar_is_refused(save, old, new, message):
+    path = save({"data": {"enc": TIME}, "current": CURRENT, "short": CURRENT[:5]})
+    path.with_name("run.mat.toml").write_text(SIDECAR.replace(old, new))
+    with pytest.raises(DataError, match=message):
+        IMPORTER.open(path).runs[0].recording()
+
+
+def test_a_folder_of_other_files_is_not_claimed(save, tmp_path):
+    save({"time_s": TIME, "motor_current_a": CURRENT})
+    assert IMPORTER.recognises(tmp_path)
+    (tmp_path / "00.TXT").write_text("%")
+    assert not IMPORTER.recognises(tmp_path)
+    assert IMPORTER.open(tmp_path).names == ("run",)
+
+
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(where=st.floats(0, 1), junk=st.binary(max_size=8), cut=st.booleans())
+def test_damaged_files_read_or_raise(save, where, junk, cut):
+    path = save({"time_s": TIME, "motor_current_a": CURRENT})
+    content = path.read_bytes()
+    at = round(where * len(content))
+    path.write_bytes(content[:at] + junk + (b"" if cut else content[at + len(junk) :]))
+    try:
+        for recording in IMPORTER.open(path):
+            assert len(recording) == recording.time_s.size
+    except DataError:
+        return
+
+
+def agree(ours, theirs):
+    if isinstance(ours, dict):
+        return all(agree(value, theirs[name]) for name, value in ours.items())
+    if isinstance(ours, Unread | str):
+        return isinstance(ours, Unread) or ours == theirs
+    return np.array_equal(ours, theirs)
+
+
+WRITTEN_BY_MATLAB = [
+    path
+    for name in ("double", "matrix", "3dmatrix", "minus", "multi", "string", "unicode", "struct*")
+    for version in ("6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86")
+    for path in Path(scipy.io.matlab.__path__[0]).glob(f"tests/data/test{name}_{version}.mat")
+]
+
+
+@pytest.mark.skipif(not WRITTEN_BY_MATLAB, reason="SciPy is installed without its test data")
+def test_files_matlab_wrote_read_as_scipy_reads_them():
+    assert len(WRITTEN_BY_MATLAB) > 20  # big-endian Solaris among them
+    for path in WRITTEN_BY_MATLAB:
+        ours = read_mat5(path.read_bytes())
+        assert ours, path
+        assert agree(ours, loadmat(path, simplify_cells=True)), path
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "no MATLAB 5 header"),
+        (b"hello" * 100, "no MATLAB 5 header"),
+        (b" " * 126 + b"IM" + b"\x0e\0\0\0", "inside an element's tag"),
+        (b" " * 126 + b"IM" + b"\x0e\0\0\0\xff\0\0\0", "an element of 255 bytes where 0"),
+        (b" " * 126 + b"IM" + b"\x0f\0\0\0\x04\0\0\0junk", "compressed variable is damaged"),
+        (b" " * 126 + b"IM" + b"\x09\0\0\0\0\0\0\0", "type 9 where a variable"),
+    ],
+)
+def test_damage_is_named(content, message):
+    with pytest.raises(Mat5Error, match=message):
+        read_mat5(content)

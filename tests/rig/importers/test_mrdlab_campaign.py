@@ -1,0 +1,194 @@
+"""Folders and archives of MRDLab logs: which runs, in which order, how named, read when asked."""
+
+import io
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.errors import DataError
+from rig.importers import archive
+from rig.importers.jaw_steps import jaw_steps
+from rig.importers.mrdlab import IMPORTER
+
+FOLDERS = ("Tool_4_Maryland_L_Pitch_1", "Tool_4_Maryland_L_Roll_1")
+
+
+@pytest.fixture
+def one(tmp_path, make_log) -> Path:
+    """A folder of three logs and the texts that lie beside them."""
+    folder = tmp_path / "Tool_4_Maryland_L_4"
+    folder.mkdir()
+    for stem in ("10", "00", "01"):
+        (folder / f"{stem}.TXT").write_text(make_log(seconds=2.5).text())
+    (folder / "ReadMe.txt").write_text("This is a roll of 0 degrees\n")
+    (folder / "SerialLog.txt").write_text("Please press 's' to begin data collection:\n")
+    (folder / "notes.pdf").write_bytes(b"%PDF")
+    return folder
+
+
+@pytest.fixture
+def several(tmp_path, make_log) -> Path:
+    root = tmp_path / "data"
+    for name in FOLDERS:
+        (root / name).mkdir(parents=True)
+        for stem in ("000", "001"):
+            (root / name / f"{stem}.TXT").write_text(make_log(seconds=2.5).text())
+    return root
+
+
+def pack(folder: Path, path: Path) -> Path:
+    mode = {".xz": "w:xz", ".gz": "w:gz", ".tar": "w"}[path.suffix]
+    with tarfile.open(path, mode) as tar:
+        tar.add(folder, folder.name)
+    return path
+
+
+def test_a_folder_is_a_campaign_in_file_order(one):
+    campaign = IMPORTER.open(one)
+    assert campaign.names == ("00", "01", "10")
+    assert [run.source for run in campaign.runs] == [one / f"{n}.TXT" for n in campaign.names]
+    assert [r.name for r in campaign] == ["00", "01", "10"]
+
+
+def test_the_read_me_becomes_part_of_the_notes(one):
+    recording = IMPORTER.open(one).runs[0].recording()
+    assert "This is a roll of 0 degrees" in recording.notes
+    assert "Please press" not in recording.notes
+
+
+def test_runs_load_when_asked(one):
+    (one / "01.TXT").write_text("not a log\n")
+    campaign = IMPORTER.open(one)
+    assert len(campaign.runs[0].recording()) == 2500
+    with pytest.raises(DataError, match=r"01\.TXT, line 1"):
+        campaign.runs[1].recording()
+
+
+def test_runs_of_several_folders_carry_the_folder(several):
+    campaign = IMPORTER.open(several)
+    assert campaign.names == tuple(f"{f}/{s}" for f in FOLDERS for s in ("000", "001"))
+    rolls = [r.conditions["wrist_roll_rad"] for r in campaign]
+    assert rolls == pytest.approx([0, 0, -np.pi / 2, -np.pi / 2])
+
+
+@pytest.mark.parametrize("suffix", ["tar.xz", "tar.gz", "tar"])
+def test_an_archive_holds_what_its_folder_holds(one, tmp_path, suffix):
+    packed = pack(one, tmp_path / f"set.{suffix}")
+    assert IMPORTER.recognises(packed)
+    campaign, folder = IMPORTER.open(packed), IMPORTER.open(one)
+    assert campaign.names == folder.names
+    assert campaign.runs[0].source == packed
+    for a, b in zip(campaign, folder, strict=True):
+        assert a.source == f"{packed}:{one.name}/{a.name}.TXT"
+        assert (a.conditions, a.instrument, a.notes) == (b.conditions, b.instrument, b.notes)
+        for name in b.columns:
+            np.testing.assert_array_equal(a[name], b[name])
+
+
+def test_an_archive_of_several_folders(several, tmp_path):
+    packed = pack(several, tmp_path / "set.tar.xz")
+    assert IMPORTER.open(packed).names == IMPORTER.open(several).names
+
+
+def test_an_archive_is_unpacked_once_a_process_and_only_its_texts(one, tmp_path):
+    packed = pack(one, tmp_path / "set.tar.xz")
+    folder = archive.unpack_text(packed)
+    assert archive.unpack_text(packed) == folder
+    assert {p.suffix.lower() for p in folder.rglob("*.*")} == {".txt"}
+
+
+def member(name: str, content: bytes = b"%x\n", **attributes) -> tuple[tarfile.TarInfo, io.BytesIO]:
+    info = tarfile.TarInfo(name)
+    info.size = len(content)
+    for key, value in attributes.items():
+        setattr(info, key, value)
+    return info, io.BytesIO(content)
+
+
+@pytest.mark.parametrize("name", ["../evil.TXT", "/evil.TXT", "a/../../evil.TXT", "..\\evil.TXT"])
+def test_a_name_that_leads_out_of_the_folder_is_refused(tmp_path, name):
+    path = tmp_path / "set.tar"
+    with tarfile.open(path, "w") as tar:
+        tar.addfile(*member("00.TXT"))
+        tar.addfile(*member(name))
+    with pytest.raises(DataError, match="leads out of its folder"):
+        IMPORTER.open(path)
+    assert not list(tmp_path.parent.rglob("evil.TXT"))
+
+
+def test_links_in_an_archive_are_not_followed(tmp_path, make_log):
+    path = tmp_path / "set.tar"
+    secret = tmp_path / "secret.txt"
+    secret.write_text("%secret\n")
+    with tarfile.open(path, "w") as tar:
+        tar.addfile(*member("00.TXT", make_log(seconds=1).text().encode()))
+        for name, kind in (("01.TXT", tarfile.SYMTYPE), ("02.TXT", tarfile.LNKTYPE)):
+            tar.addfile(*member(name, b"", type=kind, linkname=str(secret)))
+    assert IMPORTER.open(path).names == ("00",)
+
+
+def test_an_archive_that_is_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(archive, "MAX_TOTAL_BYTES", 1000)
+    path = tmp_path / "set.tar"
+    with tarfile.open(path, "w") as tar:
+        for i in range(3):
+            tar.addfile(*member(f"{i}.TXT", b"%" * 400))
+    with pytest.raises(DataError, match=r"too large at '2\.TXT'"):
+        IMPORTER.open(path)
+
+
+@pytest.mark.parametrize("keep", [0.0, 0.3, 0.9])
+def test_a_truncated_archive_is_refused_and_leaves_nothing(one, tmp_path, monkeypatch, keep):
+    packed = pack(one, tmp_path / "set.tar.xz")
+    content = packed.read_bytes()
+    packed.write_bytes(content[: round(keep * len(content))])
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr(archive.tempfile, "tempdir", str(scratch))
+    with pytest.raises(DataError, match=r"set\.tar\.xz is damaged"):
+        IMPORTER.open(packed)
+    assert not list(scratch.iterdir())
+
+
+def test_a_folder_without_logs_is_refused(tmp_path):
+    (tmp_path / "ReadMe.txt").write_text("nothing here\n")
+    assert not IMPORTER.recognises(tmp_path)
+    with pytest.raises(DataError, match="holds no MRDLab log"):
+        IMPORTER.open(tmp_path)
+
+
+def test_recognises_logs_and_nothing_else(one, several, tmp_path):
+    assert IMPORTER.recognises(one)
+    assert IMPORTER.recognises(one / "00.TXT")
+    assert IMPORTER.recognises(several)
+    other = tmp_path / "other.txt"
+    other.write_text("% a comment\n1,2,3\n")
+    broken = tmp_path / "broken.tar.xz"
+    broken.write_bytes(b"no archive")
+    assert not IMPORTER.recognises(one / "ReadMe.txt")
+    assert not IMPORTER.recognises(one / "notes.pdf")
+    assert not IMPORTER.recognises(other)
+    assert not IMPORTER.recognises(broken)
+
+
+def test_a_jaw_step_is_found_between_runs_of_the_same_load(tmp_path, make_log):
+    def step(rows):
+        rows[:, 4] += 6  # 0.54 deg
+
+    folder = tmp_path / "Tool_4_Maryland_L_4"
+    folder.mkdir()
+    loads = (0.1, 0.9)
+    for i, stem in enumerate(("00", "01", "10", "11", "20", "21")):
+        # the load stretches the cable: runs of different load are not compared
+        def edit(rows, i=i):
+            rows[:, 4] -= 100 * (i % 2)
+            if i == 4:
+                step(rows)
+
+        log = make_log(seconds=2.5, load_a=loads[i % 2], edit=edit)
+        (folder / f"{stem}.TXT").write_text(log.text())
+    (found,) = jaw_steps(IMPORTER.open(folder))
+    assert (found.run, found.compared_with) == ("20", "10")
+    assert found.step_rad == pytest.approx(np.deg2rad(0.54), rel=1e-3)

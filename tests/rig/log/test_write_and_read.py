@@ -1,0 +1,320 @@
+"""What is written is read back, by us and by two independent readers."""
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+
+from estimation.recording import Flag, Mark, Stretch
+from rig.errors import DataError, UsageError
+from rig.log.messages import UnflaggedSampleError
+from rig.log.reader import DamagedLogError, read_log
+from rig.log.run import RunEnd, RunInfo
+from rig.log.scan import NotALogError
+from rig.log.schema import Field, Stream
+from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE
+from rig.log.writer import FLUSH_AFTER_S, MAX_LOSS_S, LogExistsError, LogWriteError, LogWriter
+
+STREAM = Stream(
+    "/t",
+    "p/msg/P",
+    (Field("x_a", "float64", "A"), Field("sequence", "uint32"), Field("flags", "uint32")),
+    1000.0,
+)
+
+
+def rows(count, first=0, x=1.5, flags=0):
+    sequence = np.arange(first, first + count)
+    return {"x_a": np.full(count, x), "sequence": sequence, "flags": np.full(count, flags)}
+
+
+def times(count, first=0):
+    return np.arange(first, first + count) * 1_000_000
+
+
+class Clock:
+    """A clock that stands still until it is told to move."""
+
+    def __init__(self):
+        self.now_s = 100.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def equal(message, row):
+    return all(getattr(message, name) == row[name] for name in row.dtype.names)
+
+
+def test_mcap_ros2_support_decodes_equal_values(log):
+    ours = read_log(log)
+    place = dict.fromkeys(ours.topics, 0)
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            topic, k = ours.topics[channel.topic], place[channel.topic]
+            assert equal(decoded, topic.rows[k])
+            assert message.log_time == topic.log_time_ns[k]
+            assert message.sequence == topic.rows["sequence"][k]
+            place[channel.topic] += 1
+    assert place == {SAMPLE: 600, COUNTS: 600}
+
+
+def test_rosbags_decodes_equal_values(log):
+    from rosbags.highlevel import AnyReader
+
+    ours = read_log(log)
+    place = dict.fromkeys(ours.topics, 0)
+    with AnyReader([log]) as reader:
+        for connection, timestamp, raw in reader.messages():
+            decoded = reader.deserialize(raw, connection.msgtype)
+            topic, k = ours.topics[connection.topic], place[connection.topic]
+            assert equal(decoded, topic.rows[k])
+            assert timestamp == topic.log_time_ns[k]
+            place[connection.topic] += 1
+    assert place == {SAMPLE: 600, COUNTS: 600}
+
+
+def test_the_file_satisfies_the_reference_reader_with_all_checksums(log):
+    with log.open("rb") as file:
+        kinds = [type(r).__name__ for r in StreamReader(file, validate_crcs=True).records]
+    assert kinds.count("Message") == 1200
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary.statistics.channel_message_counts == {1: 600, 2: 600}
+    assert summary.statistics.attachment_count == 1
+    assert len(summary.chunk_indexes) == summary.statistics.chunk_count
+
+
+def test_everything_known_about_the_run_is_read_back(log):
+    read = read_log(log)
+    assert read.run.name == "run"
+    assert read.run.conditions == {"load_command_a": 0.3, "object": "spring"}
+    assert read.run.instrument.serial == "0042"
+    assert read.run.details == {"protocol": {"kind": "sine", "frequencies_hz": [0.5, 1.0]}}
+    assert read.end == RunEnd(
+        expected_samples={SAMPLE: 600},
+        counters={"crc_errors": 2},
+        zeros_after={"proximal_torque_n_m": 1.6e-3},
+        drift={"proximal_torque_n_m": 1e-4},
+        drift_verdict="within limits",
+    )
+    assert read.marks == (Mark(0.1, "finger on the jaw"),)
+    assert read.stretches == (Stretch(0.2, 0.3, Flag.SUSPECT, "re-index", "spindle_angle_rad"),)
+    assert read.attachments[0].data == b"[rig]\nname = 'bench 1'\n"
+    assert [f.unit for f in read.topics[SAMPLE].stream.fields][:4] == ["s", "A", "rad", "N m"]
+
+
+def test_only_the_wanted_topics_are_read(log):
+    assert list(read_log(log, [COUNTS]).topics) == [COUNTS]
+    assert read_log(log, ()).topics == {}
+    with pytest.raises(UsageError, match="no topic /rig/nothing"):
+        read_log(log, ["/rig/nothing"])
+
+
+def test_a_stream_without_messages_is_there_and_empty(tmp_path):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+        writer.write("/t", rows(0), times(0))
+    assert len(read_log(tmp_path / "a.mcap").topics["/t"]) == 0
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
+def test_a_file_of_another_writer_with_interleaved_streams_is_read(tmp_path, compression):
+    """Schemas inside the chunks, two streams alternating, and a stream of variable size."""
+    other = Stream("/u", "p/msg/Q", (Field("y", "int32"),))
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4096, compression=compression)
+        writer.start("ros2", library="other")
+        numbers = {}
+        for stream in (STREAM, other):
+            schema = writer.register_schema(
+                stream.message_type, "ros2msg", stream.schema_text.encode()
+            )
+            numbers[stream.topic] = writer.register_channel(stream.topic, "cdr", schema)
+        text = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        numbers["/s"] = writer.register_channel("/s", "cdr", text)
+        head = b"\x00\x01\x00\x00"
+        for k in range(500):
+            x = np.array((k / 7, k, 0), STREAM.dtype).tobytes()
+            y = np.array((-k,), other.dtype).tobytes()
+            writer.add_message(numbers["/t"], k, head + x, k)
+            writer.add_message(numbers["/u"], k + 5, head + y, k)
+            writer.add_message(numbers["/s"], k, head + b"\x02\0\0\0a\0", k)
+        writer.finish()
+    read = read_log(path)
+    assert read.unread == ("/s",)
+    np.testing.assert_array_equal(read.topics["/t"].rows["x_a"], np.arange(500) / 7)
+    np.testing.assert_array_equal(read.topics["/u"].rows["y"], -np.arange(500))
+    np.testing.assert_array_equal(read.topics["/u"].log_time_ns, np.arange(500) + 5)
+
+
+def test_while_recording_the_file_is_called_part_and_a_clean_close_renames_it(tmp_path):
+    path = tmp_path / "a.mcap"
+    with LogWriter(path, RunInfo("a"), [STREAM]) as writer:
+        writer.write("/t", rows(5), times(5))
+        assert [item.name for item in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert [item.name for item in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_an_exception_closes_the_log_and_says_why_it_is_not_clean(tmp_path):
+    path = tmp_path / "a.mcap"
+
+    def record():
+        with LogWriter(path, RunInfo("a"), [STREAM]) as writer:
+            writer.write("/t", rows(5), times(5))
+            raise RuntimeError("motor stalled")
+
+    with pytest.raises(RuntimeError, match="motor stalled"):
+        record()
+    read = read_log(path)
+    assert len(read.topics["/t"]) == 5
+    assert (read.end.clean, read.end.reason) == (False, "RuntimeError: motor stalled")
+
+
+@pytest.mark.parametrize("taken", ["a.mcap", "a.mcap.part"])
+def test_a_log_is_never_overwritten(tmp_path, taken):
+    (tmp_path / taken).write_bytes(b"precious")
+    with pytest.raises(LogExistsError, match="already"):
+        LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM])
+    assert (tmp_path / taken).read_bytes() == b"precious"
+
+
+def test_a_full_disk_is_reported_and_leaves_the_part(tmp_path, monkeypatch):
+    def full(channel, messages):
+        raise OSError(28, "No space left on device")
+
+    def record():
+        with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+            writer.write("/t", rows(5), times(5))
+            writer.flush()
+            monkeypatch.setattr(writer._container, "add_chunk", full)
+            writer.write("/t", rows(5, 5), times(5, 5))
+
+    with pytest.raises(LogWriteError, match="No space left") as caught:
+        record()
+    assert "rig log repair" in caught.value.fix
+    assert len(read_log(tmp_path / "a.mcap.part", tolerant=True).topics["/t"]) == 5
+
+
+def on_disk(path):
+    """Number of messages the operating system has of a log being written."""
+    return len(read_log(path, tolerant=True).topics["/t"])
+
+
+def test_a_sample_is_in_the_system_within_a_quarter_second_of_the_clock(tmp_path):
+    clock = Clock()
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM], clock=clock) as writer:
+        writer.write("/t", rows(1), times(1))
+        assert on_disk(writer.part) == 0
+        clock.now_s += 0.125
+        assert not writer.poll()
+        clock.now_s += 0.125
+        assert writer.poll()
+        assert on_disk(writer.part) == 1
+        assert not writer.poll()
+    assert pytest.approx(MAX_LOSS_S) == FLUSH_AFTER_S + 0.05
+
+
+def test_a_later_write_does_not_push_the_deadline_back(tmp_path):
+    clock = Clock()
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM], clock=clock) as writer:
+        for k in range(3):  # all at one data time
+            assert on_disk(writer.part) == 0
+            writer.write("/t", rows(1, k), times(1))
+            clock.now_s += 0.125
+        assert on_disk(writer.part) == 3
+
+
+def test_faster_than_real_time_the_data_time_sets_the_deadline(tmp_path):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM], clock=Clock()) as writer:
+        for first in range(0, 3000, 20):
+            writer.write("/t", rows(20, first), times(20, first))
+            assert writer.received["/t"] - on_disk(writer.part) <= MAX_LOSS_S * 1000
+
+
+def test_a_mark_is_in_the_system_at_once(tmp_path):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM], clock=Clock()) as writer:
+        writer.mark(Mark(1.0, "slipped"))
+        assert read_log(writer.part, tolerant=True).marks == (Mark(1.0, "slipped"),)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_not_finite_needs_a_flag(tmp_path, value):
+    path = tmp_path / "a.mcap"
+    with LogWriter(path, RunInfo("a"), [STREAM]) as writer:
+        with pytest.raises(UnflaggedSampleError, match="x_a of /t is not finite in row 0"):
+            writer.write("/t", rows(3, x=value), times(3))
+        writer.write("/t", rows(3, x=value, flags=Flag.MISSING), times(3))
+    np.testing.assert_array_equal(read_log(path).topics["/t"].rows["x_a"], np.full(3, value))
+
+
+def test_a_stream_without_flags_takes_finite_values_only(tmp_path):
+    stream = Stream("/u", "p/msg/P", (Field("x", "float64"),))
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [stream]) as writer:
+        with pytest.raises(UnflaggedSampleError):
+            writer.write("/u", {"x": np.array([1.0, np.nan])}, times(2))
+        assert writer.received == {"/u": 0}
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"sequence": np.array([0, 2**32])}, "does not fit"),
+        ({"sequence": np.array([-1, 0])}, "does not fit"),
+        ({"flags": np.array([0.5, 0.5])}, "not a whole number"),
+        ({"x_a": np.zeros(3)}, "differ in shape"),
+        ({"y": np.zeros(2)}, "unknown"),
+    ],
+)
+def test_values_that_would_change_on_the_way_are_refused(tmp_path, change, reason):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+        with pytest.raises(DataError, match=reason):
+            writer.write("/t", rows(2) | change, times(2))
+        with pytest.raises(DataError, match="nanoseconds"):
+            writer.write("/t", rows(2), np.array([0.0, 1.0]))
+        with pytest.raises(DataError, match="before the epoch"):
+            writer.write("/t", rows(2), np.array([-1, 1]))
+        with pytest.raises(UsageError, match="no stream"):
+            writer.write("/nothing", rows(2), times(2))
+
+
+def test_metadata_that_is_not_finite_is_refused_before_a_file_is_made(tmp_path):
+    with pytest.raises(DataError, match="conditions"):
+        LogWriter(tmp_path / "a.mcap", RunInfo("a", conditions={"load_a": np.nan}), [STREAM])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_large_block_is_cut_into_chunks_and_read_back(tmp_path):
+    count = 60_000
+    block = rows(count) | {"x_a": np.random.default_rng(0).normal(size=count)}
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+        writer.write("/t", block, times(count))
+    np.testing.assert_array_equal(
+        read_log(tmp_path / "a.mcap").topics["/t"].rows["x_a"], block["x_a"]
+    )
+
+
+def test_the_end_of_a_run_that_cannot_be_written_leaves_the_writer_open(tmp_path):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [COUNTS_STREAM]) as writer:
+        with pytest.raises(DataError, match="drift"):
+            writer.close(RunEnd(drift={"proximal_torque_n_m": np.nan}))
+        writer.close(RunEnd(drift_verdict="not judged"))
+    assert read_log(tmp_path / "a.mcap").end.drift_verdict == "not judged"
+
+
+@pytest.mark.parametrize("data", [b"", b"a", b"not a log at all" * 50, bytes(5000)])
+def test_a_file_of_another_kind_is_named_as_such(tmp_path, data):
+    path = tmp_path / "a.mcap"
+    path.write_bytes(data)
+    with pytest.raises(NotALogError):
+        read_log(path, tolerant=True)
+
+
+def test_a_log_being_written_is_refused_unless_asked_for(tmp_path):
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+        with pytest.raises(DamagedLogError, match="not finished") as caught:
+            read_log(writer.part)
+        assert f"rig log repair {writer.part}" in caught.value.fix

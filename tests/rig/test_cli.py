@@ -1,0 +1,42 @@
+"""The command line's skeleton: instant help, errors in three lines, exit codes."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from rig.cli.main import main
+from rig.cli.output import plain
+from rig.errors import DataError, ExitCode, UsageError, exit_code_of
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; from rig.cli.main import main; main(['--help']);"
+        "heavy = {'torch', 'numba', 'scipy', 'matplotlib', 'numpy', 'pyarrow', 'pydantic'};"
+        "sys.exit(f'imported: {heavy & set(sys.modules)}' if heavy & set(sys.modules) else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "record" in done.stdout
+
+
+def test_an_unknown_verb_is_a_usage_error(capsys):
+    assert main(["recrod"]) == ExitCode.USAGE
+    assert "recrod" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [(UsageError("x"), 2), (DataError("x"), 5), (ValueError("x"), 70)],
+)
+def test_exit_codes(error, code):
+    assert exit_code_of(error) == code
+
+
+def test_json_has_no_nan_and_no_numpy():
+    import numpy as np
+
+    value = plain({"a": np.float64("nan"), "b": np.arange(2), "c": (1, float("inf"))})
+    assert json.dumps(value, allow_nan=False) == '{"a": null, "b": [0, 1], "c": [1, null]}'

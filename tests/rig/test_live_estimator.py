@@ -1,0 +1,50 @@
+"""A model file shown live gives the estimate it gives offline."""
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.fitting import fit
+from estimation.model import predict
+from estimation.recording import MissingChannelError, Recording
+from rig.live.estimator import ModelEstimator
+from rig.live.replay import replay_blocks
+
+SPINDLE = "proximal_torque_n_m"
+
+
+def recording(seed):
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(3000) / 1000
+    current_a = 0.3 + 0.1 * np.sin((3 + seed) * time_s) + rng.normal(0, 0.002, time_s.size)
+    return Recording(
+        str(seed), time_s, {"motor_current_a": current_a, SPINDLE: 0.6 * current_a - 0.02}
+    )
+
+
+@pytest.fixture
+def model_path(tmp_path):
+    declared = model_file.read(model_file.shipped()["linear"])
+    campaign = Campaign.of([recording(seed) for seed in range(3)])
+    path = tmp_path / "linear.toml"
+    model_file.write(fit(declared, campaign, bootstrap=0), path)
+    return path
+
+
+def test_replayed_estimates_are_the_causal_prediction(model_path):
+    run = recording(7)
+    estimator = ModelEstimator(model_path, run.sample_rate_hz)
+    assert estimator.target_channel == SPINDLE
+    blocks = list(replay_blocks(run, estimator, speed=None))
+    live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
+    offline = predict(model_file.read(model_path), run, causal=True)
+    np.testing.assert_allclose(live, offline, rtol=1e-9, atol=1e-12)
+    assert np.abs(live[1000:] - run[SPINDLE][1000:]).max() < 0.01
+
+
+def test_a_channel_the_model_lacks_is_named(model_path):
+    run = Recording("x", np.arange(100) / 1000, {SPINDLE: np.zeros(100)})
+    estimator = ModelEstimator(model_path, 1000.0)
+    with pytest.raises(MissingChannelError, match="motor_current_a"):
+        list(replay_blocks(run, estimator, speed=None))

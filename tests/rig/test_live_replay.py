@@ -1,0 +1,263 @@
+"""A recording replayed: through the stream, and through the command."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from estimation.campaign import Campaign
+from estimation.recording import Flag, Recording, Stretch
+from rig.cli.replay import replay
+from rig.errors import DataError, UsageError
+from rig.live.replay import lost_samples, replay_blocks
+
+GRIP = "distal_torque_n_m"
+ESTIMATED = "estimated_distal_torque_n_m"
+
+
+def recording(name="07", seconds=2.0, **changes):
+    time_s = np.arange(int(seconds * 1000)) / 1000
+    current_a = 0.3 + 0.1 * np.sin(3 * time_s)
+    parts = {
+        "name": name,
+        "time_s": time_s,
+        "columns": {"motor_current_a": current_a, GRIP: 0.4 * current_a},
+    }
+    return Recording(**parts | changes)
+
+
+class Smoothed:
+    """An estimator with a memory: current times a constant through a first-order low-pass."""
+
+    target_channel = GRIP
+
+    def __init__(self):
+        self._state = 0.0
+
+    def push(self, columns, time_s):
+        out = np.empty(time_s.size)
+        for i, current_a in enumerate(columns["motor_current_a"]):
+            self._state += 0.1 * (0.4 * current_a - self._state)
+            out[i] = self._state
+        return out
+
+
+class VirtualTime:
+    """A clock that only sleeping advances."""
+
+    def __init__(self):
+        self.now_s = 100.0
+
+    def clock(self):
+        return self.now_s
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now_s += seconds
+
+
+def test_blocks_together_are_the_recording():
+    source = recording(seconds=1.234)
+    blocks = list(replay_blocks(source, None, speed=None))
+    assert len(blocks) == 25
+    assert max(len(b) for b in blocks) <= 51
+    np.testing.assert_array_equal(np.concatenate([b.time_s for b in blocks]), source.time_s)
+    for name in source.columns:
+        joined = np.concatenate([b.columns[name] for b in blocks])
+        np.testing.assert_array_equal(joined, source[name])
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
+def test_pace_is_that_of_the_recording_times_speed(speed):
+    time = VirtualTime()
+    began = time.now_s
+    for block in replay_blocks(recording(), None, speed, sleep=time.sleep, clock=time.clock):
+        due = began + block.time_s[-1] / speed
+        assert time.now_s == pytest.approx(due), "a block comes when its last sample was taken"
+    assert time.now_s - began == pytest.approx(1.999 / speed)
+
+
+def test_a_slow_reader_is_caught_up_with_and_not_waited_for():
+    time = VirtualTime()
+    blocks = replay_blocks(recording(), None, 1.0, sleep=time.sleep, clock=time.clock)
+    for index, _ in enumerate(blocks):
+        if index == 3:
+            time.now_s += 1.0  # the reader was away for a second
+    assert time.now_s == pytest.approx(100 + 1.999)
+
+
+def test_the_model_sees_one_stream_whatever_the_blocks():
+    source = recording()
+    whole = Smoothed().push(source.columns, source.time_s)
+    blocks = replay_blocks(source, Smoothed(), None, block_s=0.013)
+    cut = np.concatenate([b.estimates[GRIP] for b in blocks])
+    np.testing.assert_array_equal(cut, whole)
+
+
+def test_recorded_estimates_are_shown_unless_an_estimator_replaces_them():
+    source = recording().with_columns(**{ESTIMATED: np.full(2000, 0.5)})
+    first = next(replay_blocks(source, None, None))
+    assert set(first.estimates[GRIP]) == {0.5}
+    estimated = next(replay_blocks(source, Smoothed(), None))
+    assert estimated.estimates[GRIP][0] < 0.1
+
+
+def test_gaps_and_missing_samples_count_as_lost():
+    flags = np.zeros(2000, np.uint8)
+    flags[10:15] = Flag.MISSING
+    source = recording(flags=flags)
+    keep = np.r_[0:500, 700:2000]
+    holed = Recording(
+        "h", source.time_s[keep], {GRIP: source[GRIP][keep]}, flags=source.flags[keep]
+    )
+    assert lost_samples(holed)[[9, 14, 499, 500, -1]].tolist() == [0, 5, 5, 205, 205]
+    assert list(replay_blocks(holed, None, None))[-1].lost == 205
+
+
+def test_a_flagged_stretch_tells_its_reason():
+    source = recording().with_stretch(Stretch(1.0, 1.1, Flag.SUSPECT, "runaway: command 1.06"))
+    states = [b.devices[0] for b in replay_blocks(source, None, None)]
+    assert states[0].state == "ok"
+    assert (states[20].state, states[20].detail) == ("suspect", "runaway: command 1.06")
+    assert states[-1].state == "ok"
+
+
+def test_nothing_to_show_is_an_error():
+    empty = Recording("none", np.empty(0), {GRIP: np.empty(0)})
+    with pytest.raises(DataError, match="no samples"):
+        replay_blocks(empty, None, None)
+    with pytest.raises(UsageError, match="speed"):
+        replay_blocks(recording(), None, -1.0)
+
+
+@pytest.fixture
+def logs(monkeypatch, tmp_path):
+    """Make every path open as the campaign given."""
+
+    def use(*recordings):
+        monkeypatch.setattr(
+            "rig.importers.registry.open_campaign",
+            lambda path, format_name=None: Campaign.of(recordings),
+        )
+        return str(tmp_path)
+
+    return use
+
+
+def command(*words):
+    app = typer.Typer()
+    app.command()(replay)
+    return app(args=[*words], standalone_mode=False)
+
+
+def test_command_writes_json_lines(logs, capsys):
+    path = logs(recording())
+    assert command(path, "--json", "--speed", "0", "--lever-mm", "10") == 0
+    out, err = capsys.readouterr()
+    frames = [json.loads(line) for line in out.splitlines()]
+    assert len(frames) == 21
+    grip = frames[5]["channels"][GRIP]
+    assert grip["tip_force_n"] == pytest.approx(grip["sensor"] / 0.010)
+    assert grip["tip_force_from"] == "sensor"
+    assert frames[-1]["summary"]["samples"] == 2000
+    assert err == ""
+
+
+def test_command_writes_plain_lines_and_says_which_run(logs, capsys):
+    path = logs(recording("00").exclude("runaway"), recording("01"), recording("02"))
+    assert command(path, "--plain", "--speed", "0") == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Run 01, 2 of 3; --run NAME shows another." in err
+    assert "Finished after 2.0 s: 2000 samples, lost 0." in err
+
+
+def test_command_shows_the_run_asked_for_and_why_it_does_not_count(logs, capsys):
+    path = logs(recording("00").exclude("runaway"), recording("01", seconds=1.0))
+    assert command(path, "--plain", "--speed", "0", "--run", "00") == 0
+    err = capsys.readouterr().err
+    assert "Run 00 is left out of evidence: runaway" in err
+    assert "2000 samples" in err
+
+
+def test_command_runs_a_model(logs, capsys, monkeypatch):
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Smoothed())
+    path = logs(recording())
+    assert command(path, "--json", "--speed", "0", "--model", "model.json") == 0
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    grip = frames[-2]["channels"][GRIP]
+    assert grip["estimate"] == pytest.approx(grip["sensor"], rel=0.05)
+    assert 0 < frames[-1]["summary"]["error_rms"] < 0.02
+
+
+def test_command_interrupted_leaves_with_130(logs, capsys, monkeypatch):
+    class Interrupting(Smoothed):
+        def push(self, columns, time_s):
+            if time_s[0] > 0.5:
+                raise KeyboardInterrupt
+            return super().push(columns, time_s)
+
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Interrupting())
+    assert command(logs(recording()), "--json", "--speed", "0", "--model", "m.json") == 130
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["summary"]["ended"] == "interrupted"
+
+
+@pytest.mark.parametrize(
+    "words", [("--run", "99"), ("--speed", "-1"), ("--speed", "nan"), ("--lever-mm", "0")]
+)
+def test_command_refuses_what_cannot_be(logs, words):
+    with pytest.raises(UsageError):
+        command(logs(recording()), *words)
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    """As in `rig replay LOG --json | head -1`."""
+    code = (
+        "import numpy as np\n"
+        "from rig.cli.output import console\n"
+        "from rig.live.block import SampleBlock\n"
+        "from rig.live.options import ShowOptions\n"
+        "from rig.live.run import show\n"
+        "def blocks():\n"
+        "    for k in range(100_000):\n"
+        "        t = 0.1 * k + np.arange(2) / 1000\n"
+        "        yield SampleBlock(t, {}, np.zeros(2, np.uint8), {}, 0, ())\n"
+        "ended = show(blocks(), ShowOptions('run', json=True), console()).ended\n"
+        "raise SystemExit(0 if ended == 'output_closed' else 9)\n"
+    )
+    root = Path(__file__).parents[2]
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    ) as process:
+        assert process.stdout is not None
+        json.loads(process.stdout.readline())
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_the_command_module_starts_without_heavy_imports():
+    code = (
+        "import sys, rig.cli.replay\n"
+        "heavy = {'numpy', 'rich.live', 'numba', 'torch', 'matplotlib'} & set(sys.modules)\n"
+        "raise SystemExit(', '.join(sorted(heavy)))\n"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
+    assert done.stderr.strip() == ""

@@ -1,0 +1,186 @@
+"""The display from the first block to the summary, in virtual time."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from rig.errors import SafetyTripError, UsageError
+from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.options import ShowOptions
+from rig.live.run import show
+
+GRIP = "distal_torque_n_m"
+
+
+def blocks(count, ends_with=None, on_close=lambda: None):
+    """Yield 50 ms blocks at 1 kHz, then raise if asked."""
+    try:
+        for index in range(count):
+            time_s = (50 * index + np.arange(50)) / 1000
+            torque = 0.1 + 0.02 * np.sin(time_s)
+            yield SampleBlock(
+                time_s,
+                {GRIP: torque},
+                np.zeros(50, np.uint8),
+                {GRIP: torque + 0.002},
+                lost=3,
+                devices=(DeviceStatus("teensy", "ok"),),
+            )
+        if ends_with is not None:
+            raise ends_with
+    finally:
+        on_close()
+
+
+def people(terminal=False, **changes):
+    return Console(
+        file=io.StringIO(),
+        width=80,
+        height=24,
+        force_terminal=terminal,
+        _environ={"TERM": "xterm-256color"},
+        **changes,
+    )
+
+
+def steady_clock(step_s=0.05):
+    """Return a clock that advances whenever it is read."""
+    now = [0.0]
+
+    def clock():
+        now[0] += step_s
+        return now[0]
+
+    return clock
+
+
+def test_json_writes_ten_frames_a_second_and_a_summary(capsys):
+    console = people()
+    summary = show(blocks(40), ShowOptions("run", json=True), console)
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [f["kind"] for f in frames] == ["frame"] * 20 + ["summary"]
+    grip = frames[-2]["channels"][GRIP]
+    assert grip["unit"] == "N m"
+    assert grip["estimate"] - grip["sensor"] == pytest.approx(0.002)
+    assert grip["tip_force_n"] == pytest.approx(grip["estimate"] / 0.012)
+    assert frames[-2]["devices"] == [{"name": "teensy", "state": "ok", "detail": ""}]
+    assert frames[-1]["summary"]["samples"] == summary.samples == 2000
+    assert console.file.getvalue() == "", "people read nothing when a machine does"
+
+
+def test_plain_writes_two_lines_a_second_and_a_summary(capsys):
+    console = people()
+    show(blocks(40), ShowOptions("run"), console)
+    lines = console.file.getvalue().splitlines()
+    assert len([line for line in lines if "1000 Hz" in line and "mN m" in line]) == 4
+    assert "Finished after 2.0 s: 2000 samples, LOST 3" in lines[-2]
+    assert "rms error 2.0 mN m over 2000 samples" in lines[-1]
+    assert capsys.readouterr().out == ""
+
+
+def test_plain_is_chosen_by_option_and_by_the_terminal():
+    for console, options in (
+        (people(terminal=True), ShowOptions("run", plain=True)),
+        (people(terminal=False), ShowOptions("run")),
+        (
+            Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": "dumb"}, width=80),
+            ShowOptions("run"),
+        ),
+    ):
+        show(blocks(20), options, console)
+        assert "⠀" not in console.file.getvalue()
+        assert " | " in console.file.getvalue()
+
+
+def test_a_terminal_gets_the_drawing_and_its_cursor_back():
+    console = people(terminal=True)
+    show(blocks(40), ShowOptions("rig live"), console, steady_clock())
+    drawn = console.file.getvalue()
+    assert "⠉" in drawn or "⣀" in drawn
+    assert drawn.rindex("\x1b[?25h") > drawn.rindex("\x1b[?25l"), "the cursor is shown again"
+    assert "Finished after 2.0 s" in drawn
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_ctrl_c_leaves_with_a_summary_and_closes_the_stream(terminal):
+    closed = []
+    stream = blocks(40, KeyboardInterrupt(), on_close=lambda: closed.append(True))
+    console = people(terminal=terminal)
+    summary = show(stream, ShowOptions("run"), console, steady_clock())
+    assert summary.ended == "interrupted"
+    assert summary.samples == 2000
+    assert summary.lost == 3
+    assert summary.error_rms == pytest.approx(0.002)
+    assert closed == [True]
+    assert "Stopped after 2.0 s" in console.file.getvalue()
+
+
+def test_ctrl_c_while_drawing_closes_the_stream():
+    closed = []
+
+    class Interrupted(io.StringIO):
+        def write(self, text):
+            if "Grip" in text and not closed:
+                raise KeyboardInterrupt
+            return super().write(text)
+
+    console = Console(file=Interrupted(), force_terminal=False, width=80)
+    summary = show(blocks(40, on_close=lambda: closed.append(True)), ShowOptions("run"), console)
+    assert summary.ended == "interrupted"
+    assert closed == [True]
+
+
+def test_ctrl_c_in_json_still_ends_with_a_summary(capsys):
+    show(blocks(4, KeyboardInterrupt()), ShowOptions("run", json=True), people())
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["summary"]["ended"] == "interrupted"
+
+
+def test_a_fault_of_the_stream_is_passed_on_with_the_terminal_given_back():
+    console = people(terminal=True)
+    with pytest.raises(SafetyTripError, match="over current"):
+        show(blocks(10, SafetyTripError("over current")), ShowOptions("run"), console)
+    drawn = console.file.getvalue()
+    assert drawn.rindex("\x1b[?25h") > drawn.rindex("\x1b[?25l")
+
+
+def test_slow_drawing_skips_frames_but_shows_the_newest_at_the_end():
+    fast, slow = people(terminal=True), people(terminal=True)
+    show(blocks(100), ShowOptions("run"), fast, steady_clock(0.1))
+    frozen = iter([0.0, 60.0, *[60.0] * 10_000])  # drawing the first frame took a minute
+    show(blocks(100), ShowOptions("run"), slow, lambda: next(frozen))
+    assert fast.file.getvalue().count("error rms") >= 40
+    assert slow.file.getvalue().count("error rms") == 2, "the first and the last"
+    assert "4.9 s  1000 Hz" in slow.file.getvalue()
+
+
+def test_one_long_block_is_one_frame(capsys):
+    time_s = np.arange(10_000) / 1000
+    long = SampleBlock(time_s, {GRIP: time_s * 0}, np.zeros(10_000, np.uint8), {}, 0, ())
+    show(iter([long]), ShowOptions("run", json=True), people())
+    assert len(capsys.readouterr().out.splitlines()) == 2
+
+
+def test_silence_is_shown_in_the_clock_of_the_person(capsys):
+    def silent():
+        yield from blocks(1)
+        for _ in range(8):
+            yield SampleBlock(
+                np.empty(0), {}, np.empty(0, np.uint8), {}, 3, (DeviceStatus("teensy", "stale"),)
+            )
+
+    show(silent(), ShowOptions("run", json=True), people(), steady_clock(0.04))
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()][:-1]
+    assert len(frames) == 1 + 4
+    assert frames[-1]["channels"][GRIP]["sensor"] is None
+    assert frames[-1]["channels"][GRIP]["sensor_missing"] == "no samples arriving"
+    assert frames[-1]["devices"][0]["state"] == "stale"
+
+
+@pytest.mark.parametrize("lever_m", [0.0, -0.012, float("nan"), float("inf")])
+def test_a_lever_that_gives_no_force_is_refused(lever_m):
+    with pytest.raises(UsageError, match="lever"):
+        ShowOptions("run", lever_m=lever_m)

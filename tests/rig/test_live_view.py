@@ -1,0 +1,167 @@
+"""What a person reads on the display, as text, wide and narrow."""
+
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from estimation.recording import Flag
+from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
+from rig.live.digits import big
+from rig.live.plain import plain_line
+from rig.live.state import LiveState
+from rig.live.view import View
+
+GRIP = "distal_torque_n_m"
+DEVICES = (DeviceStatus("teensy", "armed", "SIM-0001"), DeviceStatus("load", "stale", "no reply"))
+LIMITS = (LimitStatus("motor current", 0.31, 0.6, "A"), LimitStatus("torque", -0.29, 0.3, "N m"))
+
+
+def stream(seconds=12.0, channel=GRIP, **changes):
+    time_s = np.arange(int(seconds * 1000)) / 1000
+    torque = np.full(time_s.size, 0.12)
+    block = SampleBlock(
+        time_s,
+        {channel: torque},
+        np.zeros(time_s.size, np.uint8),
+        {channel: torque + 0.0034},
+        lost=0,
+        devices=DEVICES,
+        limits=LIMITS,
+    )
+    return dataclasses.replace(block, **changes)
+
+
+def snapshot_of(block, channels=(GRIP,)):
+    state = LiveState(channels)
+    state.feed(block)
+    return state.snapshot()
+
+
+def render(snapshot, width=80, height=24, color=None, lever_m=0.012):
+    console = Console(
+        file=io.StringIO(),
+        width=width,
+        height=height,
+        color_system=color,
+        force_terminal=bool(color),
+    )
+    console.print(View(snapshot, "rig live", lever_m))
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize("width", [80, 40])
+def test_shows_what_a_person_needs(width):
+    text = render(snapshot_of(stream()), width)
+    for wanted in (
+        "123.4 mN m",
+        "10.28 N at the jaw tip (lever 12 mm)",
+        "sensor 120.0 mN m",
+        "error rms 3.4 mN m in 5 s",
+        "1000 Hz",
+        "lost 0",
+        "● teensy armed",
+        "▲ load stale",
+        "0.310 of 0.600 A, 52 %",
+        "-290.0 of 300.0 mN m, 97 % near"[: width - 8],
+        "Ctrl-C",
+    ):
+        assert wanted in text, f"{wanted!r} is not on a display of {width} columns"
+
+
+@pytest.mark.parametrize(("width", "height"), [(200, 60), (80, 24), (64, 24), (40, 24), (24, 10)])
+def test_no_line_is_wider_than_the_terminal_and_the_drawing_fits(width, height):
+    lines = render(snapshot_of(stream()), width, height).splitlines()
+    assert all(len(line) < width for line in lines)
+    if height >= 24:
+        assert len(lines) < height
+
+
+def test_large_digits_spell_the_number():
+    text = render(snapshot_of(stream()))
+    for line in big("123.4"):
+        assert line.rstrip() in text
+
+
+def test_traces_are_named_and_their_scale_is_labelled():
+    lines = render(snapshot_of(stream())).splitlines()
+    assert any(line.startswith("estimate") and "150 ┤" in line for line in lines)
+    assert any(line.startswith("sensor") and "150 ┤" in line for line in lines)
+    assert any("mN m, last 10 s" in line for line in lines)
+    assert sum(line.lstrip().startswith("0 ┤") for line in lines) == 2
+
+
+@pytest.mark.parametrize("width", [80, 40])
+def test_flagged_samples_show_the_reason_and_no_number(width):
+    flags = np.zeros(12_000, np.uint8)
+    flags[-500:] = Flag.SATURATED
+    text = render(snapshot_of(stream(flags=flags)), width)
+    assert "no value (saturated)" in text
+    assert "flagged in 10 s: saturated 500" in text
+    assert "no force at the jaw tip" in text
+    assert "mN m (" not in text
+    assert "123.4" not in text
+
+
+def test_lost_samples_stand_out_in_words():
+    assert "LOST 120 (0.99 %)" in render(snapshot_of(stream(lost=120)))
+
+
+def test_without_an_estimator_the_sensor_is_the_main_value():
+    text = render(snapshot_of(stream(estimates={})))
+    assert "Grip torque, sensor  120.0 mN m" in text
+    assert "no estimator" in text
+    assert "10.00 N at the jaw tip" in text
+    assert "estimate" not in text.replace("no estimator", "")
+
+
+def test_newtons_are_only_claimed_for_the_jaw():
+    text = render(
+        snapshot_of(stream(channel="proximal_torque_n_m"), ("proximal_torque_n_m",)), lever_m=0.012
+    )
+    assert "Spindle torque" in text
+    assert " N at " not in text
+
+
+def test_the_lever_arm_is_the_one_given():
+    text = render(snapshot_of(stream()), lever_m=0.0105)
+    assert "11.75 N at the jaw tip (lever 10.5 mm)" in text
+
+
+def test_limits_say_in_words_when_they_are_near_or_unknown():
+    limits = (
+        LimitStatus("reached", 0.6, 0.6, "A"),
+        LimitStatus("unknown", float("nan"), 0.6, "A"),
+    )
+    text = render(snapshot_of(stream(limits=limits)))
+    assert "AT LIMIT" in text
+    assert "no value, limit 0.600 A" in text
+
+
+def test_colour_only_repeats_what_the_text_says():
+    coloured = Console(file=io.StringIO(), width=80, height=24, record=True, force_terminal=True)
+    coloured.print(View(snapshot_of(stream()), "rig live", 0.012))
+    assert coloured.export_text(styles=False) == render(snapshot_of(stream()))
+
+
+def test_before_the_first_sample_the_display_says_so():
+    text = render(LiveState((GRIP,)).snapshot())
+    assert "no samples yet" in text
+    assert "sensor  no value (no samples arriving)" in text
+
+
+def test_plain_line_holds_the_same_facts():
+    line = plain_line(snapshot_of(stream()), 0.012)
+    assert "\n" not in line
+    for wanted in ("123.4 mN m", "10.28 N at 12 mm", "1000 Hz", "lost 0", "teensy armed", "52 %"):
+        assert wanted in line
+
+
+def test_other_quantities_take_one_line_each():
+    block = stream()
+    block = dataclasses.replace(
+        block, columns={**block.columns, "jaw_angle_rad": np.full(12_000, 0.5)}
+    )
+    assert "28.65 deg" in render(snapshot_of(block, (GRIP, "jaw_angle_rad")))

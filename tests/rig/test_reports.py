@@ -1,0 +1,180 @@
+"""Pages of HTML: well formed, without references to anything outside, and quiet in a browser."""
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from io import StringIO
+
+import numpy as np
+import pytest
+from jinja2 import UndefinedError
+
+from estimation.fitting import fit
+from estimation.model_file import read, shipped
+from estimation.residual import largest_structure
+from rig.reports import figures
+from rig.reports.first_look import first_look
+from rig.reports.oneill import page
+from rig.reports.provenance import Provenance, commit
+from rig.reports.render import render, write_report
+from rig.reports.table import TextTable, to_markdown, to_rich
+from rig.studies.oneill import Source, run_study
+from tests.estimation.synthetic import campaign
+
+VOID = {"meta", "br", "hr", "img", "link", "input"}
+
+
+class Page(HTMLParser):
+    """Reads a page and keeps what a test asks for."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.counts: dict[str, int] = {}
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("src", "href", "xlink:href", "data", "action", "srcset"):
+                self.references.append(value)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def pages() -> dict[str, str]:
+    runs = campaign(lambda angle, speed, load: 2e-3 * np.sin(7 * angle))
+    model = fit(read(shipped()["motor"]), runs)
+    return {
+        "study": page(run_study(Source(runs, "a <b> & c", measured=False))),
+        "first_look": first_look(
+            model, runs, largest_structure(model, runs), "Nine runs were made.", Provenance.now(1)
+        ),
+    }
+
+
+NAMES = pytest.mark.parametrize("name", ["study", "first_look"])
+
+
+@NAMES
+def test_a_page_is_well_formed_and_complete(pages, name):
+    found = Page(pages[name])
+    assert found.open == []
+    assert found.counts["svg"] == found.counts["figure"] == 3
+    assert found.counts["table"] == 2
+    assert len(found.ids) == len(set(found.ids))
+    assert "seed" in pages[name]
+
+
+@NAMES
+def test_a_page_refers_to_nothing_outside_itself(pages, name):
+    found = Page(pages[name])
+    assert not re.search(r"https?:|//\w|@import|\bsrc=", pages[name])
+    assert "script" not in found.counts
+    assert all(reference.startswith("#") for reference in found.references)
+    targets = {*re.findall(r"url\((#[^)]*)\)", pages[name]), *found.references}
+    assert targets
+    assert {t.removeprefix("#") for t in targets} <= set(found.ids)
+
+
+def test_text_is_escaped(pages):
+    assert "a &lt;b&gt; &amp; c" in pages["study"]
+
+
+def test_the_first_look_says_what_is_left_and_no_more(pages):
+    text = pages["first_look"]
+    assert "it looks like a function of motor angle" in text
+    assert "7 times a motor turn" in text
+    assert "names no effect" in text
+    assert "friction.coulomb, width" in text
+
+
+@NAMES
+def test_a_browser_opens_a_page_without_an_error(pages, name, tmp_path):
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.skip("no chromium on the path: the page was not opened in a browser")
+    path = write_report(tmp_path / f"{name}.html", pages[name])
+    done = subprocess.run(
+        [
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--no-first-run",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--virtual-time-budget=2000",
+            "--enable-logging=stderr",
+            "--dump-dom",
+            path.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in done.stderr, done.stderr
+    assert done.stdout.count("<svg") == 3
+    assert "</html>" in done.stdout
+
+
+def test_a_template_that_lacks_a_name_is_an_error():
+    with pytest.raises(UndefinedError):
+        render("study.html", {"title": "x"})
+
+
+def test_figures_do_not_share_ids_and_thin_long_lines():
+    time_s = np.arange(100_000) * 1e-3
+    drawn = [
+        figures.over_time(time_s, {"x": np.sin(time_s)}, "N m", caption) for caption in ("a", "b")
+    ]
+    ids = [re.findall(r'id="([^"]*)"', text) for text in drawn]
+    assert not set(ids[0]) & set(ids[1])
+    assert len(drawn[0]) < 100_000
+    assert "currentColor" in drawn[0]
+
+
+def test_bins_with_few_samples_are_left_out():
+    x = np.concatenate([np.zeros(500), np.ones(500), [0.5]])
+    centres, mean, low, high = figures.binned(x, x, 10)
+    assert centres == pytest.approx([0.05, 0.95])
+    assert mean == pytest.approx([0.0, 1.0])
+    assert np.all(low <= high)
+
+
+def test_a_table_is_the_same_in_every_medium():
+    from rich.console import Console
+
+    table = TextTable("T [x]", ["a", "b"], [["p|q", "1"]], "a note")
+    assert to_markdown(table) == "## T [x]\n\n| a | b |\n|---|---:|\n| p\\|q | 1 |\n\na note\n"
+    written = StringIO()
+    Console(width=60, file=written).print(to_rich(table))
+    assert "T [x]" in written.getvalue()
+    assert "p|q" in written.getvalue()
+
+
+def test_provenance_names_the_commit(tmp_path):
+    assert commit(tmp_path) == "unknown"
+    made = Provenance.now(7)
+    assert made.seed == 7
+    assert "/" not in made.command
+    assert re.fullmatch(r"unknown|[0-9a-f]{7,}(\+changes)?", made.commit)

@@ -1,0 +1,215 @@
+"""Hidden effects: off leaves no trace, each shows where it should, and drawing is seeded."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.teensy import control
+from rig import trajectory
+from rig.simulation import plant
+from rig.simulation.bench import SimulatedBench
+from rig.simulation.hidden import KINDS, NAMES, HiddenEffect, UnknownHiddenEffectError, draw, table
+from rig.simulation.parameters import PlantParameters
+from rig.simulation.play import play
+
+OPEN_RAD = -1366 * 2 * np.pi / 8192
+Columns = dict[str, NDArray[np.float64]]
+
+
+def sweep(
+    effects: Sequence[HiddenEffect], speed_rad_s: float = 0.5, load_a: float = 0.5
+) -> Columns:
+    """Close by 1 rad at constant speed, rest 0.2 s, open again."""
+    close = OPEN_RAD + speed_rad_s * trajectory.times(1.0 / speed_rad_s)
+    target = np.concatenate([close, np.full(200, close[-1]), close[::-1]])
+    return play(SimulatedBench(effects=effects), target, np.full(target.size, load_a))
+
+
+def closing(columns: Columns, low_rad: float = -0.7, high_rad: float = -0.15) -> NDArray[np.bool_]:
+    """Samples of the closing half in a window of spindle angle."""
+    angle = columns["spindle_angle_rad"]
+    first_half = np.arange(angle.size) < angle.size // 2
+    return first_half & (angle > low_rad) & (angle < high_rad)
+
+
+def wave(columns: Columns, values: NDArray[np.float64], phase: NDArray[np.float64]) -> float:
+    """Amplitude of a wave in values over phase, by least squares."""
+    waves = [np.sin(phase), np.cos(phase), np.ones_like(phase), np.linspace(-1, 1, phase.size)]
+    a, b, _, _ = np.linalg.lstsq(np.column_stack(waves), values, rcond=None)[0]
+    return float(np.hypot(a, b))
+
+
+@pytest.fixture(scope="module")
+def plain() -> Columns:
+    return sweep([])
+
+
+def mean(columns: Columns, name: str, low_rad: float = -0.7, high_rad: float = -0.15) -> float:
+    return float(columns[name][closing(columns, low_rad, high_rad)].mean())
+
+
+def test_strength_zero_is_the_plain_plant_to_the_bit(plain: Columns) -> None:
+    off = sweep([HiddenEffect(name, 0.0) for name in NAMES])
+    for name, values in plain.items():
+        assert off[name].tobytes() == values.tobytes()
+
+
+def test_motor_ripple_shows_in_current_at_its_order(plain: Columns) -> None:
+    loud = sweep([HiddenEffect("motor_ripple", 2.0, (3.0, 0.5))], speed_rad_s=0.25)
+    quiet = sweep([], speed_rad_s=0.25)
+    amplitudes = []
+    for columns in (loud, quiet):
+        inside = closing(columns)
+        phase = 3.0 * columns["motor_angle_rad"][inside]
+        amplitudes.append(wave(columns, columns["motor_current_a"][inside], phase))
+    constant = PlantParameters().torque_constant_n_m_a
+    assert amplitudes[0] == pytest.approx(2.0 * 0.08e-3 / constant, rel=0.3)
+    assert amplitudes[1] < 0.1 * amplitudes[0]
+
+
+def test_gear_load_friction_costs_more_current_at_more_load() -> None:
+    effect = [HiddenEffect("gear_load_friction", 2.0)]
+    extra = [
+        mean(sweep(effect, load_a=load), "motor_current_a")
+        - mean(sweep([], load_a=load), "motor_current_a")
+        for load in (0.1, 0.9)
+    ]
+    assert extra[1] > 3.0 * extra[0] > 0.0
+
+
+def test_stribeck_friction_costs_more_current_when_slow() -> None:
+    effect = [HiddenEffect("gear_stribeck", 1.0, (8.0,))]
+    extra = [
+        mean(sweep(effect, speed), "motor_current_a") - mean(sweep([], speed), "motor_current_a")
+        for speed in (0.1, 1.0)
+    ]
+    assert extra[0] > 4e-3
+    assert extra[0] > 4.0 * abs(extra[1])
+
+
+def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses() -> None:
+    gap = 8e-3
+
+    def jump(effects: Sequence[HiddenEffect]) -> float:
+        columns = sweep(effects, load_a=0.1)
+        twist = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
+        return float(np.percentile(twist, 95) - np.percentile(twist, 5))
+
+    assert jump([HiddenEffect("gear_backlash", 1.0, (gap,))]) - jump([]) == pytest.approx(
+        2.0 * gap, rel=0.1
+    )
+
+
+def test_eccentricity_waves_the_twist_along_the_spindle(plain: Columns) -> None:
+    bent = sweep([HiddenEffect("gear_eccentricity", 1.0, (16.0, 0.3))])
+    amplitudes = []
+    for columns in (bent, plain):
+        inside = closing(columns)
+        twist = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
+        phase = 16.0 * columns["spindle_angle_rad"][inside]
+        amplitudes.append(wave(columns, twist[inside], phase))
+    assert amplitudes[0] == pytest.approx(2e-3, rel=0.4)
+    assert amplitudes[1] < 0.1e-3
+
+
+def test_torque_constant_sag_needs_more_current_for_the_same_torque(plain: Columns) -> None:
+    sagging = sweep([HiddenEffect("torque_constant_sag", 1.0, (0.2,))])
+    assert mean(sagging, "proximal_torque_n_m") == pytest.approx(
+        mean(plain, "proximal_torque_n_m"), rel=0.01
+    )
+    assert mean(sagging, "motor_current_a") > 1.06 * mean(plain, "motor_current_a")
+
+
+def test_the_bent_current_sensor_changes_only_what_is_measured(plain: Columns) -> None:
+    bent = sweep([HiddenEffect("current_sensor_bend", 1.0, (0.1,))])
+    for name, values in plain.items():
+        if name != "motor_current_a":
+            assert bent[name].tobytes() == values.tobytes()
+    assert mean(bent, "motor_current_a") > 1.08 * mean(plain, "motor_current_a")
+
+
+def test_the_tight_spot_shows_in_proximal_torque_at_its_place(plain: Columns) -> None:
+    tight = sweep([HiddenEffect("cable_position_friction", 1.0, (-0.5, 0.1))])
+    at_spot = [mean(c, "proximal_torque_n_m", -0.52, -0.48) for c in (tight, plain)]
+    beyond = [mean(c, "proximal_torque_n_m", -0.2, -0.15) for c in (tight, plain)]
+    assert at_spot[0] - at_spot[1] == pytest.approx(15e-3, rel=0.1)
+    assert beyond[0] - beyond[1] < 1e-3
+
+
+def test_presliding_builds_up_after_a_reversal(plain: Columns) -> None:
+    bristly = sweep([HiddenEffect("cable_presliding", 1.0, (0.2,))])
+    soon = [mean(c, "proximal_torque_n_m", -0.95, -0.93) for c in (bristly, plain)]
+    late = [mean(c, "proximal_torque_n_m", -0.2, -0.15) for c in (bristly, plain)]
+    assert late[0] - late[1] == pytest.approx(12e-3, rel=0.1)
+    assert 1e-3 < soon[0] - soon[1] < 8e-3
+
+
+def test_cable_creep_lets_the_jaw_go_on_after_a_load_step() -> None:
+    smooth = PlantParameters(jaw_friction_n_m=0.0, load_friction_n_m=0.0)
+    hold = np.full(4000, -0.5)
+    load = np.where(np.arange(4000) < 1000, 0.1, 0.9)
+    start = round(0.5 * 8192 / (2 * np.pi))
+    late = []
+    for effects in ([HiddenEffect("cable_creep", 1.0, (0.8,))], []):
+        bench = SimulatedBench(smooth, effects=effects, start_count=start)
+        jaw = play(bench, hold, load)["jaw_angle_rad"]
+        late.append(jaw[1500:1550].mean() - jaw[-50:].mean())
+    assert late[0] > 5e-3
+    assert abs(late[1]) < 2e-3
+
+
+def test_the_jaw_spring_opposes_closing_more_when_more_closed(plain: Columns) -> None:
+    sprung = sweep([HiddenEffect("jaw_spring", 1.0, (0.6, 0.5))])
+    rise = [
+        mean(c, "proximal_torque_n_m", -0.2, -0.15) - mean(c, "proximal_torque_n_m", -0.7, -0.65)
+        for c in (sprung, plain)
+    ]
+    assert rise[0] > rise[1] + 5e-3
+
+
+def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
+    stopped = sweep([HiddenEffect("end_stop_spring", 1.0, (0.8,))])
+    before = [mean(c, "proximal_torque_n_m", -0.7, -0.6) for c in (stopped, plain)]
+    past = [mean(c, "proximal_torque_n_m", -0.15, -0.1) for c in (stopped, plain)]
+    assert before[0] == pytest.approx(before[1], abs=1e-4)
+    assert past[0] > past[1] + 5e-3
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
+    bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
+    idle = np.zeros(2000, np.int32)
+    bench._state[plant.JAW_ANGLE] -= 0.1
+    bench.advance(2000, idle, idle, False, control.new_state(), np.zeros(5))
+    speeds = bench.state[[plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]]
+    np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
+
+
+def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
+    drawn = [draw(seed) for seed in range(200)]
+    assert drawn == [draw(seed) for seed in range(200)]
+    assert {effect.name for effect in drawn} == set(NAMES)
+    for effect in drawn:
+        kind = KINDS[NAMES.index(effect.name)]
+        assert kind.weakest <= effect.strength <= kind.strongest
+        assert len(effect.shape) == len(kind.shapes)
+        for value, shape in zip(effect.shape, kind.shapes, strict=True):
+            assert shape.low <= value <= shape.high
+            assert not shape.whole or value == round(value)
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ([HiddenEffect("gremlin")], "no hidden effect 'gremlin'"),
+        ([HiddenEffect("jaw_spring", -1.0)], "strength -1.0"),
+        ([HiddenEffect("jaw_spring", float("nan"))], "strength nan"),
+        ([HiddenEffect("jaw_spring"), HiddenEffect("jaw_spring")], "named twice"),
+        ([HiddenEffect("cable_creep", 1.0, (1.0, 2.0))], "shaped by 2 numbers"),
+    ],
+)
+def test_a_wrong_effect_is_refused(effects: list[HiddenEffect], message: str) -> None:
+    with pytest.raises(UnknownHiddenEffectError, match=message):
+        table(effects)

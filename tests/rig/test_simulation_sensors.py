@@ -1,0 +1,136 @@
+"""Counts: signs, quanta, noise, drift and limits."""
+
+import numpy as np
+import pytest
+
+from drivers.teensy import control
+from rig import trajectory
+from rig.simulation import sensors
+from rig.simulation.bench import SimulatedBench
+from rig.simulation.parameters import REFERENCE_GAINS, SensorParameters
+from rig.simulation.play import play
+
+GAINS = np.array(REFERENCE_GAINS)
+QUIET = SensorParameters(
+    proximal_noise_n_m=0.0,
+    distal_noise_n_m=0.0,
+    proximal_offset_n_m=0.0,
+    distal_offset_n_m=0.0,
+    proximal_ramp_n_m_s=0.0,
+    distal_ramp_n_m_s=0.0,
+    torque_walk_n_m_s=0.0,
+    current_noise_a=0.0,
+    current_offset_a=0.0,
+    fsr_noise_count=0.0,
+    fsr_offset_count=0.0,
+)
+
+
+def rest(parameters: SensorParameters, ticks: int, seed: int = 0) -> np.ndarray:
+    """Counts of the disarmed rig at rest."""
+    idle = np.zeros(ticks, np.int32)
+    bench = SimulatedBench(sensors_parameters=parameters, seed=seed)
+    return bench.advance(ticks, idle, idle, False, control.new_state(), GAINS)
+
+
+def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
+    """Counts of one second of closing."""
+    target = np.round(1366 - 0.4 * np.arange(1000)).astype(np.int32)
+    load = np.full(1000, load_ma, np.int32)
+    bench = SimulatedBench(sensors_parameters=parameters)
+    return bench.advance(1000, target, load, True, control.new_state(), GAINS)
+
+
+def test_raw_signs_on_closing() -> None:
+    rows = closing(QUIET)
+    change = rows[-1].astype(int) - rows[0].astype(int)
+    for column in (sensors.MOTOR, sensors.JAW, sensors.PROXIMAL, sensors.CURRENT, sensors.FSR):
+        assert change[column] > 0
+    for column in (sensors.SPINDLE, sensors.DISTAL, sensors.COMMAND_E4):
+        assert change[column] < 0
+    np.testing.assert_array_equal(rows[:, sensors.LOAD_MA], 500)
+
+
+def test_channels_are_closing_positive_and_agree() -> None:
+    target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.25)
+    columns = play(SimulatedBench(sensors_parameters=QUIET), target, np.full(4000, 0.5))
+    close = slice(600, 1500)
+    for name in ("spindle_angle_rad", "motor_angle_rad", "jaw_angle_rad", "target_angle_rad"):
+        assert columns[name][close][-1] > columns[name][close][0]
+    loaded = ("proximal_torque_n_m", "distal_torque_n_m", "motor_current_a", "motor_command_ratio")
+    for name in loaded:
+        assert np.all(columns[name][close] > 0)
+    twist = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
+    assert np.abs(twist).max() < 0.04
+    measured = columns["motor_current_a"][1:]
+    commanded = 2.06 * columns["motor_command_ratio"][:-1]
+    np.testing.assert_allclose(measured, commanded, atol=0.02)
+    assert np.corrcoef(measured, commanded)[0, 1] > 0.999
+
+
+def test_torque_comes_in_its_quantum() -> None:
+    rows = rest(SensorParameters(), 2000)
+    for column in (sensors.PROXIMAL, sensors.DISTAL):
+        assert np.all(rows[:, column] % 2 == 0)
+        assert np.unique(rows[:, column]).size > 5
+
+
+def test_noise_has_the_stated_size_and_channels_are_unrelated() -> None:
+    rows = rest(SensorParameters(torque_walk_n_m_s=0.0), 50_000).astype(float)
+    scale = 0.000039811
+    assert np.std(rows[:, sensors.PROXIMAL]) * scale == pytest.approx(0.29e-3, rel=0.05)
+    assert np.std(rows[:, sensors.DISTAL]) * scale == pytest.approx(0.22e-3, rel=0.05)
+    assert np.std(rows[:, sensors.CURRENT]) * 1e-3 == pytest.approx(5e-3, rel=0.05)
+    noisy = rows[:, [sensors.PROXIMAL, sensors.DISTAL, sensors.CURRENT, sensors.FSR]]
+    related = np.corrcoef(noisy.T) - np.eye(4)
+    assert np.abs(related).max() < 0.03
+    centred = noisy - noisy.mean(axis=0)
+    follows = np.mean(centred[1:] * centred[:-1], axis=0) / np.var(noisy, axis=0)
+    assert np.abs(follows).max() < 0.03
+
+
+def test_zero_offset_and_drift_show_at_rest() -> None:
+    drifting = SensorParameters(
+        proximal_offset_n_m=0.01,
+        proximal_ramp_n_m_s=1e-3,
+        distal_ramp_n_m_s=0.0,
+        torque_walk_n_m_s=0.0,
+    )
+    torque = rest(drifting, 10_000)[:, sensors.PROXIMAL] * 0.000039811
+    assert torque[:200].mean() == pytest.approx(0.0101, abs=1e-4)
+    assert torque[-200:].mean() == pytest.approx(0.0199, abs=1e-4)
+
+
+def test_the_random_walk_of_the_zero_grows_with_the_root_of_time() -> None:
+    walking = SensorParameters(proximal_noise_n_m=0.0, torque_walk_n_m_s=5e-3)
+    walks = np.array([rest(walking, 1000, seed)[:, sensors.PROXIMAL] for seed in range(60)])
+    spread = walks.std(axis=0) * 0.000039811
+    assert spread[-1] == pytest.approx(5e-3, rel=0.3)
+    assert spread[249] == pytest.approx(2.5e-3, rel=0.3)
+
+
+def test_converters_saturate_at_their_limits() -> None:
+    narrow = SensorParameters(torque_limit_count=400.0, current_limit_count=50.0)
+    rows = closing(narrow)
+    assert rows[:, sensors.PROXIMAL].max() == 400
+    assert rows[:, sensors.DISTAL].min() == -401
+    assert rows[:, sensors.CURRENT].max() == 50
+    assert rest(SensorParameters(fsr_offset_count=-10.0), 100)[:, sensors.FSR].min() == 0
+    assert rest(SensorParameters(fsr_offset_count=5000.0), 100)[:, sensors.FSR].max() == 4095
+
+
+def test_the_force_sensor_reads_grip_over_the_lever_arm() -> None:
+    rows = closing(QUIET)
+    torque = -rows[-1, sensors.DISTAL] * 0.000039811
+    grip_n = rows[-1, sensors.FSR] * QUIET.fsr_n_per_count
+    assert grip_n * 0.012 == pytest.approx(torque, rel=0.01)
+
+
+def test_disarmed_commands_are_zero_and_the_controller_rests() -> None:
+    state = control.new_state()
+    far = np.full(100, -5000, np.int32)
+    bench = SimulatedBench()
+    rows = bench.advance(100, far, np.full(100, 700, np.int32), False, state, GAINS)
+    np.testing.assert_array_equal(rows[:, [sensors.COMMAND_E4, sensors.LOAD_MA]], 0)
+    np.testing.assert_array_equal(state, control.new_state())
+    assert np.ptp(rows[:, sensors.SPINDLE]) == 0

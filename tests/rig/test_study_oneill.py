@@ -1,0 +1,176 @@
+"""`rig study oneill` on an analytic campaign, and on the measured data where it is there."""
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from estimation.campaign import Campaign
+from estimation.recording import Flag, Stretch
+from rig.cli.study import study_app
+from rig.errors import DataError
+from rig.reports import oneill as shown
+from rig.studies import oneill as study
+from rig.studies.oneill import Result, Source, open_reference, run_study
+from tests.estimation.synthetic import campaign
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return run_study(Source(campaign(), "analytic rig", measured=False), seed=3)
+
+
+def rows(result: Result) -> dict[tuple[str, str], float]:
+    return {(row.surrogate, row.protocol): row.score.rmse for row in result.study.rows}
+
+
+def test_every_surrogate_is_fitted_by_every_protocol(result):
+    found = rows(result)
+    assert len(found) == 3 * 5
+    assert found["current", "run-wise"] > found["current", "random"] > 0
+    assert found["command", "lopo"] == pytest.approx(found["current", "lopo"])  # proportional here
+    assert found["gearbox", "authors"] > 3 * found["current", "authors"]
+    row = next(r for r in result.study.rows if r.protocol == "authors" and r.surrogate == "current")
+    assert row.gain_unit == "N m/A"
+    assert row.gain == pytest.approx(0.94, rel=0.1)
+
+
+def test_the_study_is_repeatable_and_its_seed_matters(result):
+    again = run_study(Source(campaign(), "analytic rig", measured=False), seed=3)
+    assert rows(again) == rows(result)
+    other = run_study(Source(campaign(), "analytic rig", measured=False), seed=4)
+    assert rows(other)["current", "random"] != rows(result)["current", "random"]
+
+
+def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
+    runs = list(campaign())
+    runs[4] = runs[4].with_stretch(Stretch(2.0, 6.0, Flag.SUSPECT, "runaway of the motor"))
+    found = run_study(Source(Campaign.of(runs), "x", measured=False)).study
+    assert found.left_out == {"11": "runaway of the motor"}
+    assert len(found.runs) == 8
+    assert any("Run 11 left out: runaway" in note for note in shown.notes(found))
+
+
+def test_what_is_missing_is_said_and_too_little_is_refused():
+    runs = list(campaign())
+    bare = [
+        type(r)(
+            r.name, r.time_s, {n: v for n, v in r.columns.items() if n != "motor_command_ratio"}
+        )
+        for r in runs
+    ]
+    found = run_study(Source(Campaign.of(bare), "x", measured=False)).study
+    assert {row.surrogate for row in found.rows} == {"current", "gearbox"}
+    assert any("no command" in note for note in found.notes)
+    assert any("lopo" in note for note in found.notes)  # no conditions either
+    with pytest.raises(DataError, match="too few"):
+        run_study(Source(Campaign.of(runs[:1]), "x", measured=False))
+    with pytest.raises(DataError, match="no run"):
+        run_study(Source(Campaign(()), "x", measured=False))
+
+
+def test_markdown_states_counts_rows_and_provenance(result):
+    text = shown.markdown(result.study)
+    assert f"{result.study.closing_samples:,} closing samples; the paper states 260,581" in text
+    assert "| current, paper | 10.06 | 23.26 | 12.26 |" in text
+    assert "| command, others |  |  | 14.17 |" in text
+    assert "seed 3" in text
+
+
+def named(names: list[str]) -> Campaign:
+    runs = list(campaign())[: len(names)]
+    return Campaign.of(
+        type(r)(name, r.time_s, r.columns) for r, name in zip(runs, names, strict=True)
+    )
+
+
+def test_the_reference_part_is_picked_and_said(tmp_path, monkeypatch):
+    opened: list[Path] = []
+
+    def opener(path: Path) -> Campaign:
+        opened.append(path)
+        return named(["00", "01"])
+
+    monkeypatch.setattr(study, "open_campaign", opener)
+    (tmp_path / "Tool_4_Maryland_L_4").mkdir()
+    (tmp_path / "Tool_5_Maryland_L_2").mkdir()
+    (tmp_path / "mrdlab-Tool_4_Maryland_L_4.tar.xz").touch()
+    source = open_reference(tmp_path)
+    assert opened == [tmp_path / "Tool_4_Maryland_L_4"]
+    assert source.measured
+    assert "Tool_4_Maryland_L_4 was taken" in source.notes[0]
+    other = open_reference(tmp_path / "Tool_5_Maryland_L_2")
+    assert not other.measured
+    assert "do not apply" in other.notes[0]
+
+
+def test_an_archive_of_several_parts_is_narrowed(tmp_path, monkeypatch):
+    names = ["Tool_4_Maryland_L_4/00", "Tool_4_Maryland_L_4/01", "Tool_5_Maryland_L_2/00"]
+    monkeypatch.setattr(study, "open_campaign", lambda path: named(names))
+    archive = tmp_path / "everything.tar.xz"
+    archive.touch()
+    source = open_reference(archive)
+    assert source.campaign.names == tuple(names[:2])
+    assert "2 of 3 runs" in source.notes[0]
+
+
+def test_conditions_held_out_have_readable_headings(result):
+    assert "| surrogate | samples at random | runs | a frequency (LOFO) |" in shown.markdown(
+        result.study
+    )
+
+
+def command_line() -> typer.Typer:
+    app = typer.Typer()
+    app.add_typer(study_app)
+    return app
+
+
+def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        study, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
+    )
+    words = ["study", "oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
+    words += ["--report", str(tmp_path / "r"), "--out", str(tmp_path / "d" / "oneill.md")]
+    done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    assert found["schema"] == "rig.study.oneill/1"
+    assert found["provenance"]["seed"] == 5
+    assert len(found["rows"]) == 15
+    assert "linear rows of Table I" in done.stderr
+    assert (tmp_path / "d" / "oneill.md").read_text().startswith("# Linear torque surrogates")
+    assert (tmp_path / "r" / "oneill.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_without_data_the_same_is_done_on_a_simulated_campaign(monkeypatch):
+    seeds: list[int] = []
+
+    def simulate(seed: int) -> Campaign:
+        seeds.append(seed)
+        return campaign()
+
+    simulation = SimpleNamespace(simulate_reference_campaign=simulate)
+    monkeypatch.setitem(sys.modules, "rig.simulation.campaign", simulation)
+    words = ["study", "oneill", "--json", "--seed", "9"]
+    done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
+    found = json.loads(done.stdout)
+    assert seeds == [9]
+    assert not found["measured"]
+    assert found["source"] == "simulated reference campaign, seed 9"
+
+
+@pytest.mark.measured
+def test_measured_data_gives_the_published_numbers(measured_data):
+    found = run_study(open_reference(measured_data))
+    rmse = {key: 1e3 * value for key, value in rows(found).items()}
+    assert found.study.measured
+    assert found.study.closing_samples == 308_117
+    assert list(found.study.left_out) == ["07"]
+    for surrogate, published in (("command", 14.17), ("current", 14.24), ("gearbox", 43.14)):
+        assert rmse[surrogate, "authors"] == pytest.approx(published, abs=0.01)
+    assert rmse["command", "run-wise"] == pytest.approx(14.05, abs=0.05)
