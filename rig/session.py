@@ -194,6 +194,7 @@ class Session:
         lead = round(LEAD_S * TICKS_A_SECOND)
         self._logger.arm(self.config.controller.gains(), self._board_limits())
         queued = played = 0
+        newest_sequence: int | None = None
         while played < targets.size:
             while queued < min(played + lead, targets.size):
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
@@ -202,8 +203,9 @@ class Session:
             self._logger.heartbeat()
             reading = self._read()
             self._check_board(reading)
-            reading = _number(reading, played, targets.size)
+            reading = _number(reading, played, targets.size, newest_sequence)
             played = max(played, int(reading.setpoint.max()) + 1)
+            newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading
 
     def settle(self) -> None:
@@ -340,7 +342,7 @@ def _has(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
     return present
 
 
-def _number(reading: Reading, played: int, planned: int) -> Reading:
+def _number(reading: Reading, played: int, planned: int, before: int | None) -> Reading:
     """Number the setpoints of a reading, and flag samples that should have had one and had none.
 
     The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
@@ -350,14 +352,16 @@ def _number(reading: Reading, played: int, planned: int) -> Reading:
         reading: Samples read while playing.
         played: The first setpoint that is not played yet.
         planned: Number of setpoints of the whole play.
+        before: Sequence number of the sample before these, None when nothing was played yet.
     """
-    dry = _has(reading.counts["status"], STATUS_QUEUE_DRY)
-    step = np.diff(reading.counts["sequence"].astype(np.int64), prepend=0)
-    step[0] = 1
-    newest = played - 1 + np.cumsum(np.where(dry, 0, step))
-    held = dry & (newest >= 0) & (newest < planned - 1)
+    status = reading.counts["status"]
+    playing = _has(status, STATUS_ARMED) & ~_has(status, STATUS_QUEUE_DRY)
+    sequence = reading.counts["sequence"].astype(np.int64)
+    step = np.diff(sequence, prepend=sequence[0] - 1 if before is None else before)
+    newest = played - 1 + np.cumsum(np.where(playing, step, 0))
+    held = ~playing & (newest >= 0) & (newest < planned - 1)
     flags = np.where(held, reading.flags | np.uint8(Flag.STALE), reading.flags).astype(np.uint8)
-    return replace(reading, setpoint=np.where(dry, -1, newest), flags=flags)
+    return replace(reading, setpoint=np.where(playing, newest, -1), flags=flags)
 
 
 @contextmanager
