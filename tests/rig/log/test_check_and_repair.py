@@ -17,7 +17,10 @@ from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import LogExistsError, LogWriter
 
 NUMBERED = Stream(
-    "/t", "p/msg/P", (Field("x", "float64"), Field("sequence", "uint32"), Field("flags", "uint32"))
+    "/t",
+    "p/msg/P",
+    (Field("x", "float64"), Field("sequence", "uint32"), Field("flags", "uint32")),
+    rate_hz=1000,
 )
 
 
@@ -191,6 +194,44 @@ def test_whole_messages_of_a_torn_chunk_are_salvaged(tmp_path):
     np.testing.assert_array_equal(read_log(result.repaired).topics["/t"].rows["x"], got)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"proximal_torque_n_m", b"proximal_torque_n_s"),
+        (b"float64 motor", b"uint64_ motor"),
+        (b"# [rad] ", b"# [rae] "),
+        (b"/rig/sample", b"/rig/samplf"),
+    ],
+)
+def test_an_unfinished_log_never_gives_a_field_a_wrong_name_or_unit(log, old, new):
+    data = log.read_bytes()
+    cut = data[: data.find(b"rig.end") - 20]
+    assert old in cut
+    log.write_bytes(cut.replace(old, new))
+    read = read_log(log, tolerant=True)
+    assert list(read.topics) == [COUNTS]
+    report = check_log(log)
+    assert report.verdict is Verdict.DAMAGED
+    assert any("definition" in problem for problem in report.problems)
+    assert repair_log(log).recovered == {COUNTS: 600}
+
+
+def test_a_closed_log_has_its_definitions_twice(log):
+    whole = read_log(log)
+    log.write_bytes(log.read_bytes().replace(b"proximal_torque_n_m", b"proximal_torque_n_s", 1))
+    read = read_log(log, tolerant=True)
+    assert read.topics[SAMPLE].stream == whole.topics[SAMPLE].stream
+    assert read.topics[SAMPLE].rows.tobytes() == whole.topics[SAMPLE].rows.tobytes()
+
+
+def test_a_changed_condition_is_lost_rather_than_wrong(log):
+    data = log.read_bytes()
+    log.write_bytes(data.replace(b'"load_command_a": 0.3', b'"load_command_a": 0.7'))
+    result = repair_log(log)
+    assert any("RunInfo" in problem for problem in result.problems)
+    assert read_log(result.repaired).run.conditions == {}
+
+
 def same_prefix_or_subset(rows, truth):
     """Whether every row is one of the true ones, found by its sequence number, byte for byte."""
     return rows.tobytes() == truth[rows["sequence"]].tobytes()
@@ -206,11 +247,14 @@ def small(tmp_path_factory):
             rows = {"x": random.normal(size=20), "sequence": np.arange(first, first + 20)}
             writer.write("/t", rows | {"flags": np.zeros(20, int)}, rows["sequence"])
             writer.flush()
-    return path.read_bytes(), read_log(path).topics["/t"].rows
+    return path.read_bytes(), read_log(path)
 
 
 def examine(folder, data, truth):
-    """Check and repair a file; nothing but DataError may come, and no sample may have changed."""
+    """Check and repair a file: nothing but DataError may come.
+
+    No sample, no name or unit of a field and nothing known about the run may have changed.
+    """
     path = folder / "fuzzed.mcap"
     path.write_bytes(data)
     repaired_path(path).unlink(missing_ok=True)
@@ -220,8 +264,10 @@ def examine(folder, data, truth):
         found = read_log(repaired or path)
     except DataError:
         return Verdict.DAMAGED
-    for topic in found.topics.values():
-        assert same_prefix_or_subset(topic.rows, truth)
+    assert found.run == truth.run or "is lost" in found.run.notes
+    for name, topic in found.topics.items():
+        assert topic.stream == truth.topics[name].stream
+        assert same_prefix_or_subset(topic.rows, truth.topics[name].rows)
     return verdict
 
 
