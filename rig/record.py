@@ -25,7 +25,8 @@ from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
 from rig.motion import Motion, motion_of
 from rig.protocol import Protocol, RunPlan
-from rig.session import Reading, Session
+from rig.reading import Reading
+from rig.session import Session
 
 MANIFEST = "campaign.json"
 
