@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from estimation import model_file
 from rig.cli.main import main
+from rig.config import load_config
 from rig.live.session_blocks import session_blocks
 from rig.live.until import until
 from tests.rig.simulated import is_armed, short_protocol, simulated, transport
@@ -46,11 +48,13 @@ def test_it_ends_after_the_asked_device_time(duration_s):
     assert duration_s <= shown_s < duration_s + 0.25
 
 
-def test_the_command_estimates_with_the_shipped_model(capsys):
-    assert main(["live", "--json", "--pace", "0", "--duration", "4"]) == 0
+def test_the_shipped_model_is_live_as_good_as_its_file_states(capsys):
+    stated = model_file.read(load_config().model_path).evidence
+    assert main(["live", "--json", "--pace", "0", "--duration", "60"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     frames = [line for line in lines if line["kind"] == "frame"]
-    grip = frames[-1]["channels"]["distal_torque_n_m"]
-    assert grip["estimate"] == pytest.approx(grip["sensor"], abs=0.02)
-    assert lines[-1]["kind"] == "summary"
-    assert lines[-1]["summary"]["lost"] == 0
+    assert all(f["channels"]["distal_torque_n_m"]["estimate"] is not None for f in frames[10:])
+    summary = lines[-1]["summary"]
+    assert summary["lost"] == 0
+    # the quick protocol is not the one it was fitted on, and live filters lag
+    assert summary["error_rms"] < 1.5 * stated.rmse_with_means
