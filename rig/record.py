@@ -98,6 +98,27 @@ def check_disk_space(folder: Path, plans: Iterable[RunPlan]) -> None:
         )
 
 
+def read_manifest(folder: Path) -> tuple[Protocol, Config]:
+    """Return the protocol and the configuration a campaign was begun with.
+
+    Raises:
+        UsageError: The folder holds no campaign.
+    """
+    manifest = folder / MANIFEST
+    try:
+        described = json.loads(manifest.read_text())
+        return (
+            Protocol.model_validate(described["protocol"]),
+            Config.model_validate(described["config"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"{folder} holds no campaign that could go on.",
+            f"{manifest.name}: {error}",
+            "Name the folder that `rig record` made.",
+        ) from error
+
+
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
 ) -> list[RunPlan]:

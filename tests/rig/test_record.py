@@ -194,3 +194,10 @@ def test_the_command_records_and_says_what_next(tmp_path, capsys):
     assert "rig log check" in captured.err
     assert main(words) == 2
     assert "rig record --resume" in capsys.readouterr().err
+    assert main(["record", "--resume", str(out), "--seed", "3"]) == 2
+    assert "goes on as the campaign was begun" in capsys.readouterr().err
+    (out / "000-sine-1Hz-0.2A.mcap").unlink()
+    assert main(["record", "--resume", str(out), "--json"]) == 0
+    assert [run["samples"] for run in json.loads(capsys.readouterr().out)["runs"]] == [500]
+    assert main(["record", "--resume", str(tmp_path)]) == 2
+    assert "holds no campaign" in capsys.readouterr().err
