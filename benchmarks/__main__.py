@@ -59,10 +59,10 @@ def _target(ratio: Ratio) -> str:
 
 
 def _markdown(ratios: list[Ratio]) -> str:
-    rows = [
-        f"| {r.name} | {r.ratio:.1f} | {_target(r)} | {'yes' if r.holds else '**no**'} | {r.detail} |"
-        for r in ratios
-    ]
+    rows = []
+    for r in ratios:
+        holds = "yes" if r.holds else "**no**"
+        rows.append(f"| {r.name} | {r.ratio:.1f} | {_target(r)} | {holds} | {r.detail} |")
     return "\n".join(
         [
             "# Benchmarks",
