@@ -98,7 +98,10 @@ class Device(Protocol):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """What happened on the link since it was opened: frames, errors, lost samples, retries."""
+        """What happened on the link since it was opened.
+
+        `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
+        """
         ...
 
     def identify(self) -> DeviceIdentity:
