@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
+from drivers.clock import ClockFit
 from drivers.errors import DriverError
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.protocol import (
@@ -113,6 +114,8 @@ class Session:
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
         self.newest_tick_us = 0
+        self.clock = ClockFit()
+        """The logger's clock against this computer's; its line states the residual of the fit."""
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
@@ -199,7 +202,6 @@ class Session:
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
                 self._logger.queue(targets[block], loads_ma[block])
                 queued = block.stop
-            self._logger.heartbeat()
             reading = self._read()
             self._check_board(reading)
             reading = _number(reading, played)
@@ -213,6 +215,7 @@ class Session:
             pass
 
     def _read(self) -> Reading:
+        self._logger.heartbeat()
         give_up_s = self._transport.now_s + STALL_S
         while True:
             batch = self._logger.read(READ_TIMEOUT_S)
@@ -224,11 +227,17 @@ class Session:
                     "Its cable was pulled, it was reset, or its program stopped.",
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
+        self._follow_clock()
         reading = self._convert(batch)
         self.newest_tick_us = int(reading.tick_us[-1])
         self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
         self._check_limits(reading)
         return reading
+
+    def _follow_clock(self) -> None:
+        exchange = self._logger.last_exchange
+        if exchange is not None:
+            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
 
     def _convert(self, batch: SampleBatch) -> Reading:
         if self._first_tick_us is None:
