@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
+from drivers.clock import ClockFit
 from drivers.errors import DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity
@@ -60,6 +61,8 @@ class Session:
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
         self.newest_tick_us = 0
+        self.clock = ClockFit()
+        """The logger's clock against this computer's; its line states the residual of the fit."""
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
@@ -148,7 +151,6 @@ class Session:
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
                 self._logger.queue(targets[block], loads_ma[block])
                 queued = block.stop
-            self._logger.heartbeat()
             reading = self._read()
             check_board(reading)
             reading = with_setpoints(reading, played, targets.size, newest_sequence)
@@ -163,6 +165,7 @@ class Session:
             pass
 
     def _read(self) -> Reading:
+        self._logger.heartbeat()
         give_up_s = self._transport.now_s + STALL_S
         while True:
             batch = self._logger.read(READ_TIMEOUT_S)
@@ -174,6 +177,7 @@ class Session:
                     "Its cable was pulled, it was reset, or its program stopped.",
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
+        self._follow_clock()
         if self._first_tick_us is None:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
@@ -185,6 +189,11 @@ class Session:
             self.safe()
             raise
         return reading
+
+    def _follow_clock(self) -> None:
+        exchange = self._logger.last_exchange
+        if exchange is not None:
+            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
 
     def _to_counts(self, channel: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
         line = self.calibrations.channels[channel]

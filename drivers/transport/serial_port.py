@@ -29,6 +29,13 @@ BAUD_RATE = 115200
 """Has no effect on a Teensy's USB port; a real UART behind an adapter uses it."""
 WRITE_TIMEOUT_S = 1.0
 _READ_SIZE = 65536
+_SETTING_ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError)
+try:
+    import termios
+except ImportError:  # Windows
+    pass
+else:
+    _SETTING_ERRORS = (*_SETTING_ERRORS, termios.error)  # pyserial lets it through
 
 
 class SerialTransport:
@@ -149,7 +156,7 @@ def open_line(url: str, baud_rate: int, parity: str = "N") -> Transport:
     if isinstance(transport, SerialTransport):
         try:
             transport.set_line(baud_rate, parity)
-        except (serial.SerialException, OSError, ValueError) as error:
+        except _SETTING_ERRORS as error:
             transport.close()
             raise LinkError(
                 f"{url} cannot be set to {baud_rate} bit/s, parity {parity}.",

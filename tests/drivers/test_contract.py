@@ -98,7 +98,7 @@ def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
         assert len({channel.name for channel in device.channels}) == len(device.channels)
         batches = read_some(device, 60)
         check(device, batches)
-        assert batches[0].sequence[0] == 0
+        assert next(batch for batch in batches if len(batch)).sequence[0] == 0
         assert batches[-1].lost == 0
         assert troubles(device) == 0, dict(device.counters)
         assert device.counters["frames"] > 0

@@ -3,6 +3,7 @@
 import errno
 import os
 import socket
+import termios
 import tty
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ import serial
 from serial.tools import list_ports
 
 from drivers.errors import (
+    LinkError,
     LinkLostError,
     PortBusyError,
     PortNotFoundError,
@@ -20,6 +22,7 @@ from drivers.errors import (
     UnknownSchemeError,
 )
 from drivers.transport import open_transport, register_scheme
+from drivers.transport.serial_port import SerialTransport, open_line
 from drivers.transport.simulated import SimulatedTransport
 
 
@@ -63,6 +66,38 @@ def test_bytes_go_both_ways(pty: Pty) -> None:
     transport.close()
     with pytest.raises(LinkLostError, match="closed"):
         transport.read(0.0)
+
+
+def test_a_line_has_its_own_speed_and_parity(pty: Pty) -> None:
+    transport = open_line(pty.path, 1_250_000)
+    os.write(pty.device, b"at this speed")
+    got = b""
+    while len(got) < 13:
+        got += transport.read(1.0)
+    assert got == b"at this speed"
+    transport.close()
+    with pytest.raises(LinkError, match="parity Z"):
+        open_line(pty.path, 9600, "Z")
+    open_transport(pty.path).close()
+
+
+class RefusingPort:
+    """A port whose driver does not have the speed asked for."""
+
+    closed = False
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise termios.error(errno.EINVAL, "Invalid argument")
+
+    def close(self) -> None:
+        type(self).closed = True
+
+
+def test_a_speed_the_adapter_does_not_have_is_said() -> None:
+    register_scheme("refusing", lambda url: SerialTransport(url, RefusingPort()))
+    with pytest.raises(LinkError, match="cannot be set to 1250000 bit/s"):
+        open_line("refusing:", 1_250_000, "E")
+    assert RefusingPort.closed
 
 
 def test_a_port_is_opened_by_one_program_only(pty: Pty) -> None:

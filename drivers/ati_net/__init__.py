@@ -1,0 +1,1 @@
+"""ATI Net F/T: raw data transfer over UDP."""

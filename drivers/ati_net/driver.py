@@ -1,0 +1,200 @@
+"""The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.ati_net import protocol
+from drivers.ati_net.sequence import RecordSequence
+from drivers.counters import Arrivals, DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.registry import Driver
+from drivers.transport import open_transport
+from drivers.transport.transport import Transport
+from drivers.transport.udp import split_address
+
+ANSWER_TIMEOUT_S = 1.0
+LONGEST_SILENCE_S = 0.1
+MOST_DATAGRAMS = 10_000
+"""Datagrams taken in one read: a second and a half of the fastest stream."""
+
+
+class AtiNet:
+    """One force/torque sensor with a Net Box, or an Ethernet Axia.
+
+    Args:
+        transport: The way to its RDT port; the device closes it.
+        open_calibration: Opens the way to its TCP port, used to ask for counts per unit.
+        rate_hz: The RDT rate set on its web page.
+    """
+
+    name = "ati-net"
+
+    def __init__(
+        self,
+        transport: Transport,
+        open_calibration: Callable[[], Transport],
+        rate_hz: float = 1000.0,
+    ) -> None:
+        self._transport = transport
+        self._open_calibration = open_calibration
+        self._rate_hz = rate_hz
+        self._calibration: protocol.Calibration | None = None
+        self._counters = DeviceCounters()
+        self._sequence = RecordSequence(self._counters)
+        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._closed = False
+        self.status = 0
+        """Status word of the newest record; `protocol.status_words` puts it in words."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Three forces and three torques; their range is known once the calibration is."""
+        tops = np.full(6, np.inf)
+        if self._calibration is not None:
+            tops = self._calibration.slopes() * 2.0**31
+        return tuple(
+            Channel(name, unit, self._rate_hz, -top, top, text)
+            for name, (unit, text), top in zip(
+                protocol.AXES,
+                [("N", "force")] * 3 + [("N m", "torque")] * 3,
+                tops.tolist(),
+                strict=True,
+            )
+        )
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the network."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Ask for the calibration: units and counts per unit. Neither serial nor firmware is told.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            FrameError: The answer is no calibration.
+        """
+        link = self._open_calibration()
+        try:
+            link.write(protocol.READ_CALIBRATION)
+            give_up_s = link.now_s + ANSWER_TIMEOUT_S
+            answer = b""
+            while len(answer) < protocol.CALIBRATION_SIZE and link.now_s < give_up_s:
+                answer += link.read(give_up_s - link.now_s)
+        finally:
+            link.close()
+        if not answer:
+            self._counters.timeouts += 1
+            raise LinkTimeoutError(
+                f"No Net F/T answers at {link.url}.",
+                f"It was asked for its calibration and had {ANSWER_TIMEOUT_S:g} s.",
+                "Check its power, the cable, and that this computer is in its network.",
+            )
+        self._calibration = protocol.decode_calibration(answer)
+        return DeviceIdentity("ATI Net F/T", "", "")
+
+    def start(self) -> None:
+        """Ask for the stream; the first record that comes has the number 0."""
+        if self._calibration is None:
+            self.identify()
+        self._transport.write(protocol.encode_command(protocol.STOP))
+        while self._transport.read(0.0):
+            pass  # of an earlier stream
+        self._sequence.restart()
+        self._transport.write(protocol.encode_command(protocol.STREAM))
+        self._arrivals.restart(self._transport.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the records that have come, stamped with the time of this read.
+
+        Raises:
+            DriverError: Neither `identify` nor `start` has been called.
+        """
+        if self._calibration is None:
+            raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
+        records = self._receive(timeout_s)
+        kept, numbers = self._sequence.follow(records["rdt_sequence"])
+        records = records[kept]
+        now_s = self._transport.now_s
+        self._arrivals.number(len(records), now_s)
+        self._counters.frames += len(records)
+        status = records["status"].astype(np.uint32)
+        values = records["counts"] * self._calibration.slopes()
+        return Batch(
+            {name: values[:, axis] for axis, name in enumerate(protocol.AXES)},
+            np.full(len(records), now_s),
+            "host",
+            numbers,
+            self._flags(status),
+            self._sequence.lost,
+        )
+
+    def set_bias(self) -> None:
+        """Take the present load for zero, in the device; it does not answer."""
+        self._transport.write(protocol.encode_command(protocol.SET_BIAS))
+
+    def reset_latch(self) -> None:
+        """Clear the latched threshold."""
+        self._transport.write(protocol.encode_command(protocol.RESET_LATCH))
+
+    def stop(self) -> None:
+        """End the stream."""
+        self._transport.write(protocol.encode_command(protocol.STOP))
+
+    def close(self) -> None:
+        """End the stream where the device can still be reached, and let go of the link."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.stop()
+        except LinkError:
+            pass  # it is gone already
+        finally:
+            self._transport.close()
+
+    def _receive(self, timeout_s: float) -> NDArray[np.void]:
+        """Return the records of the datagrams that are there, waiting for the first."""
+        good = []
+        datagram = self._transport.read(timeout_s)
+        while datagram:
+            try:
+                good.append(protocol.decode_records(datagram))
+            except FrameError:
+                self._counters.unknown_frames += 1
+                self._counters.discarded_bytes += len(datagram)
+            if len(good) >= MOST_DATAGRAMS:
+                break
+            datagram = self._transport.read(0.0)
+        return np.concatenate(good) if good else np.empty(0, protocol.RECORD_DTYPE)
+
+    def _flags(self, status: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        flags = np.zeros(len(status), np.uint8)
+        faulty = protocol.is_data_fault(status)
+        flags[faulty] |= np.uint8(SampleFlag.SUSPECT)
+        flags[(status & np.uint32(protocol.SATURATED)) != 0] |= np.uint8(SampleFlag.SATURATED)
+        self._counters.device_errors += int(np.count_nonzero(faulty))
+        if len(status):
+            self.status = int(status[-1])
+        return flags
+
+
+def open_ati_net(url: str, rate_hz: float = 1000.0) -> AtiNet:
+    """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
+
+    Args:
+        url: Where it is; the port is 49152 on every such device.
+        rate_hz: The RDT rate set on its web page, 1 to 7000.
+
+    Raises:
+        LinkError: The URL is no UDP address, or the host is out of reach.
+    """
+    host, _ = split_address(url)
+    calibration = f"socket://{host}:{protocol.CALIBRATION_PORT}"
+    return AtiNet(open_transport(url), lambda: open_transport(calibration), rate_hz)
+
+
+DRIVER = Driver("ati-net", "ATI Net F/T or Ethernet Axia, RDT over UDP", open_ati_net)

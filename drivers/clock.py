@@ -1,0 +1,286 @@
+"""Device clocks on one time base: a line from device time to host time, fitted as exchanges come.
+
+An exchange is a question for the device's clock: sent and answered at known host times. The device
+read its clock somewhere in between, so the middle is wrong by at most half the round trip; the
+exchanges with short round trips are the good ones. `ClockFit` keeps the recent exchanges, sets
+aside those with long round trips and those far off the line, and fits offset and rate by least
+squares.
+The idea is that of D. Mills' NTP and of Klipper's clock synchronisation; the code is neither's.
+
+For a device that only streams, `arrival_fit` makes a line of sequence numbers and arrival times:
+nothing arrives before it was sent, so the earliest arrivals carry the line.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import DriverError
+
+WRAP_US = 2**32
+"""A device's microsecond counter begins anew after 71.6 minutes."""
+MAX_DRIFT = 200e-6
+"""Largest difference of rates that is a crystal's and not a reset; crystals are within 50e-6."""
+RESET_S = 0.05
+"""A clock further off the line than this, and than half the round trip, has begun anew."""
+
+OFF_LINE = 6.0
+"""An exchange this many times the median distance off the line is no part of it."""
+RESOLUTION_S = 2e-6
+"""Exchanges this close to the line are always part of it; the counter's step is 1e-6."""
+
+
+class ClockError(DriverError):
+    """Too little is known of a device's clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockLine:
+    """Host time as a line in device time, and how well it fits.
+
+    Attributes:
+        device_s: A device time on the line, s.
+        host_s: The host time there, s.
+        rate: Host seconds a device second.
+        residual_s: Root mean square distance of the exchanges used from the line, s.
+        bound_s: Largest error of the host time at `device_s` that the exchanges allow: half the
+            shortest round trip, s.
+        exchanges: Exchanges used.
+    """
+
+    device_s: float
+    host_s: float
+    rate: float
+    residual_s: float
+    bound_s: float
+    exchanges: int
+
+    @property
+    def drift_ppm(self) -> float:
+        """How much faster the host's clock runs than the device's, parts per million."""
+        return (self.rate - 1.0) * 1e6
+
+    def to_host(self, device_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the host times of device times, s."""
+        return self.host_s + (device_s - self.device_s) * self.rate
+
+    def to_device(self, host_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the device times of host times, s."""
+        return self.device_s + (host_s - self.host_s) / self.rate
+
+
+class TickUnwrapper:
+    """Follows a 32-bit microsecond counter that may be looked at out of order.
+
+    Between two looks less than half a wrap (35.8 min) may pass.
+    """
+
+    def __init__(self) -> None:
+        self._newest_us: int | None = None
+
+    def unwrap(self, tick_us: int) -> int:
+        """Return the counter without its wraps, us."""
+        if self._newest_us is None:
+            self._newest_us = tick_us % WRAP_US
+            return self._newest_us
+        step = (tick_us - self._newest_us + WRAP_US // 2) % WRAP_US - WRAP_US // 2
+        unwrapped = self._newest_us + step
+        self._newest_us = max(self._newest_us, unwrapped)
+        return unwrapped
+
+    def restart(self) -> None:
+        """Forget everything: the device's counter has begun anew."""
+        self._newest_us = None
+
+
+class ClockFit:
+    """The line from one device's clock to the host's, kept up to date.
+
+    Args:
+        memory: Exchanges kept; 240 are a minute.
+        spacing_s: Of the exchanges in a stretch as long as this, the one with the shortest round
+            trip is kept, s.
+    """
+
+    def __init__(self, memory: int = 240, spacing_s: float = 0.25) -> None:
+        self._spacing_s = spacing_s
+        self._unwrapper = TickUnwrapper()
+        self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=memory)
+        self._strange = 0
+        self._last_sent_s = float("-inf")
+        self.rejected = 0
+        """Exchanges set aside: no running clock can have given them."""
+        self.resets = 0
+        """Times the device's clock began anew."""
+        self._line: ClockLine | None = None
+
+    def add(self, sent_s: float, received_s: float, tick_us: int) -> None:
+        """Take an exchange; one that was taken before is ignored.
+
+        Args:
+            sent_s: Host clock when the question left.
+            received_s: Host clock when the answer was read.
+            tick_us: Device clock in between, modulo 2^32.
+
+        Raises:
+            ClockError: The answer is older than the question.
+        """
+        if not received_s >= sent_s:
+            raise ClockError(f"An answer at {received_s} s has a question at {sent_s} s.")
+        if sent_s <= self._last_sent_s:
+            return
+        self._last_sent_s = sent_s
+        device_s = self._unwrapper.unwrap(tick_us) * 1e-6
+        if self._exchanges and not self._possible(sent_s, received_s, device_s):
+            self._strange += 1
+            self.rejected += 1
+            if self._strange < 2:
+                return  # one may be damage; a second is a clock that has begun anew
+            self.resets += 1
+            self._exchanges.clear()
+            self._unwrapper.restart()
+            device_s = self._unwrapper.unwrap(tick_us) * 1e-6
+        self._strange = 0
+        self._keep(sent_s, received_s, device_s)
+
+    @property
+    def line(self) -> ClockLine:
+        """The line through the exchanges.
+
+        Raises:
+            ClockError: There is no exchange yet.
+        """
+        if self._line is None:
+            if not self._exchanges:
+                raise ClockError(
+                    "The device's clock is not known.", "It has not answered any question for it."
+                )
+            self._line = _fit(np.array(self._exchanges))
+        return self._line
+
+    def _keep(self, sent_s: float, received_s: float, device_s: float) -> None:
+        if self._exchanges:
+            last_sent_s, last_received_s, _ = self._exchanges[-1]
+            if sent_s // self._spacing_s == last_sent_s // self._spacing_s:
+                if received_s - sent_s >= last_received_s - last_sent_s:
+                    return
+                self._exchanges.pop()
+        self._exchanges.append((sent_s, received_s, device_s))
+        self._line = None
+
+    def _possible(self, sent_s: float, received_s: float, device_s: float) -> bool:
+        """Say whether a running clock with a crystal's drift can have given this answer."""
+        last_sent_s, last_received_s, last_device_s = self._exchanges[-1]
+        step_s = device_s - last_device_s
+        slack_s = MAX_DRIFT * abs(step_s) + RESET_S
+        return sent_s - last_received_s - slack_s <= step_s <= received_s - last_sent_s + slack_s
+
+
+def _fit(exchanges: NDArray[np.float64]) -> ClockLine:
+    """Fit the line to exchanges, shape (n, 3): sent, received, device time, all s."""
+    sent_s, received_s, device_s = exchanges.T
+    trip_s = received_s - sent_s
+    middle_s = (sent_s + received_s) / 2
+    good = trip_s <= np.quantile(trip_s, 0.5) + 1e-9
+    off_s = np.abs(_distance_from_middle_line(device_s, middle_s, good))
+    good &= off_s <= max(OFF_LINE * float(np.median(off_s[good])), RESOLUTION_S)
+    return _straight(device_s[good], middle_s[good], float(trip_s[good].min()))
+
+
+def _distance_from_middle_line(
+    device_s: NDArray[np.float64], host_s: NDArray[np.float64], good: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the distances from a line that outliers do not pull: the median of all slopes.
+
+    Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", Journal of
+    the American Statistical Association 63, 1968.
+    """
+    skew = host_s - device_s
+    first, second = np.triu_indices(int(good.sum()), 1)
+    steps_s = device_s[good][second] - device_s[good][first]
+    apart = steps_s > 0
+    rises = (skew[good][second] - skew[good][first])[apart]
+    drift = float(np.median(rises / steps_s[apart])) if apart.any() else 0.0
+    rest = skew - drift * (device_s - device_s[0])
+    distance: NDArray[np.float64] = rest - np.median(rest[good])
+    return distance
+
+
+def _straight(
+    device_s: NDArray[np.float64], host_s: NDArray[np.float64], trip_s: float
+) -> ClockLine:
+    """Return the least-squares line, its rate no further from 1 than a crystal's can be."""
+    device_mean_s, host_mean_s = float(device_s.mean()), float(host_s.mean())
+    device = device_s - device_mean_s
+    skew = host_s - host_mean_s - device
+    spread = float(device @ device)
+    drift = float(device @ skew) / spread if spread > 0 else 0.0
+    drift = min(max(drift, -MAX_DRIFT), MAX_DRIFT)
+    residual_s = float(np.sqrt(np.mean((skew - drift * device) ** 2)))
+    return ClockLine(device_mean_s, host_mean_s, 1 + drift, residual_s, trip_s / 2, len(host_s))
+
+
+def arrival_fit(
+    sequence: NDArray[np.int64], arrived_s: NDArray[np.float64], rate_hz: float
+) -> ClockLine:
+    """Return the line from a stream's own time, `sequence / rate_hz`, to the host's.
+
+    Samples that came in one burst all carry the burst's time: only the newest of each arrival time
+    is used, and of those the earlier half relative to the line. The host time is late by the
+    shortest delay of the link, which arrivals alone cannot tell: `bound_s` is infinite.
+
+    Args:
+        sequence: Numbers of samples, rising, shape (n,).
+        arrived_s: When each had arrived, s, not falling, shape (n,).
+        rate_hz: Nominal rate.
+
+    Raises:
+        ClockError: Fewer than two arrivals.
+    """
+    newest = np.flatnonzero(np.diff(arrived_s, append=np.inf) > 0)
+    if newest.size < 2:
+        raise ClockError("One arrival makes no line.", "The stream has only begun.")
+    device_s, host_s = sequence[newest] / rate_hz, arrived_s[newest]
+    line = _straight(device_s, host_s, np.inf)
+    early = np.ones(newest.size, np.bool_)
+    for _ in range(3):
+        delay_s = host_s - line.to_host(device_s)
+        early = delay_s <= np.median(delay_s[early])
+        if early.sum() < 2:
+            break
+        line = _straight(device_s[early], host_s[early], np.inf)
+    return line
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """Streams of several devices on the host's time.
+
+    Attributes:
+        host_s: Host times of each device's samples, s, by device.
+        residual_s: Residual of each device's line, s, by device.
+    """
+
+    host_s: dict[str, NDArray[np.float64]]
+    residual_s: dict[str, float]
+
+
+def align(device_s: dict[str, NDArray[np.float64]], lines: dict[str, ClockLine]) -> Alignment:
+    """Put the device times of several devices on the host's time base.
+
+    Args:
+        device_s: Device times, s, by device.
+        lines: The line of each device.
+
+    Raises:
+        ClockError: A device has no line.
+    """
+    missing = sorted(set(device_s) - set(lines))
+    if missing:
+        raise ClockError(f"The clock of {', '.join(missing)} is not known.")
+    return Alignment(
+        {name: lines[name].to_host(times) for name, times in device_s.items()},
+        {name: lines[name].residual_s for name in device_s},
+    )

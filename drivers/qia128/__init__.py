@@ -1,0 +1,1 @@
+"""FUTEK QIA128 digital amplifier over UART."""

@@ -1,0 +1,200 @@
+"""The driver of a QIA128: its calibration is read from it, then it streams."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.counters import Arrivals, DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.errors import DriverError, LinkError, LinkTimeoutError
+from drivers.qia128 import protocol
+from drivers.registry import Driver
+from drivers.sliding import SlidingFrames
+from drivers.transport.serial_port import open_line
+from drivers.transport.transport import Transport
+
+TRIES = 3
+RATE_HZ = 1300.0
+REPLY_TIMEOUT_S = 0.2
+QUIET_S = 0.05
+"""A stream that was told to end has ended when nothing comes for this long, s."""
+LONGEST_SILENCE_S = 0.1
+
+
+class Qia128:
+    """One amplifier on a UART.
+
+    Args:
+        transport: The way to it; the device closes it.
+        rated_load: Load of the calibration's full-scale point, from the certificate.
+        unit: Unit of `rated_load`; `1` gives the fraction of full scale.
+        rate_hz: Samples a second. 1300 is set; for any other rate, the amplifier is left as it is.
+    """
+
+    name = "qia128"
+
+    def __init__(
+        self,
+        transport: Transport,
+        rated_load: float = 1.0,
+        unit: str = "1",
+        rate_hz: float = RATE_HZ,
+    ) -> None:
+        self._transport = transport
+        self._rated_load = rated_load
+        self._unit = unit
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._frames = SlidingFrames(protocol.FRAME_SIZE, protocol.frame_checks, self._counters)
+        self._points: tuple[int, int] | None = None
+        self._errors_at_start = 0
+        self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The load; its range is known once the calibration has been read."""
+        low, high = -np.inf, np.inf
+        if self._points is not None:
+            low, high = np.sort(self._load(np.array([0.0, protocol.TOP]))).tolist()
+        return (Channel("load", self._unit, self._rate_hz, low, high, "load on the sensor"),)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the line."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """End the stream, ask for the serial number and the calibration.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            DriverError: The calibration's two points are the same.
+        """
+        self._quieten()
+        serial = self._number(protocol.get_serial(), protocol.GET_SERIAL)
+        zero, full = (
+            self._number(protocol.get_calibration(point), protocol.GET_CALIBRATION)
+            for point in (protocol.ZERO_POINT, protocol.FULL_SCALE_POINT)
+        )
+        if zero == full:
+            raise DriverError(
+                f"The QIA128 {serial} has no calibration.",
+                f"Its zero and its full-scale point are both {zero}.",
+                "Calibrate it with FUTEK's software, or give it its certificate's values.",
+            )
+        self._points = zero, full
+        return DeviceIdentity("QIA128", str(serial), "")
+
+    def start(self) -> None:
+        """Switch the stream on."""
+        if self._points is None:
+            self.identify()
+        if self._rate_hz == RATE_HZ:
+            self._transport.write(protocol.set_rate())
+        self._quieten()
+        self._frames.restart()
+        self._errors_at_start = self._counters.crc_errors
+        self._transport.write(protocol.set_stream(True))
+        self._arrivals.restart(self._transport.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the readings that have come, stamped with the time of this read."""
+        if self._points is None:
+            self.identify()
+        give_up_s = self._transport.now_s + timeout_s
+        raw = np.empty(0, np.int64)
+        while not raw.size:
+            data = self._transport.read(max(0.0, give_up_s - self._transport.now_s))
+            raw = protocol.readings(self._frames.feed(data))
+            if not data or self._transport.now_s >= give_up_s:
+                break
+        now_s = self._transport.now_s
+        flags = np.zeros(raw.size, np.uint8)
+        flags[(raw == 0) | (raw == protocol.TOP)] = np.uint8(SampleFlag.SATURATED)
+        return Batch(
+            {"load": self._load(raw.astype(np.float64))},
+            np.full(raw.size, now_s),
+            "host",
+            self._arrivals.number(raw.size, now_s),
+            flags,
+            self._counters.crc_errors - self._errors_at_start,
+        )
+
+    def stop(self) -> None:
+        """Switch the stream off."""
+        self._transport.write(protocol.set_stream(False))
+
+    def close(self) -> None:
+        """Switch the stream off where that can still be done, and let go of the line."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.stop()
+        except LinkError:
+            pass  # it is gone already
+        finally:
+            self._transport.close()
+
+    def _load(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        assert self._points is not None  # noqa: S101
+        zero, full = self._points
+        return (raw - zero) * (self._rated_load / (full - zero))
+
+    def _quieten(self) -> None:
+        """Switch the stream off and wait until nothing more comes."""
+        self.stop()
+        give_up_s = self._transport.now_s + 1.0
+        while self._transport.read(QUIET_S):
+            if self._transport.now_s > give_up_s:
+                raise LinkTimeoutError(
+                    f"The QIA128 at {self._transport.url} does not end its stream.",
+                    "It was told to and went on for 1 s.",
+                    "Check the line to its receiver, and the bit rate.",
+                )
+
+    def _number(self, question: bytes, command: tuple[int, int]) -> int:
+        """Return the 32-bit number a question is answered with."""
+        for attempt in range(TRIES):
+            if attempt:
+                self._counters.retries += 1
+            self._transport.write(question)
+            give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
+            came = b""
+            while self._transport.now_s < give_up_s:
+                came += self._transport.read(give_up_s - self._transport.now_s)
+                found = protocol.find_packet(came, command)
+                if found is not None and len(found[0]) == 4:
+                    return int.from_bytes(found[0], "big")
+            self._counters.discarded_bytes += len(came)
+        self._counters.timeouts += 1
+        raise LinkTimeoutError(
+            f"No QIA128 answers at {self._transport.url}.",
+            f"It was asked {TRIES} times.",
+            "Check its supply, the two data lines, and the bit rate.",
+        )
+
+
+def open_qia128(
+    url: str,
+    rated_load: float = 1.0,
+    unit: str = "1",
+    rate_hz: float = RATE_HZ,
+    baud_rate: int = 320_000,
+) -> Qia128:
+    """Open the amplifier on a serial adapter.
+
+    Args:
+        url: The adapter.
+        rated_load: Load at full scale, from the certificate.
+        unit: Unit of `rated_load`.
+        rate_hz: Rate it is set to, samples a second.
+        baud_rate: Bit rate of its UART; no public source gives it.
+
+    Raises:
+        LinkError: The adapter cannot be opened.
+    """
+    return Qia128(open_line(url, baud_rate), rated_load, unit, rate_hz)
+
+
+DRIVER = Driver("qia128", "FUTEK QIA128 digital amplifier, UART", open_qia128)

@@ -1,0 +1,159 @@
+"""The driver of a USB520 in its text mode: it cannot be asked, only listened to."""
+
+import numpy as np
+
+from drivers.counters import Arrivals, DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.registry import Driver
+from drivers.transport.serial_port import open_line
+from drivers.transport.transport import Transport
+from drivers.usb520 import protocol
+
+PATIENCE_S = 1.0
+"""Time for a first whole line; ten should have come."""
+
+
+class Usb520:
+    """One amplifier on USB, sending lines by itself.
+
+    Args:
+        transport: The way to it; the device closes it.
+        rate_hz: Lines a second, at most 10.
+    """
+
+    name = "usb520"
+
+    def __init__(self, transport: Transport, rate_hz: float = 10.0) -> None:
+        self._transport = transport
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._arrivals = Arrivals(self._counters, 5 / rate_hz)
+        self._unit: str | None = None
+        self._held = b""
+        self._in_step = False
+        self._bad_at_start = 0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The one quantity on its lines; known once a line has been read."""
+        if self._unit is None:
+            return ()
+        quantity = protocol.QUANTITIES[self._unit]
+        text = f"reading in {self._unit}"
+        return (Channel(quantity.name, quantity.unit, self._rate_hz, -np.inf, np.inf, text),)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the line; bad lines are `crc_errors`."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Wait for a whole line. The device tells no name and no number.
+
+        Raises:
+            LinkTimeoutError: No such line comes.
+        """
+        give_up_s = self._transport.now_s + PATIENCE_S
+        while self._unit is None:
+            remaining_s = give_up_s - self._transport.now_s
+            if remaining_s <= 0:
+                self._counters.timeouts += 1
+                raise LinkTimeoutError(
+                    f"No line of a USB520 comes from {self._transport.url}.",
+                    "After FUTEK's software has used it, it is silent until it is plugged in.",
+                    "Unplug it, plug it in again, and set baud_rate if your unit needs another.",
+                )
+            for line in self._lines(self._transport.read(remaining_s)):
+                decoded = self._decode(line)
+                if decoded is not None and self._unit is None:
+                    self._unit = decoded[1]
+        return DeviceIdentity("USB520", "", "")
+
+    def start(self) -> None:
+        """Forget what was sent before now."""
+        if self._unit is None:
+            self.identify()
+        self._transport.read(0.0)
+        self._held = b""
+        self._in_step = False
+        self._bad_at_start = self._counters.crc_errors
+        self._arrivals.restart(self._transport.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the readings that have come, stamped with the time of this read.
+
+        Raises:
+            DriverError: Neither `identify` nor `start` has been called.
+        """
+        if self._unit is None:
+            raise DriverError("The USB520's unit is not known yet.", fix="Call start first.")
+        give_up_s = self._transport.now_s + timeout_s
+        values: list[float] = []
+        while not values:
+            data = self._transport.read(max(0.0, give_up_s - self._transport.now_s))
+            for line in self._lines(data):
+                decoded = self._decode(line)
+                if decoded is not None:
+                    values.append(decoded[0])
+            if not data or self._transport.now_s >= give_up_s:
+                break
+        now_s = self._transport.now_s
+        quantity = protocol.QUANTITIES[self._unit]
+        return Batch(
+            {quantity.name: np.array(values, np.float64) * quantity.factor},
+            np.full(len(values), now_s),
+            "host",
+            self._arrivals.number(len(values), now_s),
+            np.zeros(len(values), np.uint8),
+            self._counters.crc_errors - self._bad_at_start,
+        )
+
+    def stop(self) -> None:
+        """Do nothing: the device cannot be told to be silent."""
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._transport.close()
+
+    def _lines(self, data: bytes) -> list[bytes]:
+        """Return the whole lines that `data` completes; the first may have begun before."""
+        *lines, self._held = (self._held + data).split(b"\n")
+        if len(self._held) > protocol.LONGEST_LINE:
+            self._counters.discarded_bytes += len(self._held)
+            self._held = b""
+        if lines and not self._in_step:
+            self._in_step = True
+            del lines[0]
+        return [line + b"\n" for line in lines]
+
+    def _decode(self, line: bytes) -> tuple[float, str] | None:
+        """Return value and unit of a line, None when it is bad or of another unit than before."""
+        try:
+            value, unit = protocol.decode_line(line)
+        except FrameError:
+            self._counters.crc_errors += 1
+            self._counters.discarded_bytes += len(line)
+            return None
+        if self._unit not in (None, unit):
+            self._counters.unknown_frames += 1
+            return None
+        self._counters.frames += 1
+        return value, unit
+
+
+def open_usb520(url: str, rate_hz: float = 10.0, baud_rate: int = 115_200) -> Usb520:
+    """Open the amplifier's virtual serial port.
+
+    Args:
+        url: The port.
+        rate_hz: Lines a second it is set to, at most 10.
+        baud_rate: 115200; one user reads it at 9600.
+
+    Raises:
+        LinkError: The port cannot be opened.
+    """
+    return Usb520(open_line(url, baud_rate), rate_hz)
+
+
+DRIVER = Driver("usb520", "FUTEK USB520 amplifier, text mode", open_usb520)

@@ -1,0 +1,205 @@
+"""The Net F/T: requests and records as in the manual, numbers, statuses, units, a real socket."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.ati_net import protocol
+from drivers.ati_net.driver import AtiNet
+from drivers.ati_net.fake import CalibrationFake, RdtFake, fake_calibration
+from drivers.ati_net.protocol import Calibration
+from drivers.ati_net.sequence import RESTART_STEP, RecordSequence
+from drivers.counters import DeviceCounters
+from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
+from drivers.transport import open_transport
+from drivers.transport.faulty import Fault, Faults, FaultyTransport
+from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.udp import listen_udp
+
+
+def device_of(fake: RdtFake) -> AtiNet:
+    return AtiNet(SimulatedTransport(fake), fake_calibration)
+
+
+def test_requests_are_the_bytes_of_the_manual() -> None:
+    assert protocol.encode_command(protocol.STREAM) == bytes.fromhex("12 34 00 02 00 00 00 00")
+    assert protocol.encode_command(protocol.SET_BIAS) == bytes.fromhex("12 34 00 42 00 00 00 00")
+    assert protocol.encode_command(protocol.STREAM, 258) == bytes.fromhex("1234 0002 0000 0102")
+    assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
+
+
+def test_a_record_is_big_endian_and_36_bytes() -> None:
+    datagram = struct.pack(">IIIiiiiii", 7, 49, 0x80010000, -1, 2, -3, 4, -5, 6)
+    (record,) = protocol.decode_records(datagram)
+    assert record["rdt_sequence"] == 7
+    assert record["ft_sequence"] == 49
+    assert record["counts"].tolist() == [-1, 2, -3, 4, -5, 6]
+    assert len(protocol.decode_records(datagram * 5)) == 5
+    for size in (0, 35, 37, 8):
+        with pytest.raises(FrameError):
+            protocol.decode_records((datagram * 2)[:size])
+
+
+@given(answer=st.binary(max_size=30))
+def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer: bytes) -> None:
+    with pytest.raises(FrameError):
+        protocol.decode_calibration(answer[:23])
+    if len(answer) >= 24 and answer[:2] != b"\x12\x34":
+        with pytest.raises(FrameError):
+            protocol.decode_calibration(answer[:24])
+
+
+@given(
+    force=st.sampled_from(sorted(protocol.N_PER_UNIT)),
+    torque=st.sampled_from(sorted(protocol.N_M_PER_UNIT)),
+    counts=st.tuples(st.integers(1, 2**32 - 1), st.integers(1, 2**32 - 1)),
+)
+def test_calibrations_come_back(force: int, torque: int, counts: tuple[int, int]) -> None:
+    calibration = Calibration(force, torque, *counts)
+    assert protocol.decode_calibration(protocol.encode_calibration(calibration)) == calibration
+
+
+def test_counts_become_si_by_what_the_device_says() -> None:
+    pounds = Calibration(1, 1, 1000, 500)
+    device = AtiNet(
+        SimulatedTransport(RdtFake()), lambda: SimulatedTransport(CalibrationFake(pounds))
+    )
+    device.start()
+    batch = device.read(0.1)
+    newest = RdtFake().load(int(batch.sequence[-1]) + 1)
+    assert batch.columns["force_x_n"][-1] == pytest.approx(newest[0] / 1000 * 4.4482216152605)
+    assert batch.columns["torque_z_n_m"][-1] == pytest.approx(newest[5] / 500 * 0.112984829)
+    assert len(batch) == 50
+
+
+def test_a_status_is_said_in_words_and_flags_its_samples() -> None:
+    assert protocol.status_words(0) == []
+    assert protocol.status_words(0x80010000) == ["a threshold has been crossed"]
+    assert protocol.status_words(1 << 31 | 1 << 17 | 1 << 5) == [
+        "sensor saturated or its converter failed",
+        "supply too low",
+    ]
+    assert protocol.status_words(1) == ["bit 0 is set"]
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    fake.status = 0x80010000
+    latched = device.read(0.1)
+    assert not latched.flags.any()
+    assert device.counters["device_errors"] == 0
+    assert device.status == 0x80010000
+    device.reset_latch()
+    device.read(0.1)
+    assert device.status == 0
+    fake.status = 1 << 31 | protocol.SATURATED | protocol.LATCHED
+    assert set(device.read(0.1).flags) == {9}
+    assert device.counters["device_errors"] == 50
+
+
+def test_the_numbers_wrap_without_a_gap() -> None:
+    device = device_of(RdtFake(first_sequence=2**32 - 30))
+    device.start()
+    batch = device.read(0.1)
+    assert batch.sequence.tolist() == list(range(50))
+    assert batch.lost == 0
+
+
+def followed(numbers: list[int]) -> tuple[list[bool], list[int], DeviceCounters]:
+    counters = DeviceCounters()
+    kept, given_numbers = RecordSequence(counters).follow(np.array(numbers, np.uint32))
+    return kept.tolist(), given_numbers.tolist(), counters
+
+
+def test_lost_late_repeated_and_restarted_records_are_told_apart() -> None:
+    kept, numbers, counters = followed([5, 6, 9, 8, 9, 10])
+    assert kept == [True, True, True, False, False, True]
+    assert numbers == [0, 1, 4, 5]
+    assert (counters.lost, counters.gaps, counters.late, counters.duplicates) == (2, 1, 1, 1)
+    assert followed([5, 5])[2].duplicates == 1
+    kept, numbers, counters = followed([RESTART_STEP + 5, 1, 2])
+    assert (kept, numbers, counters.restarts) == ([True] * 3, [0, 1, 2], 1)
+
+
+@given(
+    kept=st.lists(st.booleans(), min_size=2, max_size=200),
+    first=st.integers(0, 2**32 - 1),
+)
+def test_what_is_missing_is_counted_exactly(kept: list[bool], first: int) -> None:
+    kept[0] = kept[-1] = True
+    places = [place for place, keep in enumerate(kept) if keep]
+    mask, numbers, counters = followed([(first + place) % 2**32 for place in places])
+    assert all(mask)
+    assert numbers == places
+    assert counters.lost == kept.count(False)
+
+
+def test_an_overtaken_packet_is_dropped_and_counted() -> None:
+    faults = Faults()
+    device = AtiNet(
+        FaultyTransport(SimulatedTransport(RdtFake()), faults, packets=True), fake_calibration
+    )
+    device.start()
+    device.read(0.1)
+    faults.inject(Fault.DELAY, duration_s=0.1)
+    sequence = np.concatenate([device.read(0.1).sequence for _ in range(5)])
+    assert (np.diff(sequence) > 0).all()
+    assert device.counters["late"] == 1
+    assert device.counters["lost"] == 1
+
+
+def test_the_bias_is_set_in_the_device() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    device.read(0.1)
+    device.set_bias()
+    first = device.read(0.001)
+    assert abs(first.columns["force_z_n"][0]) < 0.3
+
+
+def test_nobody_there_is_a_timeout() -> None:
+    silent = CalibrationFake()
+    silent.receive(b"x")
+    device = AtiNet(SimulatedTransport(RdtFake()), lambda: SimulatedTransport(silent))
+    with pytest.raises(DriverError, match="Call start"):
+        device.read(0.1)
+    with pytest.raises(LinkTimeoutError, match="calibration"):
+        device.start()
+
+
+def test_over_a_real_socket_on_the_loopback_interface() -> None:
+    board = RdtFake()
+    with listen_udp() as listening:
+        address = listening.getsockname()
+        assert address[0] == "127.0.0.1"
+        listening.settimeout(5.0)
+        device = AtiNet(open_transport(f"udp:127.0.0.1:{address[1]}"), fake_calibration)
+        device.start()
+        for _ in range(2):  # stop, start
+            request, client = listening.recvfrom(100)
+            board.receive(request)
+        board.advance(40)
+        datagrams = [board.transmit() for _ in range(40)]
+        for datagram in [*datagrams[:10], b"noise", *datagrams[20:]]:
+            listening.sendto(datagram, client)
+        batches = []
+        while not batches or batches[-1].sequence[-1:] != 39:
+            batches.append(device.read(1.0))
+        assert np.concatenate([batch.sequence for batch in batches]).tolist() == [
+            *range(10),
+            *range(20, 40),
+        ]
+        assert batches[-1].lost == 10
+        assert device.counters["unknown_frames"] == 1
+        device.close()
+        with pytest.raises(LinkLostError, match="closed"):
+            device.read(0.1)
+
+
+@pytest.mark.parametrize("url", ["udp:", "udp:host", "udp:host:", "udp:host:0", "udp:host:99999"])
+def test_an_address_has_a_host_and_a_port(url: str) -> None:
+    with pytest.raises(LinkError, match="udp:HOST:PORT"):
+        open_transport(url)

@@ -1,0 +1,119 @@
+"""The digital F/T: messages as published, its calibration put in force, its stream."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.ati_serial import protocol
+from drivers.ati_serial.driver import AtiSerial
+from drivers.ati_serial.fake import AtiSerialFake, example_calibration
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.simulated import SimulatedTransport
+
+
+@pytest.mark.parametrize(
+    ("message", "published"),
+    [
+        (protocol.encode(protocol.STORAGE, protocol.UNLOCK), "0A 6A AA FF 1D"),
+        (protocol.encode(protocol.STORAGE, protocol.LOCK), "0A 6A 18 7F 68"),
+        (protocol.encode(protocol.STREAM, protocol.START_STREAM), "0A 46 55 A3 9D"),
+        (protocol.encode(protocol.STREAM, b"\x01"), "0A 46 01 A2 62"),
+        (protocol.read_registers(protocol.STATUS, 1), "0A 03 00 1D 00 01 15 77"),
+    ],
+)
+def test_messages_are_the_published_bytes(message: bytes, published: str) -> None:
+    assert message == bytes.fromhex(published)
+    assert protocol.encode(*protocol.decode(message)) == message
+
+
+@given(data=st.binary(min_size=1, max_size=40), bit=st.integers(0, 7), place=st.integers(0, 60))
+def test_one_changed_bit_is_refused(data: bytes, bit: int, place: int) -> None:
+    message = bytearray(protocol.encode(protocol.READ, data))
+    message[place % len(message)] ^= 1 << bit
+    with pytest.raises(FrameError):
+        protocol.decode(bytes(message))
+
+
+@given(
+    gauges=st.lists(st.lists(st.integers(-32768, 32767), min_size=6, max_size=6), min_size=1),
+    bad=st.booleans(),
+)
+def test_frames_come_back(gauges: list[list[int]], bad: bool) -> None:
+    wire = protocol.encode_frames(np.array(gauges), bad)
+    frames = np.frombuffer(wire, np.uint8).reshape(-1, protocol.FRAME_SIZE)
+    assert protocol.frame_checks(frames).all()
+    got, status = protocol.decode_frames(frames)
+    assert got.tolist() == gauges
+    assert status.tolist() == [bad] * len(gauges)
+
+
+def test_a_frame_carries_the_gauges_in_the_published_order() -> None:
+    wire = protocol.encode_frames(np.array([[0x0100, 0x0201, 0x0302, 0x0403, 0x0504, 0x0605]]))
+    assert wire[:12].hex(" ", 2) == "0100 0302 0504 0201 0403 0605"
+    assert wire[12] == sum(wire[:12]) & 0x7F
+
+
+def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
+    fake = AtiSerialFake()
+    device = AtiSerial(SimulatedTransport(fake))
+    identity = device.identify()
+    assert (identity.serial, identity.model) == ("FT99999", "ATI digital F/T SI-145-5")
+    assert device.status() == 0
+    device.start()
+    calibration = example_calibration()
+    active = np.frombuffer(bytes(fake.registers[:24]), ">u2")
+    assert tuple(active.tolist()) == calibration.gains + calibration.offsets
+    batch = device.read(0.1)
+    assert len(batch) == 7 * 50 - 1  # the newest waits for its successor
+    began = np.arange(fake._sent - 350, fake._sent)
+    expected = fake.gauges(began)[:-1] @ calibration.matrix.T / 1e6
+    got = np.stack(list(batch.columns.values()), axis=1)
+    assert np.allclose(got, expected)
+    device.close()
+    assert not fake.streaming
+
+
+def test_a_stream_left_on_by_another_program_is_ended_first() -> None:
+    fake = AtiSerialFake()
+    fake.receive(protocol.encode(protocol.STREAM, protocol.START_STREAM))
+    fake.advance(20)
+    assert AtiSerial(SimulatedTransport(fake)).identify().serial == "FT99999"
+
+
+def test_a_bad_status_and_a_full_gauge_flag_their_samples() -> None:
+    fake = AtiSerialFake()
+    device = AtiSerial(SimulatedTransport(fake))
+    device.start()
+    device.read(0.1)
+    fake.status_bad = True
+    device.read(0.1)
+    assert (device.read(0.1).flags == 8).all()
+    assert device.counters["device_errors"] > 350
+    fake.status_bad = False
+    fake.gauges = lambda numbers: np.full((len(numbers), 6), 32767)  # type: ignore[method-assign]
+    device.read(0.1)
+    assert (device.read(0.1).flags == 1).all()
+
+
+def test_a_damaged_answer_is_asked_for_again_and_silence_is_a_timeout() -> None:
+    cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
+    cable.incoming = once(lambda data: data[:9] + b"\x55" + data[10:])
+    device = AtiSerial(cable)
+    assert device.identify().serial == "FT99999"
+    assert device.counters["retries"] == 1
+    cable.incoming = lambda data: b""
+    with pytest.raises(LinkTimeoutError, match="even parity"):
+        device.identify()
+
+
+def test_an_empty_or_impossible_calibration_is_refused() -> None:
+    with pytest.raises(FrameError, match="empty"):
+        AtiSerial(SimulatedTransport(AtiSerialFake()), calibration=2).identify()
+    with pytest.raises(DriverError, match="1 to 16"):
+        AtiSerial(SimulatedTransport(AtiSerialFake()), calibration=17)
+    fake = AtiSerialFake()
+    fake.receive(protocol.write_registers(0, (1, 2)))
+    function, reason = protocol.decode(fake.transmit())
+    assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")

@@ -1,0 +1,205 @@
+"""Device clocks: skew, jitter, wrap, bursts, resets, several devices; all in virtual time."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.clock import ClockError, ClockFit, TickUnwrapper, align, arrival_fit
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake_device import HandMovedBench
+from drivers.transport.simulated import SimulatedTransport
+
+WRAP = 2**32
+
+
+class DriftingClock:
+    """A device's clock as host time goes by, asked over a link with random delays."""
+
+    def __init__(self, ppm: float, start_us: int = 0, seed: int = 0) -> None:
+        self.rate = 1 + ppm * 1e-6
+        self.start_us = start_us
+        self.random = np.random.default_rng(seed)
+
+    def device_s(self, host_s: float) -> float:
+        return self.start_us * 1e-6 + host_s * self.rate
+
+    def exchange(self, host_s: float, jitter_s: float) -> tuple[float, float, int]:
+        there_s, back_s = 1e-4 + self.random.exponential(jitter_s, 2)
+        read_s = host_s + there_s
+        return host_s, read_s + back_s, int(self.device_s(read_s) * 1e6) % WRAP
+
+
+def fitted(clock: DriftingClock, seconds: int, jitter_s: float) -> ClockFit:
+    fit = ClockFit()
+    for quarter in range(seconds * 4):
+        fit.add(*clock.exchange(quarter / 4, jitter_s))
+    return fit
+
+
+@settings(max_examples=60)
+@given(
+    ppm=st.floats(-50, 50),
+    start_us=st.integers(0, WRAP - 10**6),
+    jitter_s=st.floats(1e-5, 2e-3),
+    seed=st.integers(0, 2**16),
+)
+def test_offset_and_drift_are_found_whatever_the_jitter(
+    ppm: float, start_us: int, jitter_s: float, seed: int
+) -> None:
+    clock = DriftingClock(ppm, start_us, seed)
+    fit = fitted(clock, 60, jitter_s)
+    now_s = np.array([30.0, 60.0])
+    device_s = np.array([clock.device_s(float(host)) for host in now_s])
+    error_s = fit.line.to_host(device_s) - now_s
+    assert np.abs(error_s).max() < 1.5 * jitter_s + 5e-6
+    assert fit.line.drift_ppm == pytest.approx(-ppm, abs=3e6 * jitter_s / 60 + 1)
+    assert np.allclose(fit.line.to_device(fit.line.to_host(device_s)), device_s, atol=1e-9)
+    assert (fit.resets, fit.rejected) == (0, 0)
+    assert fit.line.residual_s <= 2 * jitter_s + 1e-6
+
+
+def test_the_wrap_of_the_counter_is_no_jump() -> None:
+    clock = DriftingClock(20.0, WRAP - 30_000_000)
+    fit = fitted(clock, 60, 1e-4)
+    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=2e-4)
+    assert fit.resets == 0
+
+
+@given(
+    start=st.integers(0, WRAP - 1),
+    steps=st.lists(st.integers(-(10**6), 2**31 - 1), min_size=1, max_size=20),
+)
+def test_a_wrapped_counter_is_followed_out_of_order(start: int, steps: list[int]) -> None:
+    unwrapper = TickUnwrapper()
+    newest = unwrapper.unwrap(start)
+    for step in steps:
+        asked = max(0, newest + step)
+        assert unwrapper.unwrap(asked % WRAP) == asked
+        newest = max(newest, asked)
+
+
+def test_late_answers_do_not_pull_the_line() -> None:
+    clock = DriftingClock(-35.0, seed=3)
+    fit = ClockFit()
+    for quarter in range(240):
+        sent_s, received_s, tick_us = clock.exchange(quarter / 4, 5e-5)
+        if quarter % 5 == 2:  # the host was busy and read this one late
+            received_s += 0.08
+        fit.add(sent_s, received_s, tick_us)
+    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=1e-4)
+    assert fit.line.residual_s < 1e-4
+    assert fit.line.bound_s < 2e-4
+
+
+def test_a_burst_of_answers_after_a_stall_does_no_harm() -> None:
+    clock = DriftingClock(10.0, seed=4)
+    fit = ClockFit()
+    for quarter in range(240):
+        sent_s, received_s, tick_us = clock.exchange(quarter / 4, 5e-5)
+        if 100 <= quarter < 108:
+            received_s = max(received_s, 27.0)  # eight answers read at once
+        fit.add(sent_s, received_s, tick_us)
+    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=1e-4)
+    assert fit.resets == 0
+
+
+def test_one_damaged_answer_is_set_aside() -> None:
+    clock = DriftingClock(0.0, seed=5)
+    fit = ClockFit()
+    for quarter in range(80):
+        sent_s, received_s, tick_us = clock.exchange(quarter / 4, 5e-5)
+        fit.add(sent_s, received_s, 123 if quarter == 40 else tick_us)
+    assert (fit.rejected, fit.resets) == (1, 0)
+    assert fit.line.to_host(np.array([clock.device_s(20.0)]))[0] == pytest.approx(20, abs=1e-4)
+
+
+@pytest.mark.parametrize("start_us", [0, 5_000_000, WRAP - 1000])
+def test_a_reset_of_the_device_begins_a_new_line(start_us: int) -> None:
+    before, after = DriftingClock(40.0, seed=6), DriftingClock(40.0, seed=7)
+    fit = ClockFit()
+    for quarter in range(160):
+        host_s = quarter / 4
+        if host_s < 20:
+            fit.add(*before.exchange(host_s, 5e-5))
+        else:
+            sent_s, received_s, _ = after.exchange(host_s, 5e-5)
+            read_s = (sent_s + received_s) / 2
+            fit.add(sent_s, received_s, int(start_us + (read_s - 20) * 1e6) % WRAP)
+    assert fit.resets == 1
+    tick_s = (start_us + 20e6) * 1e-6
+    host_s = float(fit.line.to_host(np.array([tick_s]))[0])
+    wraps_s = WRAP * 1e-6
+    assert min(abs(host_s - 40), abs(host_s - 40 - wraps_s)) < 2e-4
+
+
+def test_several_devices_meet_on_one_time_base() -> None:
+    clocks = {"a": DriftingClock(45.0, 7, 8), "b": DriftingClock(-45.0, WRAP - 10**7, 9)}
+    lines = {name: fitted(clock, 60, 1e-4).line for name, clock in clocks.items()}
+    events_s = np.linspace(5, 55, 11)
+    times = {
+        name: np.array([clock.device_s(float(at)) for at in events_s])
+        for name, clock in clocks.items()
+    }
+    aligned = align(times, lines)
+    for name in clocks:
+        assert np.abs(aligned.host_s[name] - events_s).max() < 1e-4
+        assert 0 < aligned.residual_s[name] < 2e-4
+    with pytest.raises(ClockError, match="clock of b"):
+        align(times, {"a": lines["a"]})
+
+
+@settings(max_examples=30)
+@given(ppm=st.floats(-50, 50), burst=st.integers(1, 40), seed=st.integers(0, 2**16))
+def test_a_stream_without_a_clock_is_placed_by_its_arrivals(
+    ppm: float, burst: int, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    sequence = np.arange(12_000)
+    sent_s = 3.0 + sequence / 1000 * (1 + ppm * 1e-6)
+    wakes = sent_s[burst - 1 :: burst] + random.exponential(1e-3, len(sent_s[burst - 1 :: burst]))
+    wakes = np.maximum.accumulate(wakes)
+    place = np.searchsorted(wakes, sent_s)
+    seen = place < len(wakes)
+    line = arrival_fit(sequence[seen], wakes[place[seen]], 1000.0)
+    error_s = line.to_host(sequence / 1000) - sent_s
+    assert np.abs(error_s).max() < 2e-3
+    assert line.residual_s < 2e-3
+    assert line.bound_s == np.inf
+
+
+def test_many_exchanges_a_second_reach_as_far_back_as_few() -> None:
+    clock = DriftingClock(30.0, seed=10)
+    fit = ClockFit()
+    for millisecond in range(20_000):
+        fit.add(*clock.exchange(millisecond / 1000, 2e-4))
+    assert fit.line.exchanges <= 80
+    assert fit.line.drift_ppm == pytest.approx(-30, abs=0.5)  # the best of 250 is within 2e-6 s
+
+
+def test_too_little_makes_no_line() -> None:
+    with pytest.raises(ClockError, match="not known"):
+        _ = ClockFit().line
+    with pytest.raises(ClockError, match="only begun"):
+        arrival_fit(np.arange(5), np.ones(5), 10.0)
+    with pytest.raises(ClockError, match="question"):
+        ClockFit().add(1.0, 0.5, 0)
+
+
+def test_the_loggers_exchanges_make_a_line() -> None:
+    transport = SimulatedTransport(TeensyFake(HandMovedBench(), start_tick_us=WRAP - 10**6))
+    logger = TeensyLogger(transport)
+    logger.start()
+    fit = ClockFit()
+    for _ in range(40):
+        logger.heartbeat()
+        batch = logger.read(0.1)
+        assert logger.last_exchange is not None
+        exchange = logger.last_exchange
+        fit.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
+    assert fit.line.drift_ppm == pytest.approx(0, abs=1e-6)
+    assert fit.line.residual_s < 1e-9
+    newest_s = float(fit.line.to_host(batch.tick_us[-1:] * 1e-6)[0])
+    assert newest_s == pytest.approx(transport.now_s, abs=0.051)
+    logger.close()

@@ -1,0 +1,140 @@
+"""Faults around a transport: each does what it says, in the link's own time, repeatably."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import LinkLostError
+from drivers.transport.faulty import LONGEST_RUN, Fault, Faults, FaultyTransport, once
+from drivers.transport.simulated import SimulatedTransport
+
+
+class Counting:
+    """A board that sends its tick, two bytes a millisecond."""
+
+    def __init__(self) -> None:
+        self.tick = 0
+        self.got = b""
+        self._out: list[bytes] = []
+
+    def receive(self, data: bytes) -> None:
+        self.got += data
+
+    def advance(self, ticks: int) -> None:
+        for _ in range(ticks):
+            self._out.append(self.tick.to_bytes(2, "big"))
+            self.tick += 1
+
+    def transmit(self) -> bytes:
+        out, self._out = b"".join(self._out), []
+        return out
+
+
+class Packets(Counting):
+    """The same, one packet at a time."""
+
+    def transmit(self) -> bytes:
+        return self._out.pop(0) if self._out else b""
+
+
+def expected(ticks: int) -> bytes:
+    return b"".join(tick.to_bytes(2, "big") for tick in range(ticks))
+
+
+def read_all(cable: FaultyTransport, seconds: float) -> list[bytes]:
+    end_s = cable.now_s + seconds
+    chunks = []
+    while cable.now_s < end_s - 1e-9:
+        chunks.append(cable.read(min(0.01, end_s - cable.now_s)))
+    while chunk := cable.read(0.0):
+        chunks.append(chunk)
+    return [chunk for chunk in chunks if chunk]
+
+
+def test_without_faults_it_is_the_transport() -> None:
+    board = Counting()
+    cable = FaultyTransport(SimulatedTransport(board, "sim://here"))
+    assert cable.url == "sim://here"
+    assert b"".join(read_all(cable, 1.0)) == expected(1000)
+    assert cable.now_s == pytest.approx(1.0)
+    cable.write(b"hello")
+    assert board.got == b"hello"
+    cable.close()
+    with pytest.raises(LinkLostError, match="closed"):
+        cable.read(0.1)
+
+
+@pytest.mark.parametrize("fault", [Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE])
+@given(seed=st.integers(0, 2**16))
+def test_damage_is_one_short_run_and_the_same_for_a_seed(fault: Fault, seed: int) -> None:
+    def damaged() -> bytes:
+        faults = Faults(seed)
+        cable = FaultyTransport(SimulatedTransport(Counting()), faults)
+        faults.inject(fault)
+        got = b"".join(read_all(cable, 0.2))
+        assert faults.struck == {fault: 1}
+        return got
+
+    got, whole = damaged(), expected(200)
+    assert got == damaged()
+    assert got != whole
+    size = len(got) - len(whole)
+    if fault is Fault.CORRUPT:
+        assert size == 0
+        changed = [place for place in range(400) if got[place] != whole[place]]
+        assert changed[-1] - changed[0] < LONGEST_RUN
+    else:
+        assert 1 <= abs(size) <= LONGEST_RUN
+        assert (size > 0) == (fault is Fault.DUPLICATE)
+
+
+@pytest.mark.parametrize("fault", [Fault.DELAY, Fault.STALL])
+def test_a_late_stream_loses_nothing_and_keeps_its_order(fault: Fault) -> None:
+    faults = Faults()
+    cable = FaultyTransport(SimulatedTransport(Counting()), faults)
+    read_all(cable, 0.1)
+    faults.inject(fault, duration_s=0.3)
+    silent_from_s = cable.now_s
+    assert cable.read(0.25) == b""
+    assert cable.now_s == pytest.approx(silent_from_s + 0.25)
+    rest = b"".join(read_all(cable, 0.25))
+    assert rest == expected(600)[200:]
+    assert faults.struck == {fault: 1}
+
+
+def test_packets_are_lost_repeated_and_overtaken_whole() -> None:
+    faults = Faults()
+    cable = FaultyTransport(SimulatedTransport(Packets(), step_s=0.001), faults, packets=True)
+    for fault in (Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE, Fault.DELAY):
+        faults.inject(fault, duration_s=0.0035)
+    numbers = [int.from_bytes(packet, "big") for packet in read_all(cable, 0.01)]
+    assert numbers == [2, 2, 4, 5, 6, 3, 7, 8, 9]
+
+
+def test_a_cut_link_stays_cut_both_ways() -> None:
+    faults = Faults()
+    cable = FaultyTransport(SimulatedTransport(Counting()), faults)
+    faults.inject(Fault.DISCONNECT)
+    for _ in range(2):
+        with pytest.raises(LinkLostError, match="unplugged"):
+            cable.read(0.1)
+        with pytest.raises(LinkLostError, match="unplugged"):
+            cable.write(b"x")
+    assert faults.struck == {Fault.DISCONNECT: 1}
+
+
+def test_faults_strike_by_themselves_at_their_rate() -> None:
+    faults = Faults(seed=3, rates={Fault.DROP: 0.25})
+    cable = FaultyTransport(SimulatedTransport(Packets(), step_s=0.001), faults, packets=True)
+    packets = read_all(cable, 2.0)
+    assert len(packets) + faults.struck[Fault.DROP] == 2000
+    assert 400 < faults.struck[Fault.DROP] < 600
+
+
+def test_a_tap_changes_what_passes_once() -> None:
+    board = Counting()
+    cable = FaultyTransport(SimulatedTransport(board))
+    cable.outgoing = once(lambda data: b"")
+    cable.write(b"lost")
+    cable.write(b"kept")
+    assert board.got == b"kept"

@@ -1,0 +1,112 @@
+"""The USB520: its lines, and finding the next whole one."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.simulated import SimulatedTransport
+from drivers.usb520 import protocol
+from drivers.usb520.driver import Usb520
+from drivers.usb520.fake import Usb520Fake
+
+
+@pytest.mark.parametrize(
+    ("line", "value", "unit"),
+    [(b"-0.00190 N-m\r\n", -0.0019, "N-m"), (b"+0.00000 deg\r\n", 0.0, "deg")],
+)
+def test_lines_are_read_and_written_as_published(line: bytes, value: float, unit: str) -> None:
+    assert protocol.decode_line(line) == (value, unit)
+    assert protocol.encode_line(value or 0.0, unit) == line
+
+
+@given(
+    value=st.floats(-1e6, 1e6).map(lambda value: round(value, 5)),
+    unit=st.sampled_from(sorted(protocol.QUANTITIES)),
+)
+def test_lines_come_back(value: float, unit: str) -> None:
+    got, got_unit = protocol.decode_line(protocol.encode_line(value, unit))
+    assert (got, got_unit) == (pytest.approx(value, abs=1e-9), unit)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"\r\n",
+        b"-0.00190\r\n",
+        b"-0.00190 N-m",
+        b"0.00190 N-m\r\n",
+        b"-0.0019 N-m\r\n",
+        b"-0.00190 N-m x\r\n",
+        b"-0.00190-0.00190 N-m\r\n",
+        b"+nan N-m\r\n",
+        b"-0.00190 lb\r\n",
+    ],
+)
+def test_anything_else_is_refused(line: bytes) -> None:
+    with pytest.raises(FrameError):
+        protocol.decode_line(line)
+
+
+@given(noise=st.binary(max_size=40))
+def test_noise_is_never_a_value_out_of_range(noise: bytes) -> None:
+    try:
+        value, unit = protocol.decode_line(noise)
+    except FrameError:
+        return
+    assert math.isfinite(value)
+    assert unit in protocol.QUANTITIES
+
+
+def readings(device: Usb520, seconds: int) -> np.ndarray:
+    (channel,) = device.channels
+    return np.concatenate([device.read(1.0).columns[channel.name] for _ in range(seconds * 10)])
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("N-m", 1.0), ("deg", math.pi / 180)])
+def test_values_come_in_si(unit: str, factor: float) -> None:
+    device = Usb520(SimulatedTransport(Usb520Fake(unit)))
+    assert device.identify().model == "USB520"
+    device.start()
+    values = readings(device, 4)
+    assert np.abs(values).max() == pytest.approx(0.8 * factor, rel=0.01)
+    assert device.channels[0].unit == protocol.QUANTITIES[unit].unit
+
+
+def test_it_starts_within_a_line_and_merged_lines_cost_no_more_than_themselves() -> None:
+    cable = FaultyTransport(SimulatedTransport(Usb520Fake()))
+    cable.incoming = once(lambda data: data[5:])
+    device = Usb520(cable)
+    device.start()
+    assert device.counters["crc_errors"] == 0
+    readings(device, 1)
+    cable.incoming = once(lambda data: data[:-2])
+    after = device.read(1.0)
+    assert (len(after), after.lost) == (1, 1)
+    assert device.counters["crc_errors"] == 1
+
+
+def test_a_change_of_unit_is_not_mixed_in() -> None:
+    fake = Usb520Fake()
+    device = Usb520(SimulatedTransport(fake))
+    device.start()
+    fake.unit = "deg"
+    assert len(device.read(0.5)) == 0
+    assert device.counters["unknown_frames"] > 0
+
+
+def test_noise_without_end_of_line_is_not_kept() -> None:
+    cable = FaultyTransport(SimulatedTransport(Usb520Fake()))
+    device = Usb520(cable)
+    device.start()
+    cable.incoming = lambda data: bytes(1000)
+    device.read(0.3)
+    assert device.counters["discarded_bytes"] >= 1000
+    with pytest.raises(LinkTimeoutError, match="plug"):
+        Usb520(cable).identify()
+    with pytest.raises(DriverError, match="Call start"):
+        Usb520(cable).read(0.1)
