@@ -1,12 +1,15 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
 import tomllib
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
+from calibration.rules import Verdict, judge, judge_raw, refuse_errors
+from calibration.store import CalibrationStore, active_lines, compose, default_folder
 from estimation.recording import Instrument
 from rig.errors import UsageError
 from rig.validation import explain
@@ -97,7 +100,14 @@ class SimulationSection(_Section):
 
 
 class Config(_Section):
-    """The whole configuration."""
+    """The whole configuration.
+
+    Attributes:
+        calibration: Calibration set: a TOML file, or a shipped one by name.
+        calibration_store: Folder of the store whose active records go before that set's lines, or
+            `default` for the store that `rig cal` uses; no store if none.
+        serials: Serial numbers of the devices on the rig, held against those of the records.
+    """
 
     name: str
     logger: LoggerSection
@@ -107,6 +117,8 @@ class Config(_Section):
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
     calibration: str = "reference"
+    calibration_store: str | None = None
+    serials: dict[str, str] = Field(default_factory=dict)
     lever_arm_m: Positive = 0.012
     model: str | None = None
 
@@ -123,12 +135,35 @@ class Config(_Section):
         path = Path(self.model)
         return path if path.suffix == ".toml" else SHIPPED / f"{self.model}.model.toml"
 
+    @property
+    def store(self) -> CalibrationStore | None:
+        """The calibration store in use, if any."""
+        if self.calibration_store is None:
+            return None
+        named = self.calibration_store
+        return CalibrationStore(default_folder() if named == "default" else Path(named))
+
     def calibration_set(self) -> CalibrationSet:
-        """Return the calibrations in use: a TOML file's, or a shipped set's by name."""
+        """Return the calibrations in use: the set, with the store's active lines in place of its.
+
+        Raises:
+            CalibrationError: A file cannot be read, or an active record must not be used.
+        """
         path = Path(self.calibration)
-        if path.suffix == ".toml":
-            return load_calibration_set(path)
-        return shipped_calibration_set(self.calibration)
+        is_file = path.suffix == ".toml"
+        base = load_calibration_set(path) if is_file else shipped_calibration_set(self.calibration)
+        if self.store is None:
+            return base
+        refuse_errors(self.calibration_verdicts())
+        return compose(base, active_lines(self.store, self.instrument.serial).values())
+
+    def calibration_verdicts(self) -> list[Verdict]:
+        """Return what speaks against the store's active lines now; empty without a store."""
+        if self.store is None:
+            return []
+        lines = active_lines(self.store, self.instrument.serial).values()
+        now = datetime.now(UTC)
+        return [v for line in lines for v in (*judge(line, now, self.serials), *judge_raw(line))]
 
     def changed(self, **sections: Any) -> "Config":
         """Return a configuration with some keys changed; a section is a dict of its own keys."""

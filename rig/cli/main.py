@@ -7,6 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.cal import cal_app
 from rig.cli.demo import demo
 from rig.cli.fit import fit
 from rig.cli.live import live
@@ -32,6 +33,7 @@ app.command()(record)
 app.command()(live)
 app.command()(replay)
 app.command()(fit)
+app.add_typer(cal_app, name="cal")
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
 

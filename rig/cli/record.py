@@ -29,6 +29,7 @@ def record(
 
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
+    from calibration.rules import refuse_errors
     from rig.config import load_config
     from rig.errors import UsageError
     from rig.logger import open_logger
@@ -51,6 +52,8 @@ def record(
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
+    for verdict in refuse_errors(settings.calibration_verdicts()):
+        screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
     results: list[RunResult] = []

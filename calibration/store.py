@@ -1,0 +1,239 @@
+"""The calibration store: a folder where records are only ever added.
+
+`records/` holds one JSON file a record, its hash in its name. `active/` holds one numbered file
+each time somebody chose a record; the last choice of a kind, channel and instrument is the active
+one. A file is written under a temporary name, synced, and linked to its own: the link fails where
+the name is taken, so nothing is overwritten even by two people at once.
+"""
+
+import contextlib
+import itertools
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from calibration.errors import CalibrationError
+from calibration.linear import CalibrationSet
+from calibration.record import LINE, CalibrationRecord
+
+ENVIRONMENT = "RIG_CALIBRATIONS"
+"""Environment variable that names the store's folder."""
+
+_DIGITS = 6
+
+
+class StoreError(CalibrationError):
+    """The store is damaged, or has no such record."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One choice of an active record.
+
+    Attributes:
+        record: Hash of the record.
+        at: When it was chosen, ISO 8601.
+        by: Who chose it.
+    """
+
+    record: str
+    at: str
+    by: str
+
+
+def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the store's folder where none is named.
+
+    It is `$RIG_CALIBRATIONS`, else `calibrations` in the rig's configuration folder, which is
+    `$XDG_CONFIG_HOME/rig` or `~/.config/rig`.
+    """
+    if named := environment.get(ENVIRONMENT):
+        return Path(named)
+    base = environment.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "rig" / "calibrations"
+
+
+class CalibrationStore:
+    """Records and choices in a folder, which is made at the first record."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def add(self, record: CalibrationRecord) -> str:
+        """Keep a record and return its hash; adding the same one again changes nothing."""
+        day = f"{record.made:%Y-%m-%d}"
+        name = f"{day}-{record.kind}-{record.channel}-{record.content_hash}.json"
+        path = self.folder / "records" / name
+        if not _create(path, record.to_json()):
+            self.get(record.content_hash)  # the same content is there already, and whole
+        return record.content_hash
+
+    def records(self) -> list[CalibrationRecord]:
+        """Return every record, oldest first.
+
+        Raises:
+            StoreError: One is not what its name says.
+        """
+        found = [_read(path) for path in sorted((self.folder / "records").glob("*.json"))]
+        return sorted(found, key=lambda record: (record.made, record.content_hash))
+
+    def get(self, start: str) -> CalibrationRecord:
+        """Return the record whose hash begins with `start`.
+
+        Raises:
+            StoreError: None or several do, or it is damaged.
+        """
+        if not re.fullmatch(r"[0-9a-f]{1,16}", start):
+            raise StoreError(f"{start!r} is not the beginning of a hash.", fix="Type rig cal list.")
+        paths = sorted((self.folder / "records").glob(f"*-{start}*.json"))
+        paths = [path for path in paths if path.stem.rpartition("-")[2].startswith(start)]
+        if len(paths) != 1:
+            names = ", ".join(path.stem for path in paths)
+            raise StoreError(
+                f"{len(paths)} records begin with {start!r}.",
+                names or f"The store is {self.folder}.",
+                "Type `rig cal list` for the hashes.",
+            )
+        return _read(paths[0])
+
+    def use(self, start: str, at: str, by: str) -> CalibrationRecord:
+        """Make a record the active one of its kind, channel and instrument.
+
+        Args:
+            start: Beginning of its hash.
+            at: When, ISO 8601.
+            by: Who chooses.
+        """
+        record = self.get(start)
+        text = json.dumps(asdict(Choice(record.content_hash, at, by)), indent=1) + "\n"
+        last = max((int(path.stem) for path in self._choice_paths()), default=0)
+        for number in itertools.count(last + 1):
+            if _create(self.folder / "active" / f"{number:0{_DIGITS}d}.json", text):
+                return record
+        raise AssertionError("unreachable: the numbers do not end")  # pragma: no cover
+
+    def choices(self) -> list[Choice]:
+        """Return every choice ever made, oldest first."""
+        return [_read_choice(path) for path in self._choice_paths()]
+
+    def active(self) -> dict[tuple[str, str, str], CalibrationRecord]:
+        """Return the active record of every kind, channel and instrument."""
+        by_key = {}
+        for choice in self.choices():
+            record = self.get(choice.record)
+            by_key[record.key] = record
+        return by_key
+
+    def _choice_paths(self) -> list[Path]:
+        return sorted((self.folder / "active").glob("[0-9]*.json"), key=lambda p: int(p.stem))
+
+
+def active_lines(
+    store: CalibrationStore, instrument: str | None = None
+) -> dict[str, CalibrationRecord]:
+    """Return the line that a session takes for each channel which has an active one.
+
+    A record for this instrument goes before one for any; among kinds the newest record wins.
+
+    Args:
+        store: The store.
+        instrument: Serial number of the instrument on the rig.
+    """
+    chosen: dict[str, CalibrationRecord] = {}
+    for record in store.active().values():
+        if record.fit.form != LINE or record.instrument not in ("", instrument):
+            continue
+        other = chosen.get(record.channel)
+        if other is None or _rank(record) > _rank(other):
+            chosen[record.channel] = record
+    return chosen
+
+
+def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> CalibrationSet:
+    """Return a set in which records replace the base's lines; the same set where there are none.
+
+    Args:
+        base: A set that covers every channel of the rig.
+        records: Records that are lines, one a channel; see `active_lines`.
+
+    Raises:
+        CalibrationError: A record reads another raw field than the base's line of that channel.
+    """
+    lines = {record.channel: record.line() for record in records}
+    if not lines:
+        return base
+    for name, line in lines.items():
+        known = base.channels.get(name)
+        if known is None or known.counts != line.counts:
+            has = f"reads {known.counts!r}" if known else "does not exist"
+            raise CalibrationError(
+                f"A record gives {name} from {line.counts!r}.",
+                f"In the set {base.name!r} that channel {has}.",
+                "Choose another record with `rig cal use`.",
+            )
+    return CalibrationSet(f"{base.name}+store", {**base.channels, **lines})
+
+
+def _rank(record: CalibrationRecord) -> tuple[bool, float, str]:
+    return bool(record.instrument), record.made.timestamp(), record.content_hash
+
+
+def _read(path: Path) -> CalibrationRecord:
+    try:
+        record = CalibrationRecord.from_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, CalibrationError) as error:
+        raise StoreError(f"The record {path} cannot be read.", str(error)) from error
+    if record.content_hash != path.stem.rpartition("-")[2]:
+        raise StoreError(
+            f"The record {path.name} was changed after it was made.",
+            f"Its content has the hash {record.content_hash}.",
+            "Restore the file from a backup, or move it out of the store.",
+        )
+    return record
+
+
+def _read_choice(path: Path) -> Choice:
+    try:
+        return Choice(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise StoreError(f"The choice {path} cannot be read.", str(error)) from error
+
+
+def _create(path: Path, text: str) -> bool:
+    """Create a file whole, or not at all; return False where the name is taken."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
+        part = Path(name)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            part.chmod(0o444)
+            path.hardlink_to(part)
+        finally:
+            part.unlink(missing_ok=True)
+        _sync_folder(path.parent)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise StoreError(
+            f"{path} cannot be written.",
+            str(error),
+            "The store needs a folder you may write, on a file system with hard links.",
+        ) from error
+    return True
+
+
+def _sync_folder(folder: Path) -> None:
+    with contextlib.suppress(PermissionError):  # Windows opens no folders
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

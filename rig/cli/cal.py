@@ -1,0 +1,289 @@
+"""`rig cal`: the calibration store."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json
+
+if TYPE_CHECKING:
+    from calibration.record import CalibrationRecord
+    from calibration.store import CalibrationStore
+    from rig.config import Config
+
+cal_app = typer.Typer(
+    name="cal",
+    help="Keep calibrations, look at them, and choose the active ones.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--store", help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations."
+    ),
+]
+ConfigOption = Annotated[
+    Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+]
+Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")]
+
+
+@cal_app.callback()
+def cal() -> None:
+    """Keep calibrations, look at them, and choose the active ones."""
+
+
+@cal_app.command()
+def add(
+    file: Annotated[Path, typer.Argument(help="TOML with a table [channels.NAME] a channel.")],
+    operator: Annotated[str, typer.Option(help="Who vouches for the numbers.")],
+    kind: Annotated[str, typer.Option(help="Where they come from.")] = "certificate",
+    made_at: Annotated[
+        str | None, typer.Option(help="Date, ISO 8601 with offset from UTC; now if none.")
+    ] = None,
+    days: Annotated[float | None, typer.Option(help="Stale after this many days.")] = None,
+    serial: Annotated[
+        list[str] | None, typer.Option(help="DEVICE=SERIAL they hold for; may be repeated.")
+    ] = None,
+    instrument: Annotated[
+        str, typer.Option(help="Serial of the instrument, if for one only.")
+    ] = "",
+    channel: Annotated[list[str] | None, typer.Option(help="Only these channels.")] = None,
+    store: StoreOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Keep the lines of a certificate's TOML file, one record a channel. Makes none active."""
+    from calibration.linear import load_calibration_set
+    from calibration.record import RawFile, Validity, record_of_line
+    from rig import __version__
+    from rig.errors import UsageError
+
+    lines = load_calibration_set(file).channels
+    wanted = channel or sorted(lines)
+    if unknown := sorted(set(wanted) - set(lines)):
+        raise UsageError(f"{file} has no channel {unknown[0]!r}.", f"It has {', '.join(lines)}.")
+    made = [
+        record_of_line(
+            lines[name],
+            kind=kind,
+            made_at=made_at or _now(),
+            operator=operator,
+            instrument=instrument,
+            serials=_serials(serial or []),
+            validity=Validity(days=days),
+            raw=(RawFile.of(file),),
+            code_version=__version__,
+        )
+        for name in wanted
+    ]
+    kept = _store(store)
+    hashes = {record.channel: kept.add(record) for record in made}
+    for name, digest in hashes.items():
+        console().print(f"{digest}  {name}", markup=False)
+    if json:
+        emit_json({"store": kept.folder, "added": hashes})
+
+
+@cal_app.command("list")
+def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
+    """List every record, oldest first; the active ones are marked."""
+    from rig.reports.table import TextTable, to_rich
+
+    kept = _store(store)
+    active = {record.content_hash for record in kept.active().values()}
+    records = kept.records()
+    rows = [
+        [
+            ("* " if r.content_hash in active else "  ") + r.content_hash,
+            r.kind,
+            r.channel,
+            r.instrument or "any",
+            f"{r.made:%Y-%m-%d}",
+            r.operator,
+        ]
+        for r in records
+    ]
+    columns = ["record", "kind", "channel", "instrument", "made", "operator"]
+    note = "* active" if records else "No records yet: rig cal add."
+    console().print(to_rich(TextTable(f"Store {kept.folder}", columns, rows, note)))
+    if json:
+        emit_json(
+            {
+                "store": kept.folder,
+                "records": [_summary(r) | {"active": r.content_hash in active} for r in records],
+                "choices": kept.choices(),
+            }
+        )
+
+
+@cal_app.command()
+def show(
+    record: Hash,
+    figure: Annotated[Path | None, typer.Option(help="Write the residual figure here.")] = None,
+    store: StoreOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Show one record whole."""
+    from estimation.files import write_text_atomic
+    from rig.errors import UsageError
+
+    found = _store(store).get(record)
+    for name, value in _flat(found).items():
+        console().print(f"{name}: {value}", markup=False)
+    if figure is not None:
+        if not found.figure_svg:
+            raise UsageError(f"The record {found.content_hash} has no figure.")
+        write_text_atomic(figure, found.figure_svg)
+        console().print(f"Figure: {figure}", markup=False)
+    if json:
+        emit_json({"hash": found.content_hash, "record": found})
+
+
+@cal_app.command()
+def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = False) -> None:
+    """Show what differs between two records."""
+    kept = _store(store)
+    a, b = kept.get(first), kept.get(second)
+    left, right = _flat(a), _flat(b)
+    changes = {
+        name: {"first": left.get(name), "second": right.get(name)}
+        for name in sorted({*left, *right})
+        if left.get(name) != right.get(name)
+    }
+    for name, change in changes.items():
+        console().print(f"{name}: {change['first']} -> {change['second']}", markup=False)
+    if not changes:
+        console().print("The two are the same record.")
+    if json:
+        emit_json({"first": a.content_hash, "second": b.content_hash, "changes": changes})
+
+
+@cal_app.command()
+def use(
+    record: Hash,
+    by: Annotated[str, typer.Option(help="Who chooses it.")],
+    store: StoreOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make a record the active one of its kind, channel and instrument."""
+    kept = _store(store)
+    before = kept.active()
+    chosen = kept.use(record, _now(), by)
+    old = before.get(chosen.key)
+    was = old.content_hash if old else None
+    console().print(
+        f"{chosen.channel}: {chosen.content_hash} in place of {was or 'none'}.", markup=False
+    )
+    if json:
+        emit_json({"record": chosen.content_hash, "replaced": was, "key": chosen.key})
+
+
+@cal_app.command()
+def check(
+    config: ConfigOption = None,
+    log: Annotated[
+        Path | None, typer.Option(help="Hold this log's counts against the calibrated ranges, too.")
+    ] = None,
+    store: StoreOption = None,
+    json: JsonFlag = False,
+) -> int:
+    """Hold the active records against today, the rig's serial numbers and their raw files.
+
+    Exit code 1 when one must not be used.
+    """
+    from datetime import UTC, datetime
+
+    from calibration.rules import judge, judge_raw
+    from rig.config import load_config
+
+    settings = load_config(config)
+    kept = _store(store, settings)
+    now = datetime.now(UTC)
+    here = ("", settings.instrument.serial)
+    active = [record for record in kept.active().values() if record.instrument in here]
+    verdicts = [
+        v for record in active for v in (*judge(record, now, settings.serials), *judge_raw(record))
+    ]
+    if log is not None:
+        verdicts += _range_verdicts(log, active)
+    for v in verdicts:
+        word = "error" if v.is_error else "warning"
+        console().print(f"{word}: {v.channel} {v.record}: {v.message} ({v.rule})", markup=False)
+    bad = any(v.is_error for v in verdicts)
+    console().print(f"{len(active)} active, {len(verdicts)} remarks.")
+    if json:
+        emit_json({"store": kept.folder, "ok": not bad, "verdicts": verdicts})
+    return int(bad)
+
+
+def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
+    from calibration.rules import judge_range
+    from rig.log.reader import read_log
+    from rig.log.streams import COUNTS
+
+    topic = read_log(log, topics=(COUNTS,)).topics[COUNTS]
+    return [
+        verdict
+        for record in records
+        if record.input in topic.columns
+        for verdict in judge_range(record, topic.rows[record.input])
+    ]
+
+
+def _store(folder: Path | None, settings: "Config | None" = None) -> "CalibrationStore":
+    from calibration.store import CalibrationStore, default_folder
+
+    if folder is None and settings is not None and settings.store is not None:
+        return settings.store
+    return CalibrationStore(folder or default_folder())
+
+
+def _now() -> str:
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _serials(words: list[str]) -> dict[str, str]:
+    from rig.errors import UsageError
+
+    pairs = dict(word.split("=", 1) for word in words if "=" in word)
+    if len(pairs) != len(words) or not all(k and v for k, v in pairs.items()):
+        raise UsageError("A serial number is given as DEVICE=SERIAL.", f"Given: {words}.")
+    return pairs
+
+
+def _summary(record: "CalibrationRecord") -> dict[str, Any]:
+    return {
+        "hash": record.content_hash,
+        "kind": record.kind,
+        "channel": record.channel,
+        "instrument": record.instrument,
+        "made_at": record.made_at,
+        "operator": record.operator,
+        "parameters": record.fit.parameters,
+    }
+
+
+def _flat(record: "CalibrationRecord") -> dict[str, Any]:
+    """Return a record as dotted names and values; of the figure only its hash."""
+    from hashlib import sha256
+
+    from rig.cli.output import plain
+
+    flat: dict[str, Any] = {"hash": record.content_hash}
+
+    def walk(prefix: str, value: Any) -> None:
+        if isinstance(value, dict):
+            for name, item in value.items():
+                walk(f"{prefix}.{name}" if prefix else name, item)
+        elif prefix == "figure_svg":
+            flat[prefix] = sha256(value.encode()).hexdigest()[:16] if value else ""
+        else:
+            flat[prefix] = value
+
+    walk("", plain(record))
+    return flat

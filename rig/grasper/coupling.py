@@ -1,0 +1,148 @@
+"""The one interface of every grasper: a constant matrix from actuators to joints.
+
+Cable and gear transmissions are linear in the angles, so one matrix A carries everything:
+`q_joint = A q_actuator`, the same for velocities, and, since a loss-free transmission conserves
+power, `tau_actuator = A^T tau_joint`.
+
+Erratum. Zhang et al. 2022 (IEEE RA-L) print as their equation 4 a matrix that they call the one
+from joint to actuator torque. Its numbers are those of A^-T, which maps actuator torque to joint
+torque.
+The convention here is that of the instrument files of the da Vinci Research Kit, from which the
+numbers of `rig.grasper.dvrk` come.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimation.recording import FloatArray
+from rig.errors import ExitCode, RigError
+
+
+class GrasperError(RigError):
+    """A geometry or a matrix that makes no working grasper."""
+
+    exit_code = ExitCode.USAGE
+
+
+class JointLimitError(GrasperError):
+    """A joint is outside its limits."""
+
+    exit_code = ExitCode.SAFETY
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Range of each joint, rad.
+
+    Attributes:
+        low_rad: Least angle of each joint, shape (n,).
+        high_rad: Greatest angle of each joint, shape (n,).
+    """
+
+    low_rad: tuple[float, ...]
+    high_rad: tuple[float, ...]
+
+    @classmethod
+    def degrees(cls, *ranges: tuple[float, float]) -> Self:
+        """Return limits given in degrees, one (low, high) a joint."""
+        lows, highs = np.radians(np.array(ranges).T)
+        return cls(tuple(lows.tolist()), tuple(highs.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """A loss-free transmission from actuators to joints.
+
+    All methods take and give arrays of shape (..., n), the last axis in the order of the names.
+
+    Attributes:
+        name: What it is.
+        joints: Names of the joints, n of them.
+        actuators: Names of the actuators, n of them.
+        jacobian: A, joint velocity over actuator velocity, shape (n, n).
+        limits: Limits of the joints; None where unknown.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    actuators: tuple[str, ...]
+    jacobian: FloatArray
+    limits: Limits | None = None
+
+    def __post_init__(self) -> None:
+        size = len(self.joints)
+        if self.jacobian.shape != (size, size) or len(self.actuators) != size:
+            raise GrasperError(f"{self.name}: {size} joints need a matrix of {size} x {size}.")
+        if self.limits and {len(self.limits.low_rad), len(self.limits.high_rad)} != {size}:
+            raise GrasperError(f"{self.name}: {size} joints need {size} limits.")
+        finite = np.isfinite(self.jacobian).all()
+        if not finite or np.linalg.matrix_rank(self.jacobian) < size:
+            raise GrasperError(
+                f"{self.name}: the coupling matrix cannot be inverted.",
+                "Some joint could not be moved by any actuator.",
+            )
+
+    def joint_position(self, actuator_rad: ArrayLike) -> FloatArray:
+        """Forward kinematics: actuator angles to joint angles, rad."""
+        return self._through(self.jacobian, actuator_rad)
+
+    def actuator_position(self, joint_rad: ArrayLike) -> FloatArray:
+        """Inverse kinematics: joint angles to actuator angles, rad."""
+        return self._through(self._inverse, joint_rad)
+
+    def joint_velocity(self, actuator_rad_s: ArrayLike) -> FloatArray:
+        """Actuator velocities to joint velocities, rad/s."""
+        return self.joint_position(actuator_rad_s)
+
+    def actuator_velocity(self, joint_rad_s: ArrayLike) -> FloatArray:
+        """Joint velocities to actuator velocities, rad/s."""
+        return self.actuator_position(joint_rad_s)
+
+    def joint_torque(self, actuator_n_m: ArrayLike) -> FloatArray:
+        """Statics: actuator torques to the joint torques they hold, N m; A^-T."""
+        return self._through(self._inverse.T, actuator_n_m)
+
+    def actuator_torque(self, joint_n_m: ArrayLike) -> FloatArray:
+        """Statics: joint torques to the actuator torques that hold them, N m; A^T."""
+        return self._through(self.jacobian.T, joint_n_m)
+
+    def check_limits(self, joint_rad: ArrayLike) -> None:
+        """Hold joint angles against the limits; passes where there are none.
+
+        Args:
+            joint_rad: Joint angles, shape (..., n).
+
+        Raises:
+            JointLimitError: A joint is outside its limits, or not a number.
+        """
+        if self.limits is None:
+            return
+        angles = self._checked(joint_rad)
+        inside = (angles >= self.limits.low_rad) & (angles <= self.limits.high_rad)
+        for index in np.flatnonzero(~inside.reshape(-1, len(self.joints)).all(axis=0)):
+            low, high = self.limits.low_rad[index], self.limits.high_rad[index]
+            worst = angles.reshape(-1, len(self.joints))[:, index]
+            raise JointLimitError(
+                f"{self.name}: {self.joints[index]} goes from {worst.min():.4g} to "
+                f"{worst.max():.4g} rad.",
+                f"Its limits are {low:.4g} and {high:.4g} rad.",
+            )
+
+    @property
+    def _inverse(self) -> FloatArray:
+        return np.asarray(np.linalg.inv(self.jacobian), dtype=np.float64)
+
+    def _through(self, matrix: FloatArray, values: ArrayLike) -> FloatArray:
+        return np.asarray(self._checked(values) @ matrix.T)
+
+    def _checked(self, values: ArrayLike) -> FloatArray:
+        array = np.asarray(values, dtype=np.float64)
+        if array.ndim == 0 or array.shape[-1] != len(self.joints):
+            raise GrasperError(
+                f"{self.name}: the values have shape {array.shape}.",
+                f"The last axis has one value for each of {len(self.joints)} joints.",
+            )
+        return array

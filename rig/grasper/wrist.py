@@ -1,0 +1,219 @@
+"""The planetary wrist of Zhao & Nelson 2016: when the jaws' cables do not feel the yaw.
+
+"Estimating Tool-Tissue Forces Using a 3-Degree-of-Freedom Robotic Surgical Tool", J. Mechanisms
+Robotics 8(5), doi 10.1115/1.4032591. The jaw's cable passes idler pulley 1 (on the sun's axis),
+pulley 2 (on the planet's axis) and ends on the jaw's pulley 3. The carrier turns by alpha; the
+planet, which is the yaw output, turns by beta relative to the carrier.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+from rig.grasper.coupling import GrasperError
+
+GEAR_RATIOS = (1.0, 2.0, 3.0)
+"""Planet over sun diameter of Table 1's first step (1:1, 1:2, 1:3 read as sun:planet)."""
+
+SUN_CONSTRAINTS = (0.0, -1.0, -2.0)
+"""Sun over carrier velocity of Table 1's second step."""
+
+DRIVES = ("carrier", "gear 2", "gear 1")
+"""Driving component, Table 1's third step: gear 1 is the sun, gear 2 the planet."""
+
+
+@dataclass(frozen=True, slots=True)
+class CablePath:
+    """Pulleys and centre distances that a jaw's cable passes; see the paper's Figure 3.
+
+    Attributes:
+        d1_m: Diameter of pulley 1.
+        d2_m: Diameter of pulley 2.
+        d3_m: Diameter of pulley 3, the jaw's.
+        l1_m: Straight length before pulley 1.
+        l2_m: Distance of the centres of pulleys 1 and 2.
+        l3_m: Distance of the centres of pulleys 2 and 3.
+        l4_m: Straight length after pulley 3.
+    """
+
+    d1_m: float
+    d2_m: float
+    d3_m: float
+    l1_m: float
+    l2_m: float
+    l3_m: float
+    l4_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        sizes = (self.d1_m, self.d2_m, self.d3_m, self.l2_m, self.l3_m)
+        if not all(math.isfinite(x) and x > 0 for x in sizes) or min(self.l1_m, self.l4_m) < 0:
+            raise GrasperError(f"{self}: diameters and centre distances are greater than zero.")
+
+    def interference(self) -> list[str]:
+        """Return which neighbouring pulleys touch; empty where the cable can cross between them."""
+        gaps = {
+            "pulleys 1 and 2": self.l2_m - (self.d1_m + self.d2_m) / 2,
+            "pulleys 2 and 3": self.l3_m - (self.d2_m + self.d3_m) / 2,
+        }
+        return [f"{pair} overlap by {-gap:.4g} m" for pair, gap in gaps.items() if gap < 0]
+
+    def tangent_angles_rad(self) -> tuple[float, float]:
+        """Return theta1 and theta2 of equations 2 and 3.
+
+        Raises:
+            GrasperError: Pulleys overlap, so that there is no such angle.
+        """
+        if overlaps := self.interference():
+            raise GrasperError(
+                f"The cable path does not exist: {'; '.join(overlaps)}.",
+                "A crossing cable needs room between two pulleys.",
+                "Choose smaller pulleys or greater centre distances.",
+            )
+        return (
+            math.acos((self.d1_m + self.d2_m) / (2 * self.l2_m)),
+            math.acos((self.d2_m + self.d3_m) / (2 * self.l3_m)),
+        )
+
+    def length_m(self, alpha_rad: float = 0.0, beta_rad: float = 0.0) -> float:
+        """Return the path's length C1 by equation 1 at rest and equation 4 with the wrist turned.
+
+        Args:
+            alpha_rad: Angle of the line from pulley 1 to 2, that is of the carrier.
+            beta_rad: Angle of the line from pulley 2 to 3 relative to that line.
+
+        Raises:
+            GrasperError: Pulleys overlap, or the cable would leave a pulley.
+        """
+        theta1, theta2 = self.tangent_angles_rad()
+        wrap1 = math.pi / 2 - theta1 + alpha_rad
+        wrap2 = math.pi - theta1 - theta2 - beta_rad
+        if wrap1 < 0 or wrap2 < 0:
+            raise GrasperError(
+                f"The cable leaves pulley {1 if wrap1 < 0 else 2} at alpha {alpha_rad:.4g}, "
+                f"beta {beta_rad:.4g} rad.",
+                "Its angle of wrap is negative there.",
+            )
+        return (
+            self.l1_m
+            + self.d1_m / 2 * wrap1
+            + (self.d1_m + self.d2_m) / 2 * math.tan(theta1)
+            + self.d2_m / 2 * wrap2
+            + (self.d2_m + self.d3_m) / 2 * math.tan(theta2)
+            + self.d3_m / 2 * (math.pi / 2 - theta2)
+            + self.l4_m
+        )
+
+    def shortening_m(self, alpha_rad: float, beta_rad: float) -> float:
+        """Return C1 - C1', by which turning the wrist shortens the path; equation 5."""
+        return self.d2_m / 2 * beta_rad - self.d1_m / 2 * alpha_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Planetary:
+    """A sun, a planet and their carrier, with one constraint on the sun.
+
+    Attributes:
+        gear_ratio: Diameter of gear 2 (planet) over gear 1 (sun).
+        sun_over_carrier: Velocity of the sun over that of the carrier; 0 is a fixed sun.
+    """
+
+    gear_ratio: float
+    sun_over_carrier: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.gear_ratio) and self.gear_ratio > 0):
+            raise GrasperError(f"A gear ratio of {self.gear_ratio} cannot be.")
+        if not (math.isfinite(self.sun_over_carrier) and self.sun_over_carrier < 1):
+            raise GrasperError(
+                f"A sun at {self.sun_over_carrier} times the carrier gives no yaw of its own.",
+                "It must turn slower than the carrier, or backwards.",
+            )
+
+    @property
+    def alpha_over_beta(self) -> float:
+        """Carrier angle over the planet's angle relative to the carrier; equations 7 to 10."""
+        return self.gear_ratio / (1.0 - self.sun_over_carrier)
+
+    @property
+    def yaw_over_carrier(self) -> float:
+        """Output velocity omega_2 over the carrier's; 2 for equal gears and a fixed sun."""
+        return 1.0 + 1.0 / self.alpha_over_beta
+
+    @property
+    def decoupling_pulley_ratio(self) -> float:
+        """The d2/d1 with which the jaws do not feel the yaw; equation 6."""
+        return self.alpha_over_beta
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """One combination of Table 1.
+
+    Attributes:
+        planetary: Gear ratio and constraint.
+        drive: Driving component.
+        pulley_ratio: The d2/d1 that decouples it.
+        area: Length times width of gears and pulleys, in squares of the least diameter.
+        extra_stages: Mechanisms it needs besides the planetary stage.
+        obstacle: Why it cannot be built; empty if it can.
+    """
+
+    planetary: Planetary
+    drive: str
+    pulley_ratio: float
+    area: float
+    extra_stages: int
+    obstacle: str = ""
+
+
+def designs(gear_ratios: tuple[float, ...] = GEAR_RATIOS) -> list[Design]:
+    """Return all combinations of Table 1's three steps, 27 for three gear ratios.
+
+    The paper does not say how it measures compactness. Here the smallest gear and the smallest
+    pulley have diameter 1, gears mesh, pulleys do not touch, and the area is that of the rectangle
+    around them. A sun that is not fixed needs a stage that ties it to the carrier; driving the
+    planet needs one that reaches its moving axis.
+
+    Args:
+        gear_ratios: Planet over sun diameters.
+    """
+    return [
+        _design(Planetary(ratio, sun), drive)
+        for ratio, sun, drive in itertools.product(gear_ratios, SUN_CONSTRAINTS, DRIVES)
+    ]
+
+
+def most_compact(candidates: list[Design]) -> Design:
+    """Return the design of least area, and among equals the one of fewest extra stages.
+
+    Raises:
+        GrasperError: None of them can be built.
+    """
+    possible = [design for design in candidates if not design.obstacle]
+    if not possible:
+        raise GrasperError("None of the designs can be built.")
+    return min(possible, key=lambda design: (round(design.area, 9), design.extra_stages))
+
+
+def _design(planetary: Planetary, drive: str) -> Design:
+    gears = _with_least_one(planetary.gear_ratio)
+    pulleys = _with_least_one(planetary.decoupling_pulley_ratio)
+    # the distance of the axes is the gears'; gears grow where pulleys would touch
+    scale = max(1.0, sum(pulleys) / sum(gears))
+    gears = (gears[0] * scale, gears[1] * scale)
+    axes = sum(gears) / 2
+    radii = [max(gear, pulley) / 2 for gear, pulley in zip(gears, pulleys, strict=True)]
+    is_sun_fixed = planetary.sun_over_carrier == 0.0
+    return Design(
+        planetary=planetary,
+        drive=drive,
+        pulley_ratio=planetary.decoupling_pulley_ratio,
+        area=(radii[0] + axes + radii[1]) * 2 * max(radii),
+        extra_stages=int(not is_sun_fixed) + int(drive == "gear 2"),
+        obstacle="the sun is fixed and cannot drive" if is_sun_fixed and drive == "gear 1" else "",
+    )
+
+
+def _with_least_one(ratio: float) -> tuple[float, float]:
+    """Return two diameters of the given ratio, second over first, the smaller being 1."""
+    return max(1.0, 1.0 / ratio), max(1.0, ratio)

@@ -1,0 +1,201 @@
+"""The calibration store: nothing is overwritten, damage is noticed, rules warn and refuse."""
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calibration.errors import CalibrationError
+from calibration.linear import LinearCalibration, shipped_calibration_set
+from calibration.record import CalibrationRecord, Fit, RawFile, Validity, record_of_line
+from calibration.rules import UnfitCalibrationError, judge, judge_range, judge_raw, refuse_errors
+from calibration.store import (
+    CalibrationStore,
+    StoreError,
+    active_lines,
+    compose,
+    default_folder,
+)
+
+MADE = datetime(2026, 3, 1, 12, tzinfo=UTC)
+LINE = LinearCalibration("proximal_torque_n_m", "proximal", 4e-5, 12.0, "certificate 1", True)
+
+
+def line_record(**changes):
+    record = record_of_line(
+        LINE, kind="certificate", made_at=MADE.isoformat(), operator="Ada Bench"
+    )
+    return replace(record, **changes)
+
+
+@pytest.fixture
+def store(tmp_path):
+    return CalibrationStore(tmp_path / "store")
+
+
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=4),
+    st.text(st.characters(codec="utf-8"), max_size=20),
+)
+def test_a_record_survives_a_round_trip(coefficients, notes):
+    parameters = {f"c{k}": value for k, value in enumerate(coefficients)}
+    covariance = tuple(map(tuple, np.eye(len(parameters)).tolist()))
+    record = line_record(
+        fit=Fit("polynomial", parameters, covariance, 0.1, 9),
+        notes=notes,
+        raw=(RawFile("a.mcap", "00"),),
+        validity=Validity(0.0, 1.0, 30.0),
+    )
+    again = CalibrationRecord.from_json(record.to_json())
+    assert again == record
+    assert again.content_hash == record.content_hash
+
+
+def test_a_record_is_found_by_the_beginning_of_its_hash(store):
+    digest = store.add(line_record())
+    assert store.get(digest[:6]) == line_record()
+    assert store.add(line_record()) == digest
+    assert len(store.records()) == 1
+    other = "0" if digest[0] != "0" else "1"
+    with pytest.raises(StoreError, match="0 records"):
+        store.get(other)
+
+
+def test_no_file_changes_once_it_is_there(store):
+    first = store.add(line_record())
+    store.use(first, MADE.isoformat(), "Ada")
+    before = {p: p.read_bytes() for p in store.folder.rglob("*.json")}
+    second = store.add(line_record(operator="Bob"))
+    store.use(second, MADE.isoformat(), "Bob")
+    store.use(first, MADE.isoformat(), "Ada")
+    assert all(path.read_bytes() == text for path, text in before.items())
+    assert [choice.record for choice in store.choices()] == [first, second, first]
+    assert [r.content_hash for r in store.active().values()] == [first]
+    assert not list(store.folder.rglob(".new-*"))
+
+
+def test_two_people_who_choose_at_once_both_have_their_choice_kept(store, monkeypatch):
+    digest = store.add(line_record())
+    store.use(digest, MADE.isoformat(), "Ada")
+    # Bob looked before Ada's choice was there, so he tries the number she took
+    monkeypatch.setattr(store, "_choice_paths", list)
+    store.use(digest, MADE.isoformat(), "Bob")
+    monkeypatch.undo()
+    assert [choice.by for choice in store.choices()] == ["Ada", "Bob"]
+
+
+def test_a_record_that_was_edited_is_refused(store):
+    digest = store.add(line_record())
+    (path,) = (store.folder / "records").iterdir()
+    path.chmod(0o644)
+    path.write_text(path.read_text().replace("Ada", "Eve"))
+    with pytest.raises(StoreError, match="changed after it was made"):
+        store.get(digest)
+
+
+def test_half_a_record_is_never_there(store, monkeypatch):
+    def fail(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("calibration.store.os.fsync", fail)
+    with pytest.raises(StoreError, match="disk full"):
+        store.add(line_record())
+    assert list((store.folder / "records").iterdir()) == []
+
+
+def test_the_store_is_in_the_configuration_folder_unless_the_environment_says_otherwise(tmp_path):
+    assert default_folder({"RIG_CALIBRATIONS": str(tmp_path)}) == tmp_path
+    assert default_folder({"XDG_CONFIG_HOME": "/c"}).as_posix() == "/c/rig/calibrations"
+    assert default_folder({}).parts[-3:] == (".config", "rig", "calibrations")
+
+
+def test_active_lines_take_the_place_of_the_sets_own(store):
+    base = shipped_calibration_set("reference")
+    assert compose(base, active_lines(store).values()) is base
+    store.use(store.add(line_record()), MADE.isoformat(), "Ada")
+    composed = compose(base, active_lines(store).values())
+    line = composed.channels["proximal_torque_n_m"]
+    assert (line.slope, line.zero_counts, line.tared) == (4e-5, 12.0, True)
+    assert store.records()[0].content_hash in line.source
+    assert composed.content_hash != base.content_hash
+    assert composed.channels.keys() == base.channels.keys()
+
+
+def test_a_record_of_this_instrument_goes_before_one_of_any(store):
+    for instrument in ("", "S1", "S2"):
+        store.use(store.add(line_record(instrument=instrument)), MADE.isoformat(), "Ada")
+    assert active_lines(store, "S1")["proximal_torque_n_m"].instrument == "S1"
+    assert active_lines(store, "S9")["proximal_torque_n_m"].instrument == ""
+
+
+def test_a_record_that_reads_another_field_is_not_composed():
+    record = record_of_line(
+        replace(LINE, counts="distal"), kind="k", made_at=MADE.isoformat(), operator="Ada"
+    )
+    with pytest.raises(CalibrationError, match="reads 'proximal'"):
+        compose(shipped_calibration_set("reference"), [record])
+
+
+@pytest.mark.parametrize(
+    ("days", "expected"),
+    [(29, []), (31, [("stale", False)]), (61, [("stale", True)]), (-1, [("future", True)])],
+)
+def test_age(days, expected):
+    record = line_record(validity=Validity(days=30.0))
+    verdicts = judge(record, MADE + timedelta(days=days))
+    assert [(v.rule, v.is_error) for v in verdicts] == expected
+
+
+def test_a_foreign_serial_is_refused_and_an_unknown_one_is_told():
+    record = line_record(serials={"proximal_sensor": "F7"})
+    assert judge(record, MADE, {"proximal_sensor": "F7"}) == []
+    (unknown,) = judge(record, MADE, {})
+    assert (unknown.rule, unknown.is_error) == ("unknown_serial", False)
+    assert refuse_errors([unknown]) == [unknown]
+    foreign = judge(record, MADE, {"proximal_sensor": "F8"})
+    with pytest.raises(UnfitCalibrationError, match="here is F8"):
+        refuse_errors(foreign)
+
+
+def test_out_of_range_is_a_warning_for_a_line_and_an_error_for_a_polynomial():
+    line = line_record(validity=Validity(-10.0, 10.0))
+    assert judge_range(line, [-10.0, 0.0, 10.0]) == []
+    assert [v.is_error for v in judge_range(line, [11.0])] == [False]
+    curve = replace(line, fit=Fit("polynomial", {"c0": 0.0}))
+    assert [v.is_error for v in judge_range(curve, [0.0, np.nan])] == [True]
+
+
+def test_raw_files_that_changed_are_noticed(tmp_path):
+    raw = tmp_path / "weights.csv"
+    raw.write_text("1,2\n")
+    record = line_record(raw=(RawFile.of(raw),))
+    assert judge_raw(record) == []
+    raw.write_text("1,3\n")
+    assert [(v.rule, v.is_error) for v in judge_raw(record)] == [("raw_changed", True)]
+    raw.unlink()
+    assert [(v.rule, v.is_error) for v in judge_raw(record)] == [("raw_missing", False)]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"operator": " "},
+        {"made_at": "2026-03-01T12:00:00"},
+        {"made_at": "yesterday"},
+        {"kind": "../etc"},
+    ],
+)
+def test_a_record_that_cannot_stand_is_refused(change):
+    with pytest.raises(CalibrationError):
+        line_record(**change)
+
+
+def test_a_text_that_is_no_record_is_refused():
+    with pytest.raises(CalibrationError, match="not a calibration record"):
+        CalibrationRecord.from_json(json.dumps({"kind": "torque"}))
+    with pytest.raises(CalibrationError, match="2 x 2"):
+        Fit("line", {"slope": 1.0, "zero": 0.0}, ((1.0,),))

@@ -1,0 +1,153 @@
+"""Every grasper behind one interface: inverse, power, decoupling, residual coupling, limits."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from rig.grasper.coupling import Coupling, GrasperError, JointLimitError, Limits
+from rig.grasper.dvrk import TOOLS, dvrk_coupling
+from rig.grasper.three_dof import (
+    Drive,
+    coupled_grasper,
+    jaw_angles,
+    jaw_torques,
+    planetary_grasper,
+)
+from rig.grasper.wrist import CablePath, Planetary
+
+PATH = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
+GRASPERS = [
+    planetary_grasper(PATH),
+    planetary_grasper(replace(PATH, d2_m=0.003)),
+    coupled_grasper(0.005, 0.004),
+    *(dvrk_coupling(model) for tool in TOOLS for model in tool.models),
+]
+graspers = st.sampled_from(GRASPERS)
+
+
+def vectors(size):
+    return hnp.arrays(np.float64, (3, size), elements=st.floats(-100, 100))
+
+
+@given(graspers, st.data())
+def test_inverse_of_forward_is_identity(grasper, data):
+    values = data.draw(vectors(len(grasper.joints)))
+    for there, back in [
+        (grasper.joint_position, grasper.actuator_position),
+        (grasper.joint_velocity, grasper.actuator_velocity),
+        (grasper.joint_torque, grasper.actuator_torque),
+    ]:
+        np.testing.assert_allclose(back(there(values)), values, atol=1e-9)
+
+
+@given(graspers, st.data())
+def test_power_is_conserved(grasper, data):
+    velocity = data.draw(vectors(len(grasper.joints)))
+    torque = data.draw(vectors(len(grasper.joints)))
+    at_joints = np.sum(torque * grasper.joint_velocity(velocity), axis=-1)
+    at_actuators = np.sum(grasper.actuator_torque(torque) * velocity, axis=-1)
+    np.testing.assert_allclose(at_joints, at_actuators, rtol=1e-9, atol=1e-8)
+
+
+@given(
+    st.floats(0.4, 2.5), st.floats(-2.0, 0.0), st.floats(-100, 100), st.floats(-100, 100)
+)  # fmt: skip
+def test_decoupled_motion_stays_decoupled(gear_ratio, sun, yaw_motor, jaw_motor):
+    gears = Planetary(gear_ratio, sun)
+    path = CablePath(0.004, 0.004 * gears.decoupling_pulley_ratio, 0.005, 0.01, 0.02, 0.02)
+    grasper = planetary_grasper(path, gears)
+    yaw, pitch, grasp = grasper.joint_position([yaw_motor, 0.0, 0.0])
+    assert (pitch, grasp) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert yaw == pytest.approx(yaw_motor * gears.yaw_over_carrier / 66)
+    moved = grasper.joint_position([0.0, jaw_motor, jaw_motor])
+    assert moved[[0, 2]] == pytest.approx(0.0, abs=1e-12)
+    closed = grasper.joint_position([0.0, jaw_motor, -jaw_motor])
+    assert closed[:2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_papers_grasper():
+    grasper = planetary_grasper(PATH, drive=Drive(66.0, 0.01))
+    turn = 2 * math.pi * 66
+    # carrier one turn: yaw two; drum twice the jaw's pulley: jaw two turns
+    assert grasper.joint_position([turn, 0, 0]) == pytest.approx([4 * math.pi, 0, 0])
+    assert grasper.joint_position([0, turn, 0]) == pytest.approx([0, 2 * math.pi, 4 * math.pi])
+    # a grasp torque is shared by both jaws, with opposite sign
+    assert grasper.actuator_torque([0, 0, 0.33]) == pytest.approx([0, 0.01, -0.01])
+
+
+@given(st.floats(0.5, 1.4), st.floats(-50, 50))
+def test_a_wrong_pulley_ratio_gives_the_residual_coupling_of_equation_5(ratio, motor):
+    path = replace(PATH, d2_m=PATH.d1_m * ratio)
+    grasper = planetary_grasper(path)
+    yaw, pitch, grasp = grasper.joint_position([motor, 0.0, 0.0])
+    alpha = beta = motor / 66
+    assert pitch == pytest.approx(-(path.d2_m * beta - path.d1_m * alpha) / path.d3_m, abs=1e-12)
+    assert grasp == pytest.approx(0.0, abs=1e-12)
+    assert yaw == pytest.approx(alpha + beta)
+    # so a pitch torque is felt at the yaw motor, a grasp torque is not
+    felt = grasper.actuator_torque([[0, 1.0, 0], [0, 0, 1.0]])[:, 0]
+    assert felt == pytest.approx([(1 - ratio) * path.d1_m / path.d3_m / 66, 0.0], abs=1e-12)
+
+
+def test_a_coupled_graspers_jaws_stay_behind_when_it_yaws():
+    grasper = coupled_grasper(0.004, 0.004, Drive(1.0, 0.004))
+    assert grasper.joint_position([0.3, 0, 0]) == pytest.approx([0.3, -0.3, 0])
+    # to yaw with the jaws in line, their motors move along
+    assert grasper.actuator_position([0.3, 0, 0]) == pytest.approx([0.3, 0.3, 0.3])
+
+
+@given(vectors(3), vectors(3))
+def test_jaws_and_joints_carry_the_same_power(angles, torques):
+    by_joint = np.sum(angles[:, 1:] * torques[:, 1:], axis=-1)
+    by_jaw = np.sum(jaw_angles(angles) * jaw_torques(torques), axis=-1)
+    np.testing.assert_allclose(by_joint, by_jaw, rtol=1e-9, atol=1e-8)
+
+
+def test_the_cadiere_forceps_torques_and_the_printed_equation_4():
+    grasper = dvrk_coupling("400049")
+    jaw_alone = [0.0, 0.0, 0.0, 1.0]
+    assert grasper.actuator_torque(jaw_alone) == pytest.approx([0, 0, -1.2177, 1.2177])
+    printed = [
+        [-0.6397, 0, 0, 0],
+        [0, 0.9817, 0.6696, 0.6696],
+        [0, 0, 0.8212, 0.8212],
+        [0, 0, -0.4106, 0.4106],
+    ]
+    # the erratum: what is printed as joint to actuator torque maps the other way
+    to_joints = grasper.joint_torque(np.eye(4)).T
+    np.testing.assert_allclose(to_joints, printed, atol=1e-4)
+
+
+def test_limits_are_checked_by_name():
+    grasper = dvrk_coupling("400049")
+    grasper.check_limits(np.radians([[260, -80, 80, 80], [0, 0, 0, -20]]) * 0.999)
+    with pytest.raises(JointLimitError, match="wrist_yaw"):
+        grasper.check_limits(np.radians([0, 0, 81, 0]))
+    with pytest.raises(JointLimitError, match="jaw"):
+        grasper.check_limits([0, 0, 0, math.nan])
+
+
+def test_a_wrist_whose_cables_would_leave_their_pulleys_is_refused():
+    wide = Limits.degrees((-170, 170), (-60, 60), (-60, 60))
+    with pytest.raises(GrasperError, match="leaves pulley"):
+        planetary_grasper(PATH, limits=wide)
+    modest = Limits.degrees((-60, 60), (-60, 60), (-60, 60))
+    assert planetary_grasper(PATH, limits=modest).limits is modest
+
+
+def test_what_makes_no_grasper_is_refused():
+    with pytest.raises(GrasperError, match="cannot be inverted"):
+        Coupling("flat", ("a", "b"), ("x", "y"), np.ones((2, 2)))
+    with pytest.raises(GrasperError, match="overlap"):
+        planetary_grasper(replace(PATH, l3_m=0.004))
+    with pytest.raises(GrasperError, match="last axis"):
+        GRASPERS[0].joint_position([1.0, 2.0])
+    with pytest.raises(GrasperError, match="no coupling"):
+        dvrk_coupling("1")
+    with pytest.raises(GrasperError, match="greater than zero"):
+        Drive(drum_m=0.0)

@@ -1,0 +1,105 @@
+"""`rig cal`: from a certificate to the calibration of a session."""
+
+import json
+
+import pytest
+
+from rig.cli.main import main
+from rig.config import SIMULATED, load_config
+
+CERTIFICATE = """
+name = "certificate"
+[channels.proximal_torque_n_m]
+counts = "proximal"
+slope = 4.0e-5
+zero_counts = 3.0
+tared = true
+source = "certificate 4711"
+"""
+
+
+@pytest.fixture
+def rig(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
+
+    def run(*words):
+        code = main([*words, "--json"])
+        return code, json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def certificate(tmp_path, slope="4.0e-5"):
+    path = tmp_path / f"certificate{slope}.toml"
+    path.write_text(CERTIFICATE.replace("4.0e-5", slope))
+    return str(path)
+
+
+def configuration(tmp_path, serial):
+    path = tmp_path / "rig.toml"
+    keys = f'calibration_store = "default"\nserials = {{ proximal_sensor = "{serial}" }}\n'
+    path.write_text(keys + SIMULATED.read_text())
+    return path
+
+
+def test_from_a_certificate_to_a_session(rig, tmp_path):
+    code, added = rig("cal", "add", certificate(tmp_path), "--operator", "Ada",
+                      "--serial", "proximal_sensor=F7")  # fmt: skip
+    digest = added["added"]["proximal_torque_n_m"]
+    assert code == 0
+    assert load_config(configuration(tmp_path, "F7")).calibration_set().name == "reference"
+
+    assert rig("cal", "use", digest[:8], "--by", "Ada")[1]["replaced"] is None
+    calibrations = load_config(configuration(tmp_path, "F7")).calibration_set()
+    assert calibrations.channels["proximal_torque_n_m"].slope == 4.0e-5
+    listed = rig("cal", "list")[1]["records"]
+    assert [(r["hash"], r["active"]) for r in listed] == [(digest, True)]
+    assert rig("cal", "show", digest)[1]["record"]["operator"] == "Ada"
+
+
+def test_a_foreign_sensor_is_refused_by_check_and_by_the_session(rig, tmp_path):
+    _, added = rig("cal", "add", certificate(tmp_path), "--operator", "Ada",
+                   "--serial", "proximal_sensor=F7")  # fmt: skip
+    rig("cal", "use", *added["added"].values(), "--by", "Ada")
+    path = configuration(tmp_path, "F8")
+    code, said = rig("cal", "check", "--config", str(path))
+    assert code == 1
+    assert [v["rule"] for v in said["verdicts"]] == ["foreign_serial"]
+    code, said = rig("record", "--config", str(path), "--out", str(tmp_path / "runs"))
+    assert code == 5
+    assert "must not be used" in said["error"]["what"]
+    assert not (tmp_path / "runs").exists()
+
+
+def test_diff_names_what_changed(rig, tmp_path):
+    hashes = []
+    for slope in ("4.0e-5", "4.1e-5"):
+        words = (certificate(tmp_path, slope), "--operator", "Ada", "--made-at")
+        _, added = rig("cal", "add", *words, "2026-03-01T12:00:00+00:00")
+        hashes += added["added"].values()
+    _, told = rig("cal", "diff", *hashes)
+    assert told["changes"]["fit.parameters.slope"] == {"first": 4.0e-5, "second": 4.1e-5}
+    assert set(told["changes"]) == {"hash", "fit.parameters.slope", "raw"}
+
+
+def test_a_log_beyond_the_calibrated_range_is_told(rig, tmp_path):
+    from dataclasses import replace
+
+    from calibration.record import Validity
+    from calibration.store import CalibrationStore
+    from rig.record import open_campaign_folder, record_campaign
+    from rig.session import Session
+    from tests.rig.simulated import short_protocol, simulated, transport
+
+    config = simulated()
+    plans = open_campaign_folder(tmp_path / "runs", short_protocol(1), config, resume=False)
+    with Session(config, transport(config)) as session:
+        (run,) = record_campaign(session, plans, tmp_path / "runs")
+    _, added = rig("cal", "add", certificate(tmp_path), "--operator", "Ada")
+    store = CalibrationStore(tmp_path / "store")
+    narrow = replace(store.get(*added["added"].values()), validity=Validity(-1.0, 1.0))
+    store.use(store.add(narrow), narrow.made_at, "Ada")
+    code, said = rig("cal", "check", "--log", str(run.path))
+    assert code == 0
+    assert [v["rule"] for v in said["verdicts"]] == ["out_of_range"]
+    assert rig("cal", "check")[1]["verdicts"] == []
