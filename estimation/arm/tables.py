@@ -69,6 +69,8 @@ class Arm:
             the first by the speed of the second.
         gravity_m_s2: Gravity in the base frame.
         source: Where the numbers come from.
+        wrist: First joint (from 0) that cables drive from coupled motors, or None.
+        wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
     """
 
     name: str
@@ -77,6 +79,8 @@ class Arm:
     viscous_pairs: tuple[tuple[int, int], ...]
     gravity_m_s2: tuple[float, float, float]
     source: str
+    wrist: int | None = None
+    wrist_coupling: tuple[tuple[float, ...], ...] = ()
 
 
 PSM = Arm(
@@ -141,5 +145,7 @@ PSM = Arm(
     viscous_pairs=((4, 5), (5, 4)),
     gravity_m_s2=(0.0, 0.0, -9.80665),
     source="G. A. Piqué, Dynamic Modeling of the Da Vinci Research Kit Arm, 2018, tables 2.1, 2.3",
+    wrist=4,
+    wrist_coupling=((1.0186, 0.0, 0.0), (-0.8306, 0.6089, 0.6089), (0.0, -1.2177, 1.2177)),
 )
 """The thesis' model: 68 parameters of links, springs, frictions, drives and offsets."""
