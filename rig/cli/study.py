@@ -61,6 +61,40 @@ def oneill(
         emit_json(result.study)
 
 
+@study_app.command()
+def pique(
+    data: Annotated[
+        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
+    ],
+    paths: Annotated[
+        tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
+    ] = ("one18", "two18"),
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
+    from estimation.files import write_text_atomic
+    from rig.reports import pique as shown
+    from rig.reports.table import to_rich
+    from rig.studies.pique import open_paths, run_study
+
+    with progress() as bar:
+        task = bar.add_task("paths", total=None)
+        study = run_study(
+            *open_paths(data, paths), on_step=lambda step: bar.update(task, description=step)
+        )
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.studies.oneill import Source

@@ -1,0 +1,120 @@
+"""Identification of an arm: parameters from filtered columns and torques, by least squares."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from estimation.arm.kinematics import ArmError
+from estimation.arm.motion import LOW_PASS
+from estimation.filters import LowPass, zero_phase
+from estimation.recording import FloatArray
+
+UNTOLD = 1e-10
+"""Smallest singular value, as a share of the largest, of columns that can still be told apart."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Identified parameters.
+
+    Attributes:
+        values: Shape (parameters,), in the units of torque over column.
+        errors: Standard errors, same shape. They know noise only, not what the model lacks.
+        condition: Condition number of the weighted columns, each scaled to unit length.
+    """
+
+    values: FloatArray
+    errors: FloatArray
+    condition: float
+
+
+def smoothed(
+    columns: FloatArray, sample_rate_hz: float, low_pass: LowPass = LOW_PASS
+) -> FloatArray:
+    """Filter the columns of a regressor as the torque is filtered.
+
+    A filter does not commute with friction's sign: columns made from barely filtered motion and
+    then filtered belong to the filtered torque, columns made from filtered motion do not.
+
+    Args:
+        columns: Shape (n, joints, parameters).
+        sample_rate_hz: Sample rate, Hz.
+        low_pass: Filter, run forwards and backwards.
+    """
+    flat = zero_phase(columns.reshape(len(columns), -1), sample_rate_hz, low_pass)
+    return flat.reshape(columns.shape)
+
+
+def thesis_weights(torque: FloatArray) -> FloatArray:
+    """Return the thesis' weight of each joint, equation 2.11: one over its largest torque.
+
+    Args:
+        torque: Shape (n, joints).
+    """
+    weights: FloatArray = 1 / np.abs(torque).max(axis=0)
+    return weights
+
+
+def fit(
+    columns: FloatArray,
+    torque: FloatArray,
+    weights: FloatArray | None = None,
+    damping: float = 0.0,
+    independent_share: float = 1.0,
+) -> Fit:
+    """Fit parameters by ordinary, weighted or damped least squares.
+
+    Args:
+        columns: Shape (n, joints, parameters).
+        torque: Shape (n, joints).
+        weights: Weight of each joint, shape (joints,); None weighs all joints alike.
+        damping: Added to the squared length of each weighted column, as a share of it: 0 is plain
+            least squares; small values hold back what the motion hardly tells.
+        independent_share: Share of the samples that are independent of one another; after a
+            low-pass about 2 cutoff / sample rate. Enters the standard errors only.
+
+    Raises:
+        ArmError: Without damping, the motion does not tell the parameters apart.
+    """
+    joints = torque.shape[1]
+    weight = np.ones(joints) if weights is None else weights
+    table = (columns * weight[:, None]).reshape(-1, columns.shape[2])
+    length = np.linalg.norm(table, axis=0)
+    length[length == 0] = 1.0
+    table /= length
+    # the singular values of the triangular factor are the table's, at a fraction of the cost
+    _, singular, basis = linalg.svd(np.linalg.qr(table, mode="r"))
+    if damping == 0 and singular[-1] <= UNTOLD * singular[0]:
+        worst = np.flatnonzero(np.abs(basis[-1]) > 0.1)
+        raise ArmError(
+            "The motion does not tell the parameters apart.",
+            f"The columns {', '.join(map(str, worst))} depend on one another.",
+            "Reduce them to base parameters, or add damping.",
+        )
+    inverse = (basis.T / (singular**2 + damping)) @ basis
+    target = (torque * weight).ravel()
+    values = inverse @ (table.T @ target)
+    left = np.square((target - table @ values).reshape(-1, joints))
+    noise = left.sum(axis=0) / max(1.0, len(left) - len(values) / joints) / independent_share
+    by_joint = table.reshape(-1, joints, len(values))
+    spread = np.einsum("njp,j,njr->pr", by_joint, noise, by_joint, optimize=True)
+    variance = np.diag(inverse @ spread @ inverse)
+    return Fit(values / length, np.sqrt(variance) / length, float(singular[0] / singular[-1]))
+
+
+def nrmsd_percent(estimate: FloatArray, torque: FloatArray) -> FloatArray:
+    """Return the error of each joint, equation 3.2 of the thesis: RMS over the torque's range, %.
+
+    Args:
+        estimate: Shape (n, joints).
+        torque: Shape (n, joints).
+
+    Raises:
+        ArmError: A joint's torque does not change.
+    """
+    spread = np.ptp(torque, axis=0)
+    if np.any(spread == 0):
+        raise ArmError("A joint's torque does not change: its error has no scale.")
+    error: FloatArray = 100 * np.sqrt(np.mean((estimate - torque) ** 2, axis=0)) / spread
+    return error

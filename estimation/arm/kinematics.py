@@ -1,0 +1,133 @@
+"""Kinematics of an arm by Pinocchio, from its table and without a URDF file."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from estimation.arm.tables import Arm, DhRow
+from estimation.errors import EstimationError
+from estimation.recording import FloatArray
+
+TIP = "tip"
+
+
+class ArmError(EstimationError):
+    """An arm's motion does not fit the arm, or does not tell its parameters."""
+
+
+class PinocchioMissingError(ArmError):
+    """Pinocchio is not installed."""
+
+
+def pinocchio() -> Any:
+    """Return the Pinocchio module; imported when first needed, since it is large and optional.
+
+    Raises:
+        PinocchioMissingError: It is not installed.
+    """
+    try:
+        import pinocchio as module
+    except ImportError as error:
+        raise PinocchioMissingError(
+            "Arm dynamics need Pinocchio, which is not installed.",
+            "It is an optional dependency.",
+            "Type: pip install 'rig[arm]'",
+        ) from error
+    return module
+
+
+@lru_cache(maxsize=8)
+def built(arm: Arm) -> Any:
+    """Return the arm as a `pinocchio.Model`: massless links, a frame called `tip`, gravity set."""
+    pin = pinocchio()
+    model = pin.Model()
+    model.name = arm.name
+    model.gravity = pin.Motion(np.array(arm.gravity_m_s2), np.zeros(3))
+    parent = 0
+    for joint in arm.joints:
+        moves = pin.JointModelRZ() if joint.kind == "revolute" else pin.JointModelPZ()
+        parent = model.addJoint(parent, moves, _placement(pin, joint.row), joint.name)
+        model.appendBodyToJoint(parent, pin.Inertia.Zero(), pin.SE3.Identity())
+    model.addFrame(pin.Frame(TIP, parent, 0, _placement(pin, arm.tip), pin.FrameType.OP_FRAME))
+    return model
+
+
+def _placement(pin: Any, row: DhRow) -> Any:
+    about_x = pin.SE3(pin.utils.rotate("x", row.alpha_rad), np.array([row.a_m, 0.0, 0.0]))
+    about_z = pin.SE3(pin.utils.rotate("z", row.theta_rad), np.array([0.0, 0.0, row.d_m]))
+    return about_x * about_z
+
+
+def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return where the tip is, in the base frame.
+
+    Args:
+        arm: The arm.
+        position: Joint positions, shape (joints,), rad or m.
+
+    Returns:
+        Homogeneous transform, shape (4, 4), m.
+
+    Raises:
+        ArmError: The number of positions is not the arm's.
+    """
+    pin, model = pinocchio(), built(arm)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, _checked(arm, position))
+    pose: FloatArray = data.oMf[model.getFrameId(TIP)].homogeneous
+    return pose
+
+
+def spatial_jacobian(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return the Jacobian to the tip's spatial twist, taken at the base's origin.
+
+    Args:
+        arm: The arm.
+        position: Joint positions, shape (joints,), rad or m.
+
+    Returns:
+        Shape (6, joints): linear velocity first, then angular, in the base frame.
+
+    Raises:
+        ArmError: The number of positions is not the arm's.
+    """
+    return _jacobian(arm, position, "WORLD")
+
+
+def body_jacobian(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return the Jacobian to the tip's body twist, taken at the tip in the tip's frame.
+
+    Args:
+        arm: The arm.
+        position: Joint positions, shape (joints,), rad or m.
+
+    Returns:
+        Shape (6, joints): linear velocity first, then angular, in the tip's frame.
+
+    Raises:
+        ArmError: The number of positions is not the arm's.
+    """
+    return _jacobian(arm, position, "LOCAL")
+
+
+def _jacobian(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
+    pin, model = pinocchio(), built(arm)
+    jacobian: FloatArray = pin.computeFrameJacobian(
+        model,
+        model.createData(),
+        _checked(arm, position),
+        model.getFrameId(TIP),
+        getattr(pin.ReferenceFrame, frame),
+    )
+    return jacobian
+
+
+def _checked(arm: Arm, position: FloatArray) -> FloatArray:
+    q = np.asarray(position, dtype=np.float64)
+    if q.shape != (len(arm.joints),) or not np.isfinite(q).all():
+        raise ArmError(
+            f"Positions of shape {q.shape} do not fit {arm.name}.",
+            f"It has {len(arm.joints)} joints; every position must be finite.",
+        )
+    return q

@@ -1,0 +1,151 @@
+"""Arms as data: modified Denavit-Hartenberg rows, joint limits, and what their joints carry.
+
+A row places joint i on link i - 1 (Craig's convention):
+T = RotX(alpha) TransX(a) RotZ(theta) TransZ(d), with q added to theta or, prismatic, to d.
+"""
+
+from dataclasses import dataclass
+from math import pi, radians
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class DhRow:
+    """One row of a modified Denavit-Hartenberg table: m and rad.
+
+    Attributes:
+        a_m: Distance along the previous x axis.
+        alpha_rad: Angle about the previous x axis.
+        d_m: Distance along the own z axis at q = 0.
+        theta_rad: Angle about the own z axis at q = 0.
+    """
+
+    a_m: float
+    alpha_rad: float
+    d_m: float
+    theta_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
+
+    Attributes:
+        name: What it is called.
+        kind: How it moves.
+        row: Where it sits.
+        lower: Lower end of its range.
+        upper: Upper end of its range.
+        speed: Largest speed.
+        link: What of its link's ten parameters counts: all of them, or only the first moments of
+            a link whose mass is negligible.
+        spring: Whether an elastic torque proportional to its position acts on it.
+    """
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    row: DhRow
+    lower: float
+    upper: float
+    speed: float
+    link: Literal["full", "first moments"] = "full"
+    spring: bool = False
+
+    @property
+    def torque_unit(self) -> str:
+        """Unit of the joint's torque or force."""
+        return "N m" if self.kind == "revolute" else "N"
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A serial arm.
+
+    Attributes:
+        name: What it is called.
+        joints: From the base to the tip.
+        tip: The fixed row from the last joint's frame to the tip's.
+        viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of
+            the first by the speed of the second.
+        gravity_m_s2: Gravity in the base frame.
+        source: Where the numbers come from.
+        wrist: First joint (from 0) that cables drive from coupled motors, or None.
+        wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    tip: DhRow
+    viscous_pairs: tuple[tuple[int, int], ...]
+    gravity_m_s2: tuple[float, float, float]
+    source: str
+    wrist: int | None = None
+    wrist_coupling: tuple[tuple[float, ...], ...] = ()
+
+
+PSM = Arm(
+    name="da Vinci patient-side manipulator, serial",
+    joints=(
+        Joint(
+            name="outer yaw",
+            kind="revolute",
+            row=DhRow(0.0, pi / 2, 0.0, pi / 2),
+            lower=radians(-60),
+            upper=radians(60),
+            speed=2.0,
+            spring=True,
+        ),
+        Joint(
+            name="outer pitch",
+            kind="revolute",
+            row=DhRow(0.0, -pi / 2, 0.0, -pi / 2),
+            lower=radians(-45),
+            upper=radians(45),
+            speed=2.0,
+            spring=True,
+        ),
+        Joint(
+            name="insertion",
+            kind="prismatic",
+            row=DhRow(0.0, pi / 2, -0.43, 0.0),
+            lower=0.05,
+            upper=0.18,
+            speed=0.4,
+        ),
+        Joint(
+            name="outer roll",
+            kind="revolute",
+            row=DhRow(0.0, 0.0, 0.41, 0.0),
+            lower=radians(-180),
+            upper=radians(180),
+            speed=6.0,
+            link="first moments",
+            spring=True,
+        ),
+        Joint(
+            name="wrist pitch",
+            kind="revolute",
+            row=DhRow(0.0, -pi / 2, 0.0, -pi / 2),
+            lower=radians(-90),
+            upper=radians(90),
+            speed=5.0,
+            link="first moments",
+        ),
+        Joint(
+            name="wrist yaw",
+            kind="revolute",
+            row=DhRow(0.0091, -pi / 2, 0.0, -pi / 2),
+            lower=radians(-90),
+            upper=radians(90),
+            speed=5.0,
+            link="first moments",
+        ),
+    ),
+    tip=DhRow(0.0, -pi / 2, 0.01, 0.0),
+    viscous_pairs=((4, 5), (5, 4)),
+    gravity_m_s2=(0.0, 0.0, -9.80665),
+    source="G. A. Piqué, Dynamic Modeling of the Da Vinci Research Kit Arm, 2018, tables 2.1, 2.3",
+    wrist=4,
+    wrist_coupling=((1.0186, 0.0, 0.0), (-0.8306, 0.6089, 0.6089), (0.0, -1.2177, 1.2177)),
+)
+"""The thesis' model: 68 parameters of links, springs, frictions, drives and offsets."""

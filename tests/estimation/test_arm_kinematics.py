@@ -1,0 +1,79 @@
+"""An arm's kinematics against products of its table's transforms, written out in NumPy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.arm.kinematics import ArmError, body_jacobian, spatial_jacobian, tip_pose
+from estimation.arm.tables import PSM, DhRow
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+
+within_limits = st.tuples(*(st.floats(j.lower, j.upper) for j in PSM.joints)).map(np.array)
+
+
+def transform(row: DhRow, theta_rad: float, d_m: float) -> np.ndarray:
+    """Craig's modified DH matrix, element by element."""
+    ca, sa = np.cos(row.alpha_rad), np.sin(row.alpha_rad)
+    ct, st_ = np.cos(theta_rad), np.sin(theta_rad)
+    return np.array(
+        [
+            [ct, -st_, 0, row.a_m],
+            [st_ * ca, ct * ca, -sa, -sa * d_m],
+            [st_ * sa, ct * sa, ca, ca * d_m],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def joint_frames(q: np.ndarray) -> list[np.ndarray]:
+    frames, pose = [], np.eye(4)
+    for joint, value in zip(PSM.joints, q, strict=True):
+        turn, shift = (value, 0.0) if joint.kind == "revolute" else (0.0, value)
+        row = joint.row
+        pose = pose @ transform(row, row.theta_rad + turn, row.d_m + shift)
+        frames.append(pose)
+    return [*frames, pose @ transform(PSM.tip, PSM.tip.theta_rad, PSM.tip.d_m)]
+
+
+@given(within_limits)
+def test_the_tip_is_where_the_tables_product_puts_it(q):
+    np.testing.assert_allclose(tip_pose(PSM, q), joint_frames(q)[-1], atol=1e-12)
+
+
+@given(within_limits)
+def test_the_spatial_jacobian_holds_the_joints_twists(q):
+    expected = np.zeros((6, 6))
+    for k, (joint, frame) in enumerate(zip(PSM.joints, joint_frames(q), strict=False)):
+        axis, origin = frame[:3, 2], frame[:3, 3]
+        if joint.kind == "revolute":
+            expected[:, k] = [*np.cross(origin, axis), *axis]
+        else:
+            expected[:3, k] = axis
+    np.testing.assert_allclose(spatial_jacobian(PSM, q), expected, atol=1e-12)
+
+
+@given(within_limits)
+def test_the_body_jacobian_is_the_derivative_of_the_tips_pose(q):
+    step, pose = 1e-6, joint_frames(q)[-1]
+    for k in range(6):
+        h = np.zeros(6)
+        h[k] = step
+        rate = (joint_frames(q + h)[-1] - joint_frames(q - h)[-1]) / (2 * step)
+        twist = np.linalg.inv(pose) @ rate  # skew angular part and linear part, in the tip's frame
+        linear, angular = twist[:3, 3], (twist[2, 1], twist[0, 2], twist[1, 0])
+        np.testing.assert_allclose(body_jacobian(PSM, q)[:, k], [*linear, *angular], atol=1e-8)
+
+
+def test_the_first_three_joints_keep_the_shaft_through_the_remote_centre():
+    for q in ([0.5, -0.3, 0.1, 0, 0, 0], [-1.0, 0.7, 0.17, 2.0, 0, 0]):
+        shaft = joint_frames(np.array(q))[3]
+        axis, point = shaft[:3, 2], tip_pose(PSM, np.array(q))[:3, 3]
+        assert np.linalg.norm(np.cross(axis, shaft[:3, 3])) < 1e-12
+        assert point[2] < 0  # below the remote centre: gravity's sign is right
+
+
+def test_a_wrong_number_of_positions_is_named():
+    with pytest.raises(ArmError, match="6 joints"):
+        tip_pose(PSM, np.zeros(7))

@@ -1,0 +1,142 @@
+"""`rig study pique` on a made arm with known hidden effects, and on the measured paths."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from estimation.arm.effects import candidates
+from estimation.arm.motion import motion_of
+from estimation.arm.regressor import regressor
+from estimation.arm.tables import PSM
+from estimation.campaign import Campaign
+from estimation.recording import Recording
+from rig.cli.study import study_app
+from rig.errors import DataError
+from rig.importers.dvrk_psm import MOTOR_TO_JOINT
+from rig.studies import pique
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+
+RATE_HZ = 100.0
+HIDDEN = "presliding J2"
+
+
+def made_path(name: str, seed: int, seconds: float = 20.0) -> Recording:
+    """A path of an arm with known parameters, a hidden effect and a little noise."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, seconds, 1 / RATE_HZ)
+    waves = sum(
+        np.sin(2 * np.pi * 0.16 * k * time[:, None] + rng.uniform(0, 6.28, 7))
+        * rng.uniform(0.3, 1, 7)
+        / k
+        for k in range(1, 6)
+    )
+    waves /= np.abs(waves).max(axis=0)
+    lower, upper = (np.array([*(getattr(j, n) for j in PSM.joints), e]) for n, e in LIMITS)
+    position = (lower + upper) / 2 + 0.4 * (upper - lower) * waves
+    motion = motion_of(position, 1 / RATE_HZ, pique.FINE)
+    torque = regressor(PSM, motion) @ np.random.default_rng(1).uniform(0.05, 1, 68)
+    (hidden,) = (e for e in candidates(PSM) if e.name == HIDDEN)
+    torque += hidden.columns(motion) @ np.full(3, 0.15 * np.ptp(torque[:, 1]))
+    torque += 0.002 * np.ptp(torque, axis=0) * rng.normal(size=torque.shape)
+    columns = {}
+    for k in range(7):
+        units = (
+            ("position_m", "velocity_m_s", "force_n")
+            if k == 2
+            else ("angle_rad", "velocity_rad_s", "torque_n_m")
+        )
+        effort = torque[:, k] if k < 6 else np.zeros(len(time))
+        for unit, block in zip(units, (position[:, k], motion.velocity[:, k], effort), strict=True):
+            columns[f"joint_{k + 1}_{unit}"] = block
+    return Recording(name=name, time_s=time, columns=columns)
+
+
+LIMITS = (("lower", 0.0), ("upper", 1.0))
+
+
+@pytest.fixture(scope="module")
+def paths():
+    return made_path("a", 11), made_path("b", 12)
+
+
+@pytest.fixture(scope="module")
+def study(paths):
+    return pique.run_study(*paths)
+
+
+def errors(study, model):
+    return np.mean([r.nrmsd_percent for r in study.rows if r.model == model], axis=0)
+
+
+def test_the_hidden_effect_is_found_and_halves_its_joints_error(study):
+    assert study.trials[0].effect == HIDDEN
+    assert study.trials[0].kept_in_round == 1
+    assert study.trials[0].other_way_percent > 0
+    assert errors(study, pique.EFFECTS)[1] < 0.5 * errors(study, pique.FILTERED)[1]
+
+
+def test_every_candidate_is_reported_as_kept_or_dropped(study):
+    assert sorted(t.effect for t in study.trials) == sorted(e.name for e in candidates(PSM))
+    kept = [t.kept_in_round for t in study.trials if t.kept_in_round is not None]
+    assert kept == list(range(1, len(kept) + 1))
+    assert all(
+        t.gain_percent >= 100 * pique.LEAST_GAIN
+        for t in study.trials
+        if t.kept_in_round is not None
+    )
+
+
+def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
+    there = tuple(pique.prepare(path) for path in paths)
+    kept = [HIDDEN]
+    fast = pique._Direction(*there, [HIDDEN, "curved spring J1"]).score(kept)
+    row = pique._row("x", *there, there[0].columns(kept), there[1].columns(kept), pique.DAMPING)
+    np.testing.assert_allclose(fast, row.nrmsd_percent, rtol=1e-6)
+
+
+def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_path):
+    monkeypatch.setattr(pique, "open_campaign", lambda path: Campaign.of(paths))
+    monkeypatch.setattr(pique, "candidates", lambda arm: candidates(arm)[:5])
+    out = tmp_path / "pique.md"
+    words = ["pique", "--data", "x", "--paths", "a", "b", "--out", str(out), "--json"]
+    ran = CliRunner().invoke(study_app, words)
+    assert ran.exit_code == 0, ran.output
+    found = json.loads(ran.stdout)
+    assert found["schema"] == "rig.study.pique/1"
+    assert len(found["rows"]) == 6
+    text = out.read_text()
+    assert "thesis, table 3.2 (another robot)" in text
+    assert "| 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in text
+    assert HIDDEN in text.split("## Effects kept")[1].split("## Effects tried")[0]
+
+
+def test_a_missing_path_names_those_there(paths, monkeypatch, tmp_path):
+    monkeypatch.setattr(pique, "open_campaign", lambda path: Campaign.of(paths))
+    with pytest.raises(DataError, match="no run one18"):
+        pique.open_paths(tmp_path, ("one18", "b"))
+
+
+def test_a_path_of_three_seconds_is_too_short():
+    with pytest.raises(DataError, match="too short"):
+        pique.prepare(made_path("short", 1, seconds=3.0))
+
+
+def test_the_table_and_the_importer_agree_on_the_coupling():
+    np.testing.assert_array_equal(np.array(PSM.wrist_coupling), MOTOR_TO_JOINT)
+
+
+@pytest.mark.measured
+def test_the_measured_paths_give_the_reference_and_the_effects_gain(measured_data):
+    if not (measured_data / "psm").is_dir():
+        pytest.skip(f"no arm data at {measured_data / 'psm'}")
+    found = pique.run_study(*pique.open_paths(measured_data / "psm", ("one18", "two18")))
+    there, back = (r.nrmsd_percent for r in found.rows if r.model == pique.THESIS)
+    # an independent run of the thesis' model on these files
+    np.testing.assert_allclose(there, [1.71, 3.84, 4.21, 8.67, 10.00, 9.25], rtol=0.05)
+    np.testing.assert_allclose(back, [1.54, 3.40, 4.61, 7.20, 9.97, 10.94], rtol=0.05)
+    for row in found.rows:
+        if row.model == pique.EFFECTS:
+            assert np.all(np.array(row.nrmsd_percent) < [0.95, 2.5, 3.4, 6.0, 4.9, 5.6])
