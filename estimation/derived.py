@@ -144,7 +144,8 @@ def zero_phase_channels(
         return np.asarray(holoborodko_derivative(filled(values), period_s)[ticks])
 
     def travel(values: FloatArray) -> FloatArray:
-        return _travel(filled(values), _window(recording.sample_rate_hz))[ticks]
+        window = _window(recording.sample_rate_hz)
+        return np.asarray(_travel(filled(values), window)[ticks])
 
     return replace(filtered, columns=_derive(filtered.columns, wanted, derivative, travel))
 
