@@ -9,7 +9,8 @@ import typer
 from typer.testing import CliRunner
 
 from estimation.campaign import Campaign
-from estimation.networks.training import Settings, has_torch
+from estimation.networks.training import Settings, has_torch, train
+from estimation.scores import rmse
 from rig.cli.study import study_app
 from rig.errors import DataError, UsageError
 from rig.reports import oneill_networks as shown
@@ -164,3 +165,23 @@ def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
     assert "Not run" in done.stderr
     assert "Not run" in (tmp_path / "d.md").read_text()
     assert "Not run" in (tmp_path / "r" / "oneill.html").read_text()
+
+
+@torch_only
+@pytest.mark.measured
+def test_physical_states_lower_the_error_on_a_fold_of_measured_runs(measured_data):
+    source = linear.open_reference(measured_data)
+    table = closing_table(source.campaign.exclude("07", "runaway of the motor"), CHANNELS)
+    assert len(table.run) == 304_394
+    mask = held_out_masks(table, "run-wise", 5, 0)[0]
+    job = next(j for j in jobs(("neutral",)) if j.targets == (PROXIMAL,))
+    states = replace(job, way="+ acceleration")
+    error = []
+    for one in (job, states):
+        rows, names = np.flatnonzero(~mask)[::60], (one.inputs, one.targets)
+        x, y = table[one.inputs], table[one.targets]
+        settings = Settings(nodes=one.nodes, iterations=60)
+        trained = train(x[rows], y[rows], names, settings)
+        error.append(rmse(trained.network(x[mask]), y[mask]))
+    assert error[0] == pytest.approx(6.6e-3, abs=1.2e-3)
+    assert error[1] < 0.65 * error[0]
