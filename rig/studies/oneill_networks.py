@@ -140,10 +140,14 @@ class NetworkStudy:
         return None
 
 
+Kind = tuple[str, str, str, tuple[str, ...]]
+"""Pose, way, surrogate and targets of a job."""
+
+
 def jobs(poses: tuple[str, ...]) -> list[Job]:
     """Return the rows of the study, the most telling ones first."""
     both = (DISTAL, JAW)
-    paper: list[tuple[str, str, str, tuple[str, ...]]] = []
+    paper: list[Kind] = []
     paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(SURROGATES)[:4]]
     paper += [("neutral", "end-to-end", s, both) for s in SURROGATES]
     paper += [("neutral", "staged", s, both) for s in tuple(SURROGATES)[:4]]
@@ -155,11 +159,12 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
     motor = [kind for kind in paper if kind[1:3] in MOTOR]
     rest = [kind for kind in paper if kind not in motor]
     posed_states = [(p, "+ travel", "command", (t,)) for p in ("pitch", "roll") for t in both]
-    order: list[tuple[str, Sequence[tuple[str, str, str, tuple[str, ...]]]]] = [
+    order: list[tuple[str, Sequence[Kind]]] = [
         ("random", paper),
-        ("run-wise", [*ways["+ travel"], *motor, *ways["causal"], *ways["+ acceleration"]]),
+        *(("run-wise", _of(s, [*ways["+ travel"], *motor])) for s in ("command", "current")),
         ("lofo", ways["+ travel"]),
         ("lopo", ways["+ travel"]),
+        ("run-wise", [*ways["causal"], *ways["+ acceleration"]]),
         ("lofo", motor),
         ("lopo", motor),
         ("run-wise", [*posed_states, *rest]),
@@ -173,6 +178,10 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
         for pose, way, surrogate, targets in kinds
         if pose in poses
     ]
+
+
+def _of(surrogate: str, kinds: Sequence[Kind]) -> list[Kind]:
+    return [kind for kind in kinds if kind[2] == surrogate]
 
 
 @dataclass(frozen=True)
