@@ -1,9 +1,11 @@
 """Channels that are computed: speeds, accelerations, the twist of the gearbox.
 
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
-and second derivative of `X_angle_rad`; `gearbox_differential_rad` is the motor's angle behind the
-gear ratio less the spindle's. Offline they come from a zero-phase filter and a noise-robust
-derivative, live from a causal filter and backward differences: the same names, two sources.
+and second derivative of `X_angle_rad`; `X_travel_rad` is how far that angle has come since its
+lowest value of the last `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal;
+`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's. Offline
+they come from a zero-phase filter and a noise-robust derivative, live from a causal filter and
+backward differences: the same names, two sources.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -11,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import ndimage
 
 from estimation.filters import (
     PAPER,
@@ -26,9 +29,12 @@ GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
 
 GEARBOX = "gearbox_differential_rad"
-VELOCITY, ACCELERATION = "_velocity_rad_s", "_acceleration_rad_s2"
+VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
 
-Derivative = Callable[[FloatArray], FloatArray]
+TRAVEL_WINDOW_S = 0.5
+"""How far back a travel looks, s. Longer memory could tell which run it is in."""
+
+Operator = Callable[[FloatArray], FloatArray]
 
 
 def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
@@ -37,9 +43,15 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
     for name in names:
         if name == GEARBOX:
             needed |= {"motor_angle_rad", "spindle_angle_rad"}
+        elif name.endswith(TRAVEL):
+            needed.add(_travelled(name))
         elif name != "time_s":
             needed.add(_differentiated(name)[0])
     return tuple(sorted(needed))
+
+
+def _travelled(name: str) -> str:
+    return name.removesuffix(TRAVEL) + "_angle_rad"
 
 
 def _differentiated(name: str) -> tuple[str, int]:
@@ -51,7 +63,10 @@ def _differentiated(name: str) -> tuple[str, int]:
 
 
 def _derive(
-    filtered: Mapping[str, FloatArray], names: Iterable[str], derivative: Derivative
+    filtered: Mapping[str, FloatArray],
+    names: Iterable[str],
+    derivative: Operator,
+    travel: Operator,
 ) -> dict[str, FloatArray]:
     channels: dict[str, FloatArray] = {}
     for name in names:
@@ -60,11 +75,23 @@ def _derive(
                 filtered["motor_angle_rad"] / GEAR_RATIO - filtered["spindle_angle_rad"]
             )
             continue
+        if name.endswith(TRAVEL):
+            channels[name] = travel(filtered[_travelled(name)])
+            continue
         source, times = _differentiated(name)
         channels[name] = filtered[source]
         for _ in range(times):
             channels[name] = derivative(channels[name])
     return channels
+
+
+def _travel(values: FloatArray, window: int) -> FloatArray:
+    """Return each value less the lowest of itself and the `window - 1` before it."""
+    lowest: FloatArray = ndimage.minimum_filter1d(
+        values, window, mode="nearest", origin=(window - 1) // 2
+    )
+    travelled: FloatArray = np.subtract(values, lowest)
+    return travelled
 
 
 def settled(channels: Recording, low_pass: LowPass, step: int = 1) -> Recording:
@@ -110,11 +137,22 @@ def zero_phase_channels(
     period_s = 1.0 / recording.sample_rate_hz
     ticks = np.rint((recording.time_s - recording.time_s[0]) / period_s).astype(np.int64)
 
-    def derivative(values: FloatArray) -> FloatArray:
-        filled = fill_gaps(ticks, values[:, None])[:, 0]
-        return np.asarray(holoborodko_derivative(filled, period_s)[ticks])
+    def filled(values: FloatArray) -> FloatArray:
+        return np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
 
-    return replace(filtered, columns=_derive(filtered.columns, wanted, derivative))
+    def derivative(values: FloatArray) -> FloatArray:
+        return np.asarray(holoborodko_derivative(filled(values), period_s)[ticks])
+
+    def travel(values: FloatArray) -> FloatArray:
+        window = _window(recording.sample_rate_hz)
+        return np.asarray(_travel(filled(values), window)[ticks])
+
+    return replace(filtered, columns=_derive(filtered.columns, wanted, derivative, travel))
+
+
+def _window(sample_rate_hz: float) -> int:
+    """Return the samples a travel looks at."""
+    return max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))
 
 
 class CausalChannels:
@@ -137,7 +175,9 @@ class CausalChannels:
         self._filter = CausalFilter(sample_rate_hz, low_pass)
         self._last_time_s: float | None = None
         self._last_row: FloatArray = np.empty(0)
-        self._history: FloatArray = np.empty((0, 0))  # the last two filtered rows
+        travels = any(name.endswith(TRAVEL) for name in self.names)
+        self._kept = max(2, _window(sample_rate_hz) if travels else 0)
+        self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
         """Take the next samples and return the channels for them.
@@ -180,15 +220,20 @@ class CausalChannels:
         filled = fill_gaps(ticks, np.vstack([self._last_row, rows]))[1:]
         filtered = self._filter.step(filled)
         if first:
-            self._history = np.repeat(filtered[:1], 2, axis=0)
+            self._history = np.repeat(filtered[:1], self._kept, axis=0)
         lined = np.vstack([self._history, filtered])
-        self._history, self._last_row, self._last_time_s = lined[-2:], rows[-1], float(time[-1])
+        self._history, self._last_row, self._last_time_s = (
+            lined[-self._kept :],
+            rows[-1],
+            float(time[-1]),
+        )
         derived = _derive(
             dict(zip(self.measured, lined.T, strict=True)),
             [name for name in self.names if name != "time_s"],
             self._backward,
+            lambda values: _travel(values, _window(self._rate_hz)),
         )
-        at = ticks[1:] + 1  # two rows of history, and tick 1 is the first new row
+        at = ticks[1:] + self._kept - 1  # tick 1 is the first row after the history
         channels = {name: values[at] for name, values in derived.items()}
         return {**channels, "time_s": time} if "time_s" in self.names else channels
 

@@ -11,7 +11,7 @@ M. T. Hagan, "Gauss-Newton approximation to Bayesian learning", ICNN 1997; start
 after D. Nguyen and B. Widrow, IJCNN 1990.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 BLOCK = 8192
-"""Rows whose Jacobian is held at once."""
+"""Rows whose derivatives are held at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,18 +118,27 @@ def train(
     )
 
 
-def jacobian(network: Network, rows: FloatArray) -> FloatArray:
-    """Return the derivative of the mapped outputs by the weights, shape (n, o, weights).
+def normal_equations(
+    network: Network, rows: FloatArray, targets: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return J'J, shape (p, p), and J'e, shape (p,), of a network on rows.
 
-    The weights are ordered as `network.hidden`, then `network.output`, row by row.
+    J is the derivative of the mapped outputs by the weights, e the mapped outputs less the mapped
+    targets. The weights are ordered as `network.hidden`, then `network.output`, row by row.
+
+    Args:
+        network: The network.
+        rows: Shape (n, d).
+        targets: Shape (n, o).
     """
     import torch
 
     unit = to_unit(rows, network.input_range)
     x = torch.from_numpy(np.column_stack([unit, np.ones(len(unit))]))
+    y = torch.from_numpy(to_unit(targets, network.output_range))
     hidden, output = (torch.from_numpy(np.array(w)) for w in (network.hidden, network.output))
-    found: FloatArray = _jacobian(x, hidden, output)[1].numpy()
-    return found
+    curvature, slope = _normal([(x, y)], hidden, output)
+    return curvature.numpy(), slope.numpy()
 
 
 def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
@@ -145,22 +154,38 @@ def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
     return bounds
 
 
-def _jacobian(x: "Tensor", hidden: "Tensor", output: "Tensor") -> tuple["Tensor", "Tensor"]:
-    """Return outputs, shape (n, o), and their derivative by all weights, shape (n, o, p)."""
+def _normal(
+    blocks: Iterable[tuple["Tensor", "Tensor"]], hidden: "Tensor", output: "Tensor"
+) -> tuple["Tensor", "Tensor"]:
+    """Return J'J and J'e summed over blocks of rows.
+
+    The derivative of output k by hidden weight (j, i) is V_kj a_j (1 - a_j) u_i, and by its output
+    weights (a, 1). The part without V is the same for every output, so its products are summed
+    once, and scaled by V at the end.
+    """
     import torch
 
-    nodes = torch.sigmoid(x @ hidden.T)
-    slope = nodes * (1 - nodes)
-    ones = torch.ones(len(x), 1, dtype=torch.float64)
-    last = torch.cat([nodes, ones], dim=1)
-    rows, count = len(x), hidden.numel() + output.numel()
-    found = torch.zeros(rows, len(output), count, dtype=torch.float64)
-    for k in range(len(output)):
-        by_hidden = (slope * output[k, :-1])[:, :, None] * x[:, None, :]
-        found[:, k, : hidden.numel()] = by_hidden.reshape(rows, -1)
-        first = hidden.numel() + k * last.shape[1]
-        found[:, k, first : first + last.shape[1]] = last
-    return last @ output.T, found
+    count, outputs = hidden.numel(), len(output)
+    nodes, wide = hidden.shape
+    last = nodes + 1
+    products = torch.zeros(count + last, count + last, dtype=torch.float64)
+    slopes = torch.zeros(count + last, outputs, dtype=torch.float64)
+    for x, y in blocks:
+        node = torch.sigmoid(x @ hidden.T)
+        ones = torch.ones(len(x), 1, dtype=torch.float64)
+        by_hidden = (node * (1 - node))[:, :, None] * x[:, None, :]
+        table = torch.cat([by_hidden.reshape(len(x), -1), node, ones], dim=1)
+        products.addmm_(table.T, table)
+        slopes.addmm_(table.T, table[:, count:] @ output.T - y)
+    scale = output[:, :-1].repeat_interleave(wide, dim=1)  # V_kj for each hidden weight
+    curvature = torch.zeros(count + outputs * last, count + outputs * last, dtype=torch.float64)
+    curvature[:count, :count] = products[:count, :count] * (scale.T @ scale)
+    for k in range(outputs):
+        own = slice(count + k * last, count + (k + 1) * last)
+        curvature[:count, own] = products[:count, count:] * scale[k][:, None]
+        curvature[own, :count] = curvature[:count, own].T
+        curvature[own, own] = products[count:, count:]
+    return curvature, torch.cat([(slopes[:count] * scale.T).sum(dim=1), slopes[count:].T.ravel()])
 
 
 class _Fit:
@@ -207,13 +232,13 @@ class _Fit:
         """Train; return why it stopped and whether that is convergence."""
         damping = self.FIRST_DAMPING
         history = [self.rmse]
-        curvature, slope = self._normal()
+        curvature, slope = _normal(self._blocks(), *self._parts(self._w))
         while self.steps < self.settings.iterations:
             damping = self._step(curvature, slope, damping)
             if damping > self.MOST_DAMPING:
                 return "no step lowers the objective any more", True
             self.steps += 1
-            curvature, slope = self._normal()
+            curvature, slope = _normal(self._blocks(), *self._parts(self._w))
             self._update_evidence(curvature)
             history.append(self.rmse)
             on_step(self.steps, self.rmse)
@@ -241,20 +266,6 @@ class _Fit:
             estimate = torch.sigmoid(x @ hidden.T) @ output[:, :-1].T + output[:, -1]
             total += float(((estimate - y) ** 2).sum())
         return total
-
-    def _normal(self) -> tuple["Tensor", "Tensor"]:
-        """Return J'J and J'e."""
-        import torch
-
-        curvature = torch.zeros(self.count, self.count, dtype=torch.float64)
-        slope = torch.zeros(self.count, dtype=torch.float64)
-        hidden, output = self._parts(self._w)
-        for x, y in self._blocks():
-            estimate, block = _jacobian(x, hidden, output)
-            flat = block.reshape(-1, self.count)
-            curvature.addmm_(flat.T, flat)
-            slope.addmv_(flat.T, (estimate - y).reshape(-1))
-        return curvature, slope
 
     def _step(self, curvature: "Tensor", slope: "Tensor", damping: float) -> float:
         """Take the first step that lowers the objective; return the damping for the next one."""

@@ -1,5 +1,6 @@
 """`rig study`: make a paper's results again."""
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ from rig.cli.output import JsonFlag, console, emit_json, progress
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
+    from rig.studies.oneill_networks import NetworkStudy
 
 study_app = typer.Typer(
     name="study",
@@ -32,9 +34,20 @@ def oneill(
     report: Annotated[Path | None, typer.Option(help="Folder for the HTML report.")] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of splits and of the simulation.")] = 0,
+    networks: Annotated[
+        bool, typer.Option("--networks", help="Also train the networks: long, can be resumed.")
+    ] = False,
+    minutes: Annotated[
+        float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
+    ] = None,
+    every: Annotated[int, typer.Option(min=1, help="Train on every n-th closing sample.")] = 8,
+    workers: Annotated[int, typer.Option(min=1, help="Networks trained at once.")] = 1,
+    state: Annotated[
+        Path | None, typer.Option(help="Folder of trained networks; a cache folder by default.")
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Make the linear rows of Table I of O'Neill et al. 2018 again."""
+    """Make the results of O'Neill et al. 2018 again: Table I's linear rows, and its networks."""
     from estimation.files import write_text_atomic
     from rig.reports import oneill as shown
     from rig.reports.render import write_report
@@ -45,20 +58,59 @@ def oneill(
     with progress() as bar:
         task = bar.add_task("runs", total=len(source.campaign))
         result = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
+    deep = None
+    if networks:
+        left_out = result.study.left_out
+        training = Training(minutes, every, workers, state)
+        deep = _train(source, left_out, data, training, seed)
     screen = console()
     screen.print(shown.lead(result.study), markup=False)
-    for note in [f"Data: {source.name}.", *shown.notes(result.study)]:
+    for note in [f"Data: {source.name}.", *shown.all_notes(result.study, deep)]:
         screen.print(note, markup=False)
-    for table in shown.tables(result.study):
+    for table in shown.all_tables(result.study, deep):
         screen.print(to_rich(table))
     if out is not None:
-        write_text_atomic(out, shown.markdown(result.study))
+        write_text_atomic(out, shown.markdown(result.study, deep))
         screen.print(f"Markdown: {out}", markup=False)
     if report is not None:
-        page = write_report(report / "oneill.html", shown.page(result))
+        page = write_report(report / "oneill.html", shown.page(result, deep))
         screen.print(f"Report: {page}", markup=False)
     if json:
-        emit_json(result.study)
+        emit_json({**asdict(result.study), **({"networks": deep} if deep is not None else {})})
+
+
+@dataclass(frozen=True)
+class Training:
+    """How long, on what and where networks are trained; see the command's options."""
+
+    minutes: float | None
+    every: int
+    workers: int
+    state: Path | None
+
+
+def _train(
+    source: "Source", left_out: dict[str, str], data: Path | None, training: Training, seed: int
+) -> "NetworkStudy":
+    from rig.studies.oneill_data import network_tables
+    from rig.studies.oneill_networks import run_networks
+
+    with progress() as bar:
+        task = bar.add_task("closing samples", total=None)
+        tables, notes = network_tables(
+            source.campaign, left_out, data, on_run=lambda name: bar.advance(task)
+        )
+        trained = bar.add_task("networks", total=None)
+        return run_networks(
+            tables,
+            training.state or Path.home() / ".cache" / "rig" / "oneill",
+            every=training.every,
+            seed=seed,
+            workers=training.workers,
+            minutes=float("inf") if training.minutes is None else training.minutes,
+            notes=notes,
+            on_network=lambda done, total: bar.update(trained, completed=done, total=total),
+        )
 
 
 @study_app.command()

@@ -6,9 +6,11 @@ from markupsafe import Markup
 from estimation import oneill
 from estimation.scores import Score
 from rig.reports import figures
+from rig.reports import oneill_networks as networks
 from rig.reports.render import render
 from rig.reports.table import TextTable, to_markdown
 from rig.studies.oneill import PROTOCOLS, PaperRow, Result, Study
+from rig.studies.oneill_networks import NetworkStudy
 
 TITLE = "Linear torque surrogates: Table I of O'Neill et al. 2018, made again"
 
@@ -98,15 +100,25 @@ def _held_out_table(study: Study) -> TextTable:
     return TextTable("RMSE by what was held out, mN m", columns, rows, note)
 
 
-def markdown(study: Study) -> str:
-    """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *notes(study)]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
+def markdown(study: Study, deep: NetworkStudy | None = None) -> str:
+    """Return the study, and that of the networks where there is one, as a Markdown page."""
+    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, deep)]
+    parts += [to_markdown(table).rstrip() for table in all_tables(study, deep)]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
 
-def page(result: Result) -> str:
-    """Return the study as a page of HTML."""
+def all_notes(study: Study, deep: NetworkStudy | None) -> list[str]:
+    """Return the notes of the study and of its networks."""
+    return notes(study) + (networks.notes(deep) if deep is not None else [])
+
+
+def all_tables(study: Study, deep: NetworkStudy | None) -> list[TextTable]:
+    """Return the tables of the study and of its networks."""
+    return tables(study) + (networks.tables(deep) if deep is not None else [])
+
+
+def page(result: Result, deep: NetworkStudy | None = None) -> str:
+    """Return the study, and that of the networks where there is one, as a page of HTML."""
     study = result.study
     return render(
         "study.html",
@@ -114,8 +126,8 @@ def page(result: Result) -> str:
             "title": TITLE,
             "lead": lead(study),
             "source": study.source,
-            "notes": notes(study),
-            "tables": tables(study),
+            "notes": all_notes(study, deep),
+            "tables": all_tables(study, deep),
             "figures": _figures(result),
             "provenance": study.provenance,
         },

@@ -219,7 +219,7 @@ def run_study(
     there = set(next(iter(campaign)).columns)
     names = [oneill.TARGET, *surrogates.values(), *(c for c in context if c in there)]
     closing = oneill.closing_campaign(campaign, names, on_run=lambda run: on_run(run.name))
-    kept, left_out = _without_flagged(closing)
+    kept, left_out = without_flagged(closing)
     splits = _splits(kept, seed, remarks)
     rows = []
     for surrogate, channel in surrogates.items():
@@ -271,7 +271,7 @@ def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
     return found
 
 
-def _without_flagged(closing: Campaign) -> tuple[Campaign, dict[str, str]]:
+def without_flagged(closing: Campaign) -> tuple[Campaign, dict[str, str]]:
     """Leave out runs with flagged closing samples, and say why."""
     left_out = {}
     for run in closing:

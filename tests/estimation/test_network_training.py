@@ -1,5 +1,7 @@
 """Training a network: it needs torch, and is skipped visibly without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,28 +17,24 @@ def rows(count: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform([-1.0, 0.0], [2.0, 0.5], (count, 2))
 
 
-def test_the_jacobian_is_the_derivative_of_the_mapped_outputs():
-    network = make()
-    x = rows(6)
-    found = training.jacobian(network, x)
+def test_the_normal_equations_are_those_of_the_numerical_derivative():
+    network = make(outputs=2)
+    x = rows(9)
+    y = np.random.default_rng(1).normal(size=(9, 2))
     weights = np.concatenate([network.hidden.ravel(), network.output.ravel()])
 
     def mapped(w: np.ndarray) -> np.ndarray:
-        moved = type(network)(
-            network.inputs,
-            network.outputs,
-            network.input_range,
-            network.output_range,
-            w[: network.hidden.size].reshape(network.hidden.shape),
-            w[network.hidden.size :].reshape(network.output.shape),
-        )
-        return to_unit(moved(x), network.output_range)
+        hidden = w[: network.hidden.size].reshape(network.hidden.shape)
+        output = w[network.hidden.size :].reshape(network.output.shape)
+        moved = replace(network, hidden=hidden, output=output)
+        return to_unit(moved(x), network.output_range).ravel()
 
-    for k in range(len(weights)):
-        step = np.zeros_like(weights)
-        step[k] = 1e-6
-        slope = (mapped(weights + step) - mapped(weights - step)) / 2e-6
-        np.testing.assert_allclose(found[:, :, k], slope, atol=1e-8)
+    steps = 1e-6 * np.eye(len(weights))
+    jacobian = np.column_stack([(mapped(weights + s) - mapped(weights - s)) / 2e-6 for s in steps])
+    error = mapped(weights) - to_unit(y, network.output_range).ravel()
+    curvature, slope = training.normal_equations(network, x, y)
+    np.testing.assert_allclose(curvature, jacobian.T @ jacobian, atol=1e-7)
+    np.testing.assert_allclose(slope, jacobian.T @ error, atol=1e-6)
 
 
 def test_training_recovers_a_known_function_and_its_noise():

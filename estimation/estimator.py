@@ -1,0 +1,80 @@
+"""One interface for everything that estimates a channel: fit, predict, step, save, load.
+
+An estimator is an unchanging object. What fits one is a recipe: `ModelRecipe`, `NetworkRecipe` and
+`ResidualRecipe` hold their settings and turn a campaign into an estimator.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+from numpy.typing import ArrayLike
+
+from estimation.campaign import Campaign
+from estimation.recording import FloatArray, Recording
+
+
+class Stepper(Protocol):
+    """An estimator as it runs live; it holds the state of the filters."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that `step` needs."""
+        ...
+
+    def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
+        """Take the next samples, one or many, and return their estimates, shape (n,)."""
+        ...
+
+
+class Estimator(Protocol):
+    """What estimates one channel of the rig."""
+
+    @property
+    def target(self) -> str:
+        """Channel that is estimated; its name ends in the unit."""
+        ...
+
+    def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
+        """Return the estimate for each sample of a recording, shape (n,).
+
+        With `causal`, filters run as live, and the result is that of the stepper to rounding.
+        """
+        ...
+
+    def stepper(self, sample_rate_hz: float) -> Stepper:
+        """Return the estimator as it runs live, before its first sample."""
+        ...
+
+    def save(self, path: Path) -> None:
+        """Write the estimator to a file that `load` reads."""
+        ...
+
+
+class Recipe(Protocol):
+    """What fits an estimator on a campaign."""
+
+    def fit(self, campaign: Campaign) -> Estimator:
+        """Fit on the runs that are not excluded."""
+        ...
+
+
+def load(path: Path) -> Estimator:
+    """Read an estimator: a model file (`.toml`) or a network with what belongs to it (`.npz`).
+
+    Raises:
+        ModelFileError: A model file cannot be read.
+        NetworkError: A network's file cannot be read.
+    """
+    from estimation.estimators.model import ModelEstimator
+    from estimation.estimators.network import NetworkEstimator
+    from estimation.estimators.residual import ResidualEstimator
+    from estimation.model_file import read
+    from estimation.networks.network import read_arrays
+
+    if path.suffix == ".toml":
+        return ModelEstimator(read(path))
+    arrays = read_arrays(path, NetworkEstimator.SCHEMA)
+    if "model" in arrays:
+        return ResidualEstimator.from_arrays(arrays)
+    return NetworkEstimator.from_arrays(arrays)

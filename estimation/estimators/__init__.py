@@ -1,0 +1,1 @@
+"""The kinds of estimator behind `estimation.estimator`, one a file."""

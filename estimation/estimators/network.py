@@ -1,0 +1,154 @@
+"""A network as an estimator: filtered and derived channels in, one channel out."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.campaign import Campaign
+from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.filters import PAPER, LowPass
+from estimation.networks import network as files
+from estimation.networks.network import Network
+from estimation.networks.training import Settings, train
+from estimation.oneill import closing_samples, processed
+from estimation.recording import FloatArray, Recording
+
+EVERY = 4
+"""Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
+
+
+@dataclass(frozen=True)
+class NetworkEstimator:
+    """A trained network as an estimator.
+
+    Attributes:
+        network: The network; its inputs are channel names, its one output the target.
+        low_pass: Filter of every channel.
+    """
+
+    SCHEMA: ClassVar[str] = "rig.estimator/1"
+
+    network: Network
+    low_pass: LowPass = PAPER
+
+    @property
+    def target(self) -> str:
+        """Channel that is estimated."""
+        return self.network.outputs[0]
+
+    def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
+        """Return the estimate for each sample, shape (n,).
+
+        Raises:
+            MissingChannelError: The recording lacks a channel.
+            FilterError: The run cannot be filtered.
+        """
+        return self.network(self.rows(recording, causal))[:, 0]
+
+    def inside(self, recording: Recording, causal: bool = False) -> NDArray[np.bool_]:
+        """Say of each sample whether every input lies in the range trained on, shape (n,)."""
+        return self.network.inside(self.rows(recording, causal))
+
+    def rows(self, recording: Recording, causal: bool = False) -> FloatArray:
+        """Return the network's inputs for each sample, shape (n, inputs)."""
+        source = causal_channels if causal else zero_phase_channels
+        channels = source(recording, self.network.inputs, self.low_pass)
+        return np.column_stack([channels[name] for name in self.network.inputs])
+
+    def stepper(self, sample_rate_hz: float) -> "NetworkStepper":
+        """Return the network as it runs live."""
+        return NetworkStepper(self, sample_rate_hz)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the estimator as named arrays; `from_arrays` gives it back."""
+        processing = np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)])
+        return {"low_pass": processing, **files.to_arrays(self.network)}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> "NetworkEstimator":
+        """Return the estimator of named arrays.
+
+        Raises:
+            NetworkError: An array is missing, or the shapes do not fit.
+        """
+        network = files.from_arrays(arrays)
+        processing = arrays.get("low_pass", np.empty(0))
+        if processing.shape != (2,):
+            raise files.NetworkError("The network's file does not state its filter.")
+        return cls(network, LowPass(float(processing[0]), int(processing[1])))
+
+    def save(self, path: Path) -> None:
+        """Write the estimator as NPZ."""
+        files.write_arrays(path, self.SCHEMA, self.arrays())
+
+
+class NetworkStepper:
+    """A network as it runs live."""
+
+    def __init__(self, estimator: NetworkEstimator, sample_rate_hz: float) -> None:
+        self._network = estimator.network
+        self._source = CausalChannels(estimator.network.inputs, sample_rate_hz, estimator.low_pass)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that `step` needs."""
+        return self._source.measured
+
+    def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
+        """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
+        channels = self._source.step(time_s, measured)
+        return self._network(np.column_stack([channels[n] for n in self._network.inputs]))[:, 0]
+
+
+@dataclass(frozen=True)
+class NetworkRecipe:
+    """Trains a network on the closing samples of a campaign, as the paper does.
+
+    Attributes:
+        inputs: Channels, measured or derived.
+        target: Channel to estimate.
+        settings: How to train.
+        low_pass: Filter of every channel.
+        every: Train on every n-th closing sample.
+    """
+
+    inputs: tuple[str, ...]
+    target: str
+    settings: Settings = field(default_factory=Settings)
+    low_pass: LowPass = PAPER
+    every: int = EVERY
+
+    def fit(self, campaign: Campaign) -> NetworkEstimator:
+        """Train on the valid closing samples of the runs that are not excluded.
+
+        Raises:
+            NetworkError: torch is missing, or the samples cannot be learnt from.
+            MissingChannelError: A run lacks a channel.
+        """
+        return self.fit_rest(campaign, lambda run: np.zeros(len(run)))
+
+    def fit_rest(
+        self, campaign: Campaign, known: Callable[[Recording], FloatArray]
+    ) -> NetworkEstimator:
+        """Train on what another estimate leaves of the target.
+
+        Args:
+            campaign: The runs.
+            known: Returns the other estimate for each sample of a recording, shape (n,).
+        """
+        rows, rest = [], []
+        for recording in campaign.evidence:
+            run = processed(recording, [*self.inputs, self.target], self.low_pass)
+            run = run.with_columns(**{self.target: run[self.target] - known(recording)})
+            kept = closing_samples(run, keep_flagged=False)
+            rows.append(np.column_stack([kept[name] for name in self.inputs])[:: self.every])
+            rest.append(kept[self.target][:: self.every, None])
+        if not rows:
+            raise files.NetworkError("There is no run to train the network on.")
+        names = (self.inputs, (self.target,))
+        trained = train(np.concatenate(rows), np.concatenate(rest), names, self.settings)
+        return NetworkEstimator(trained.network, self.low_pass)

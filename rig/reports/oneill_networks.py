@@ -1,0 +1,106 @@
+"""The network rows of O'Neill et al. 2018 as tables beside the paper's, and what goes beyond."""
+
+from collections import Counter
+
+import numpy as np
+
+from rig.reports.table import TextTable
+from rig.studies.oneill_networks import FOLDS, STATE_NODES, NetworkRow, NetworkStudy
+from rig.studies.oneill_paper import (
+    DISTAL,
+    GRIP_ARM_M,
+    JAW,
+    PAPER,
+    PAPER_GRIP_N,
+    PAPER_GRIP_SHARE,
+    PROXIMAL,
+)
+
+SHOWN = {
+    PROXIMAL: ("proximal torque", "mN m", 1e3),
+    DISTAL: ("distal torque", "mN m", 1e3),
+    JAW: ("jaw angle", "deg", float(np.degrees(1.0))),
+}
+"""Name, unit and scale of each target."""
+
+WAYS = {
+    "end-to-end": "the paper's inputs and 30 nodes",
+    "+ acceleration": f"with motor acceleration, {STATE_NODES} nodes",
+    "+ travel": f"with motor acceleration and the motor's travel of the last 0.5 s, {STATE_NODES}"
+    " nodes",
+    "causal": "the same, every input filtered and differentiated as live",
+}
+
+
+def notes(study: NetworkStudy) -> list[str]:
+    """Return what a reader must know about the networks."""
+    settings = study.settings
+    every = "every closing sample" if study.every == 1 else f"one of {study.every} closing samples"
+    told = [
+        f"Networks: trained on {every}, scored on all held-out ones. Converged means that the"
+        f" error fell by less than {settings.tolerance:.1%} in {settings.patience} steps; at most"
+        f" {settings.iterations} steps. Truth is the sensor filtered without lag.",
+        *study.notes,
+    ]
+    if study.grip_force is not None:
+        force, share = study.grip_force
+        told.append(
+            f"Grip force at {1e3 * GRIP_ARM_M:.0f} mm, from the command, random split: RMSE"
+            f" {force:.2f} N, {share:.1%} of the peak (paper: {PAPER_GRIP_N} N,"
+            f" {PAPER_GRIP_SHARE:.1%})."
+        )
+    loose = sum(row.networks - row.converged for row in study.rows)
+    if loose:
+        told.append(f"{loose} row entries are of networks stopped before they converged.")
+    if study.not_run:
+        missing = Counter(f"{job.pose}, {job.way}, {job.protocol}" for job in study.not_run)
+        listed = "; ".join(f"{name} ({count})" for name, count in missing.items())
+        told.append(f"Not run, or not in all folds (networks by target and surrogate): {listed}.")
+    return told
+
+
+def tables(study: NetworkStudy) -> list[TextTable]:
+    """Return the rows beside the paper's, and the errors by what was held out."""
+    poses = [pose for pose in study.samples if any(row.pose == pose for row in study.rows)]
+    shown = [_paper_table(study, pose, target) for pose in poses for target in SHOWN]
+    shown += [_held_out_table(study, pose) for pose in poses]
+    return [table for table in shown if table.rows]
+
+
+def _paper_table(study: NetworkStudy, pose: str, target: str) -> TextTable:
+    name, unit, scale = SHOWN[target]
+    rows = []
+    for row in study.rows:
+        if (row.pose, row.target, row.protocol) == (pose, target, "random"):
+            score = row.score
+            errors = [f"{scale * value:.2f}" for value in (score.mae, score.p95, score.rmse)]
+            fits = [f"{score.pearson_r:.3f}", f"{score.spearman_rho:.3f}"]
+            printed = PAPER.get((pose, row.way, target, row.surrogate))
+            paper = [f"{value:.2f}" for value in printed] if printed else ["", "", ""]
+            rows.append([f"{row.surrogate}, {row.way}", *errors, *fits, *paper])
+    columns = [f"{name}, {unit}", "MAE", "95th pct", "RMSE", "R", "rho"]
+    columns += ["paper MAE", "95th pct", "RMSE"]
+    note = "Random split of the samples, as the paper's; neighbours of a test sample are trained on"
+    return TextTable(f"Networks, {pose} pose: {name}", columns, rows, note + ".")
+
+
+def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:
+    protocols = ("random", "run-wise", "lofo", "lopo")
+    found: dict[tuple[str, str, str], dict[str, NetworkRow]] = {}
+    for row in study.rows:
+        if row.pose == pose:
+            found.setdefault((row.target, row.surrogate, row.way), {})[row.protocol] = row
+    rows = []
+    for (target, surrogate, way), by in sorted(found.items(), key=_order):
+        name, unit, scale = SHOWN[target]
+        cells = [f"{scale * by[p].score.rmse:.2f}" if p in by else "" for p in protocols]
+        rows.append([f"{name}, {unit}: {surrogate}, {way}", *cells])
+    columns = ["RMSE", "samples at random", "runs", "a frequency (LOFO)", "a power level (LOPO)"]
+    note = f"Runs: {FOLDS} folds of whole runs. " + "; ".join(f"{k}: {v}" for k, v in WAYS.items())
+    return TextTable(f"Networks, {pose} pose: RMSE by what was held out", columns, rows, note + ".")
+
+
+def _order(item: tuple[tuple[str, str, str], object]) -> tuple[int, int, str]:
+    (target, surrogate, way), _ = item
+    ways = ["end-to-end", "staged", *list(WAYS)[1:]]
+    return list(SHOWN).index(target), ways.index(way), surrogate

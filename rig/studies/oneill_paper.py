@@ -1,0 +1,51 @@
+"""Tables I to V of O'Neill et al. 2018 as printed, rows of the networks.
+
+Each row is mean absolute error, 95th percentile of the absolute error, and root mean square error:
+mN m for torques, degrees for the jaw angle. Source: IEEE Robotics and Automation Letters 2018.
+"""
+
+PROXIMAL, DISTAL, JAW = "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"
+
+_FOUR = ("command", "current", "gearbox", "all")
+_FIVE = (*_FOUR, "sensor")
+_PRINTED: dict[tuple[str, str, str], tuple[str, ...]] = {
+    ("neutral", "end-to-end", PROXIMAL): (
+        "4.37 11.54 5.69",
+        "4.47 11.72 5.80",
+        "11.54 36.89 16.90",
+        "3.82 10.04 4.94",
+    ),
+    ("neutral", "staged", JAW): ("0.28 0.73 0.36", "0.29 0.74 0.37", "0.65 2.26 1.00",
+                                 "0.25 0.64 0.32"),
+    ("neutral", "end-to-end", JAW): ("0.28 0.74 0.37", "0.30 0.77 0.38", "0.69 2.33 1.00",
+                                     "0.28 0.73 0.36", "0.13 0.33 0.17"),
+    ("neutral", "staged", DISTAL): ("3.28 9.49 4.49", "3.37 9.71 4.59", "7.87 25.03 11.65",
+                                    "2.92 8.32 3.94"),
+    ("neutral", "end-to-end", DISTAL): ("3.33 9.00 4.42", "3.42 9.28 4.72", "8.42 24.91 12.09",
+                                        "2.86 7.60 3.75", "1.20 3.39 1.78"),
+    ("pitch", "end-to-end", JAW): ("0.26 0.70 0.35", "0.28 0.75 0.37", "0.70 2.12 0.97",
+                                   "0.25 0.68 0.34", "0.13 0.34 0.17"),
+    ("roll", "end-to-end", JAW): ("0.37 0.99 0.50", "0.36 0.98 0.49", "1.11 2.69 1.39",
+                                  "0.35 0.95 0.48", "0.23 0.67 0.34"),
+    ("pitch", "end-to-end", DISTAL): ("3.12 8.38 4.16", "3.31 9.02 4.41", "8.63 25.41 11.77",
+                                      "2.86 7.37 3.71", "1.64 4.69 2.24"),
+    ("roll", "end-to-end", DISTAL): ("5.50 15.42 7.91", "5.62 15.38 7.95", "14.64 34.55 18.08",
+                                     "5.37 14.76 7.67", "3.80 12.63 6.31"),
+}  # fmt: skip
+
+PAPER: dict[tuple[str, str, str, str], tuple[float, float, float]] = {
+    (pose, way, target, surrogate): (mae, p95, rmse)
+    for (pose, way, target), rows in _PRINTED.items()
+    for surrogate, row in zip(_FIVE, rows, strict=False)
+    for mae, p95, rmse in [tuple(map(float, row.split()))]
+}
+"""(pose, way, target, surrogate) to the printed row."""
+
+PAPER_POSE_SAMPLES = 962_936
+"""Closing samples of pitch and roll together, as the paper states them."""
+
+GRIP_ARM_M = 0.012
+"""Moment arm of the paper's grip force."""
+
+PAPER_GRIP_N, PAPER_GRIP_SHARE = 0.37, 0.035
+"""The paper's error of the grip force, and its share of the peak."""

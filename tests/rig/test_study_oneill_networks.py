@@ -1,0 +1,187 @@
+"""The network rows of `rig study oneill`, on a small analytic campaign."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from estimation.campaign import Campaign
+from estimation.networks.training import Settings, has_torch, train
+from estimation.scores import rmse
+from rig.cli.study import study_app
+from rig.errors import DataError, UsageError
+from rig.reports import oneill_networks as shown
+from rig.studies import oneill as linear
+from rig.studies import oneill_networks as study
+from rig.studies.closing import CAUSAL, closing_table, held_out_masks
+from rig.studies.oneill import Source
+from rig.studies.oneill_data import network_tables
+from rig.studies.oneill_networks import CHANNELS, NetworkStudy, jobs, run_networks
+from rig.studies.oneill_paper import DISTAL, JAW, PAPER, PROXIMAL
+from tests.estimation.synthetic import campaign
+
+torch_only = pytest.mark.skipif(
+    not has_torch(), reason="torch is not installed: pip install 'rig[learn]'"
+)
+QUICK = Settings(iterations=4)
+
+
+def with_jaw() -> Campaign:
+    return Campaign.of(
+        run.with_columns(jaw_angle_rad=1.1 * run["spindle_angle_rad"] - 0.3 * run[DISTAL])
+        for run in campaign()
+    )
+
+
+@pytest.fixture(scope="module")
+def table():
+    return closing_table(with_jaw(), CHANNELS)
+
+
+def test_masks_hold_out_whole_runs_conditions_or_samples(table):
+    (mask,) = held_out_masks(table, "random", 5, 0)
+    assert mask.mean() == pytest.approx(0.15, abs=1e-3)
+    for protocol, count in (("run-wise", 5), ("lofo", 3), ("lopo", 3)):
+        masks = held_out_masks(table, protocol, 5, 0)
+        assert len(masks) == count
+        assert np.all(np.sum(masks, axis=0) == 1)
+        assert all(not set(table.run[m]) & set(table.run[~m]) for m in masks)
+    folds = [
+        {f"{r // 3}{r % 3}" for r in set(table.run[m])}
+        for m in held_out_masks(table, "run-wise", 5, 3)
+    ]
+    assert folds == [set(split.test.names) for split in with_jaw().folds(5, 3)]
+    bare = replace(table, conditions={**table.conditions, "frequency_hz": np.full(9, np.nan)})
+    assert held_out_masks(bare, "lofo", 5, 0) == []
+
+
+def test_the_table_holds_each_channel_without_lag_and_as_live(table):
+    live, offline = (table[[p + PROXIMAL]][:, 0] for p in (CAUSAL, ""))
+    assert 0 < np.sqrt(np.mean((live - offline) ** 2)) < 0.01
+    with pytest.raises(DataError, match="wrist_roll_rad"):
+        closing_table(with_jaw(), CHANNELS, ("wrist_roll_rad",))
+
+
+def test_an_estimate_holds_no_more_than_half_a_second_and_no_target():
+    for job in jobs(("neutral", "pitch", "roll")):
+        names = {name.removeprefix(CAUSAL) for name in job.inputs}
+        assert not names & {"time_s", "load_command_a", DISTAL, JAW}
+        assert (PROXIMAL in names) == (job.surrogate == "sensor")
+        assert all(name.startswith(CAUSAL) for name in job.inputs) or job.way != "causal"
+
+
+def test_every_row_of_the_papers_tables_has_a_job():
+    planned = {
+        (job.pose, job.way, target, job.surrogate)
+        for job in jobs(("neutral", "pitch", "roll"))
+        if job.protocol == "random"
+        for target in job.targets
+    }
+    assert set(PAPER) <= planned
+    assert len(PAPER) == 4 + 9 + 9 + 10 + 10
+
+
+def test_data_of_experiment_3_is_missed_out_loud(tmp_path):
+    tables, notes = network_tables(with_jaw(), {"00": "flagged"}, tmp_path)
+    assert list(tables) == ["neutral"]
+    assert len(tables["neutral"].conditions["frequency_hz"]) == 8
+    assert [n for n in notes if "experiment 3, pitch" in n]
+
+
+@pytest.fixture(scope="module")
+def deep(table, tmp_path_factory) -> NetworkStudy:
+    if not has_torch():
+        pytest.skip("torch is not installed: pip install 'rig[learn]'")
+    folder = tmp_path_factory.mktemp("state")
+    whole = study.jobs
+
+    def few(poses):
+        kept = [("end-to-end", "command"), ("staged", "command"), ("+ travel", "command")]
+        return [
+            j
+            for j in whole(poses)
+            if (j.way, j.surrogate) in kept and j.protocol in ("random", "lofo")
+        ]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "jobs", few)
+        partial = run_networks({"neutral": table}, folder, settings=QUICK, every=40, minutes=0)
+        assert partial.rows == ()
+        assert partial.not_run
+        assert any("Not run" in note for note in shown.notes(partial))
+        calls: list[tuple[int, int]] = []
+        found = run_networks(
+            {"neutral": table}, folder, settings=QUICK, every=40,
+            on_network=lambda done, total: calls.append((done, total)),
+        )  # fmt: skip
+        assert calls[-1][0] == calls[-1][1] > 0
+        calls.clear()
+        again = run_networks(
+            {"neutral": table}, folder, settings=QUICK, every=40,
+            on_network=lambda done, total: calls.append((done, total)),
+        )  # fmt: skip
+        assert calls == []  # all kept
+        assert again.rows == found.rows
+    return found
+
+
+def test_rows_are_scored_beside_the_paper(deep):
+    assert deep.not_run == ()
+    assert {row.way for row in deep.rows} == {"end-to-end", "staged", "+ travel"}
+    error = {(r.way, r.protocol, r.target): r.score.rmse for r in deep.rows}
+    assert error["+ travel", "lofo", PROXIMAL] < error["end-to-end", "lofo", PROXIMAL]
+    titles = {table.title: table for table in shown.tables(deep)}
+    row = titles["Networks, neutral pose: proximal torque"].rows[0]
+    assert row[0] == "command, end-to-end"
+    assert row[-1] == "5.69"
+    (held_out,) = [t for title, t in titles.items() if "held out" in title]
+    assert "a frequency (LOFO)" in held_out.columns
+    assert deep.grip_force is not None
+    assert any("Grip force at 12 mm" in note for note in shown.notes(deep))
+
+
+def test_without_torch_it_is_said_what_to_install(table, tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "has_torch", lambda: False)
+    with pytest.raises(UsageError, match="torch"):
+        run_networks({"neutral": table}, tmp_path)
+
+
+@torch_only
+def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        linear, "open_reference", lambda path: Source(with_jaw(), "analytic rig", measured=False)
+    )
+    app = typer.Typer()
+    app.add_typer(study_app)
+    words = ["study", "oneill", "--data", str(tmp_path), "--networks", "--minutes", "0", "--json"]
+    words += ["--state", str(tmp_path / "s"), "--out", str(tmp_path / "d.md")]
+    words += ["--report", str(tmp_path / "r")]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["networks"]["rows"] == []
+    assert "Not run" in done.stderr
+    assert "Not run" in (tmp_path / "d.md").read_text()
+    assert "Not run" in (tmp_path / "r" / "oneill.html").read_text()
+
+
+@torch_only
+@pytest.mark.measured
+def test_physical_states_lower_the_error_on_a_fold_of_measured_runs(measured_data):
+    source = linear.open_reference(measured_data)
+    table = closing_table(source.campaign.exclude("07", "runaway of the motor"), CHANNELS)
+    assert len(table.run) == 304_394
+    mask = held_out_masks(table, "run-wise", 5, 0)[0]
+    job = next(j for j in jobs(("neutral",)) if j.targets == (PROXIMAL,))
+    states = replace(job, way="+ acceleration")
+    error = []
+    for one in (job, states):
+        rows, names = np.flatnonzero(~mask)[::60], (one.inputs, one.targets)
+        x, y = table[one.inputs], table[one.targets]
+        settings = Settings(nodes=one.nodes, iterations=60)
+        trained = train(x[rows], y[rows], names, settings)
+        error.append(rmse(trained.network(x[mask]), y[mask]))
+    assert error[0] == pytest.approx(6.6e-3, abs=1.2e-3)
+    assert error[1] < 0.65 * error[0]
