@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 # the C++ firmware core is optional: without a compiler the Python fake speaks for the board
 CXX    ?= g++
 
-.PHONY: setup demo test lint bench firmware clean
+.PHONY: setup demo test lint bench blind firmware clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -29,6 +29,11 @@ lint: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+# resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster
+BLIND ?=
+blind: setup
+	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md --baselines $(BLIND)
 
 firmware:
 	@if command -v $(CXX) >/dev/null 2>&1; then $(MAKE) --no-print-directory -C firmware CXX=$(CXX); \
