@@ -50,7 +50,12 @@ def lay_out(model: Model, campaign: Campaign) -> Table:
     """Fit the declared model and return its columns and those of every other catalogue effect."""
     fitted = fit(model, campaign, bootstrap=0)
     own = {term.effect.id for term in fitted.terms}
-    others = [e for name, e in catalogue().items() if name not in own]
+    others = [
+        effect
+        for name, effect in catalogue().items()
+        # noise shared by both sides of a balance looks like an effect to any of the three
+        if name not in own and fitted.target not in effect.roles.values()
+    ]
     blocks: dict[str, list[FloatArray]] = {}
     target, declared = [], []
     for recording in campaign.evidence:
@@ -59,7 +64,7 @@ def lay_out(model: Model, campaign: Campaign) -> Table:
         names = [*fitted.channels, fitted.target, *sorted(wanted)]
         whole = zero_phase_channels(recording, names, fitted.low_pass)
         run = settled(whole, fitted.low_pass, int(recording.sample_rate_hz / RATE_HZ))
-        target.append(_centred(run[fitted.target][:, None])[:, 0])
+        target.append(_centred(run[fitted.target]))
         parts = [t.columns(run, t.numbers(t.effect.shape)) for t in fitted.terms]
         declared.append(_centred(np.column_stack(parts)))
         for effect in usable:

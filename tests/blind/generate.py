@@ -196,7 +196,7 @@ def _disturbed(recording: Recording, variant: str, seed: int) -> Recording:
         )
     if variant == "skewed":
         skew = 1.0 + 1e-4 * random.uniform(-1.0, 1.0)
-        jitter_s = 2e-5 * random.uniform(-1.0, 1.0, len(recording))
+        jitter_s = 2e-6 * random.uniform(-1.0, 1.0, len(recording))
         return replace(recording, time_s=recording.time_s * skew + jitter_s)
     return recording
 

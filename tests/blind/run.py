@@ -32,6 +32,8 @@ from tests.blind.truths import TRUTHS
 COUNTS = "strong=40,weak=40,pair=30,outside=30,partial=10,confounded=20,control=100"
 COMMAND = f"{sys.executable} -m rig diagnose {{case}} --json {{out}}"
 TIME_LIMIT_S = 900.0
+DECLARED = "motor"
+"""Shipped model whose balance the textbook methods are given."""
 
 Result = Mapping[str, Any]
 
@@ -136,7 +138,7 @@ def _baselines(folder: Path, answer: Answer) -> list[dict[str, Any]]:
     from tests.blind.baselines import run_all
 
     truths = [TRUTHS[effect.name] for effect in answer.effects]
-    picked = run_all([read(Path("motor"))], open_campaign(folder))
+    picked = run_all([read(Path(DECLARED))], open_campaign(folder))
     return [
         {
             "method": one.method,

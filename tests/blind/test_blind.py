@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from estimation.derived import zero_phase_channels
 from rig.importers.registry import open_campaign
 from rig.simulation.hidden import NAMES, HiddenEffect
 from tests.blind import baselines
@@ -73,6 +74,7 @@ def test_a_case_is_a_folder_of_logs_and_the_answer_lies_elsewhere(
     assert kept["variant"] == CONTROLS[number]
     (recording,) = open_campaign(folder)
     assert 13.0 < recording.duration_s < 15.0
+    assert len(zero_phase_channels(recording, ["motor_velocity_rad_s"])) == len(recording)
     for text in (recording.source, recording.notes, recording.rig):
         assert CONTROLS[number] not in text
 
