@@ -23,6 +23,7 @@ from drivers.errors import (
     PortNotFoundError,
     PortPermissionError,
 )
+from drivers.transport.transport import Transport, open_transport
 
 BAUD_RATE = 115200
 """Has no effect on a Teensy's USB port; a real UART behind an adapter uses it."""
@@ -83,6 +84,11 @@ class SerialTransport:
         except (serial.SerialException, OSError) as error:
             raise self._lose(error) from error
 
+    def set_line(self, baud_rate: int, parity: str = "N") -> None:
+        """Set the speed of the line and its parity (`N`, `E` or `O`); 8 bits, 1 stop bit."""
+        self._port.baudrate = baud_rate
+        self._port.parity = parity
+
     def close(self) -> None:
         """Close the port."""
         self._lost = self._lost or LinkLostError(f"{self._url} is closed.")
@@ -126,6 +132,31 @@ def open_serial(url: str) -> SerialTransport:
     except (serial.SerialException, ValueError) as error:
         raise _explain(url, name, error) from error
     return SerialTransport(url, port)
+
+
+def open_line(url: str, baud_rate: int, parity: str = "N") -> Transport:
+    """Open a transport and, where it is a serial port, set its line.
+
+    Args:
+        url: Any URL `open_transport` takes.
+        baud_rate: Speed, bit/s.
+        parity: `N`, `E` or `O`.
+
+    Raises:
+        LinkError: The link cannot be opened, or the port cannot be set so.
+    """
+    transport = open_transport(url)
+    if isinstance(transport, SerialTransport):
+        try:
+            transport.set_line(baud_rate, parity)
+        except (serial.SerialException, OSError, ValueError) as error:
+            transport.close()
+            raise LinkError(
+                f"{url} cannot be set to {baud_rate} bit/s, parity {parity}.",
+                str(error),
+                "Use an adapter that has this speed, or set the device to another one.",
+            ) from error
+    return transport
 
 
 def find_usb_port(url: str) -> str:

@@ -87,7 +87,8 @@ def _there(channels: object, recording: Recording) -> bool:
 
 
 def _centred(columns: FloatArray) -> FloatArray:
-    return columns - columns.mean(axis=0)
+    centred: FloatArray = columns - columns.mean(axis=0)
+    return centred
 
 
 def _sum_of_squares(target: FloatArray, columns: FloatArray) -> float:
@@ -114,7 +115,8 @@ def forward_bic(table: Table) -> list[str]:
     n, chosen, columns = table.target.size, list[str](), table.declared
 
     def criterion(tried: FloatArray) -> float:
-        return n * math.log(_sum_of_squares(table.target, tried) / n) + tried.shape[1] * math.log(n)
+        fit_term = n * math.log(_sum_of_squares(table.target, tried) / n)
+        return float(fit_term + tried.shape[1] * math.log(n))
 
     best = criterion(columns)
     while len(chosen) < MOST:

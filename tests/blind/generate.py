@@ -60,7 +60,8 @@ def draw(kind: str, number: int, seed: int) -> Answer:
     word = hashlib.sha256(f"{kind}/{number}/{seed}".encode()).hexdigest()
     random = np.random.default_rng(int(word[:15], 16))
     runs = tuple(range(14))
-    variant, either, names = "", (), []
+    variant, names = "", list[str]()
+    either: tuple[str, ...] = ()
     if kind in ("strong", "weak", "partial"):
         names = [_cycled(sorted(CATALOGUED), number, seed)]
     elif kind == "outside":
@@ -153,7 +154,7 @@ def _steady(index: int) -> RunPlan:
     load = (0.1, 0.3, 0.5, 0.7, 0.9)[index % 5]
     start = -1.0 + 0.05 * (index % 3)
     angle = trajectory.speed_staircase(start, 0.7, [0.5] * 5, 1e-3)
-    conditions = {"load_command_a": load, "jaw_start_rad": start}
+    conditions: dict[str, float | str] = {"load_command_a": load, "jaw_start_rad": start}
     return RunPlan(f"{index:03d}-steady", angle, np.full(angle.size, load), conditions)
 
 

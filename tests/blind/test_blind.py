@@ -30,7 +30,7 @@ pathlib.Path(out).write_text(json.dumps({"findings": [], "next_experiment": None
 
 
 def finding(verdict: str, family: str, balance: str = "motor", **more: Any) -> dict[str, Any]:
-    base = {"also_in": [], "alternatives": [], "depends_on": []}
+    base: dict[str, Any] = {"also_in": [], "alternatives": [], "depends_on": []}
     return base | {"verdict": verdict, "family": family, "balance": balance} | more
 
 

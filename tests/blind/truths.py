@@ -53,15 +53,15 @@ def _outside(balances: str, *groups: frozenset[str]) -> Truth:
 
 CATALOGUED: dict[str, Truth] = {
     # motor and gear losses
-    "motor_asymmetry": _of("friction.coulomb_asymmetry", "motor"),
+    "motor_asymmetry": _of("friction.coulomb_asymmetry", "motor", "", 1.5),
     "motor_drag": _of("friction.drag", "motor"),
     "gear_stribeck": _of("friction.stribeck", "motor"),
     "gear_load_friction": _of("friction.load", "motor"),
     "cable_growing_friction": _of("friction.position", "cable"),
     # memory: both are elastic-plastic elements, of different order and place
     "cable_presliding": _of("hysteresis.presliding", "cable", "hysteresis.bouc_wen"),
-    "cable_hysteresis": _of("hysteresis.bouc_wen", "stretch cable", "hysteresis.presliding", 1.5),
-    "cable_creep": _of("transmission.relaxation", "stretch cable"),
+    "cable_hysteresis": _of("hysteresis.bouc_wen", "stretch", "hysteresis.presliding", 1.5),
+    "cable_creep": _of("transmission.relaxation", "stretch"),
     # springs act between jaw and ground, where no torque sensor is
     "jaw_spring": _of("spring.position", "cable stretch", "gravity.payload"),
     "end_stop_spring": _of("spring.end_stop", "cable stretch"),
@@ -84,7 +84,7 @@ CATALOGUED: dict[str, Truth] = {
     "proximal_bend": _of("sensor.gain_nonlinear", "motor gearbox cable", "transmission.stiffening"),
     "proximal_creep": _of("sensor.creep", "motor gearbox cable", "transmission.relaxation"),
     "proximal_lag": _of("sensor.lag", "motor gearbox cable", "sensor.delay"),
-    "distal_drift": _of("sensor.drift", "cable stretch", "sensor.creep", 0.6),
+    "distal_drift": _of("sensor.drift", "cable stretch", "sensor.creep"),
     "distal_crosstalk": _of("sensor.crosstalk", "cable stretch"),
     "jaw_delay": _of("sensor.delay", "stretch", "sensor.lag"),
     "friction_step": _of("change.step", "cable"),

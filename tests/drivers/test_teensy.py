@@ -19,9 +19,9 @@ from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import Limits, Result
+from drivers.transport.faulty import FaultyTransport, once
 from drivers.transport.simulated import Board, SimulatedTransport
 from tests.drivers.bench_physics import START_SPINDLE, PlainBench
-from tests.drivers.faults import FaultyBoard, once
 
 GAINS = [20.0, 0.05, -1.0, 0.2, 10000.0]
 WIDEST = Limits.widest()
@@ -40,6 +40,11 @@ def make_board(request: pytest.FixtureRequest) -> MakeBoard:
 
 def logger_of(board: Board) -> TeensyLogger:
     return TeensyLogger(SimulatedTransport(board))
+
+
+def behind_a_bad_cable(board: Board) -> tuple[FaultyTransport, TeensyLogger]:
+    cable = FaultyTransport(SimulatedTransport(board))
+    return cable, TeensyLogger(cable)
 
 
 def read_for(logger: TeensyLogger, ticks: int, beat: bool = True) -> list[SampleBatch]:
@@ -236,10 +241,10 @@ def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
 
 
 def test_a_hello_reply_of_another_layout_is_a_mismatch() -> None:
-    board = FaultyBoard(TeensyFake(PlainBench()))
-    board.from_board = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
+    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable.incoming = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
     with pytest.raises(ProtocolMismatchError, match="another layout"):
-        logger_of(board).identify()
+        logger.identify()
 
 
 def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
@@ -248,10 +253,9 @@ def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
     logger_of(board).start()
     board.advance(40)
     board.transmit()
-    faulty = FaultyBoard(board)
-    faulty.from_board = once(lambda data: data[17:])
+    cable, logger = behind_a_bad_cable(board)
+    cable.incoming = once(lambda data: data[17:])
     board.advance(5)
-    logger = logger_of(faulty)
     logger.identify()
     assert logger.counters.crc_errors == 0
     assert logger.counters.discarded_bytes == 46 - 17
@@ -262,20 +266,18 @@ def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
 
 
 def test_a_silent_board_is_a_timeout_after_the_retries() -> None:
-    board = FaultyBoard(TeensyFake(PlainBench()))
-    board.from_board = lambda _: b""
-    logger = logger_of(board)
+    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable.incoming = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="sim://"):
         logger.identify()
     assert logger.counters.retries == 2
 
 
 def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard) -> None:
-    board = FaultyBoard(make_board())
-    logger = logger_of(board)
+    cable, logger = behind_a_bad_cable(make_board())
     logger.start()
     logger.arm(GAINS, WIDEST)
-    board.from_board = once(lambda _: b"")
+    cable.incoming = once(lambda _: b"")
     targets = START_SPINDLE - np.arange(30)
     logger.queue(targets, np.zeros(30, np.int64))
     assert logger.counters.retries == 1
@@ -286,19 +288,27 @@ def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard)
     logger.close()
 
 
-def test_a_damaged_command_is_sent_again(make_board: MakeBoard) -> None:
-    board = FaultyBoard(make_board())
-    logger = logger_of(board)
+def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: MakeBoard) -> None:
+    cable, logger = behind_a_bad_cable(make_board())
     logger.identify()
-    board.to_board = once(lambda data: data[:2] + b"\x55" + data[3:])
+    cable.incoming = once(lambda _: b"")
+    with pytest.raises(CommandRefusedError, match="not any more"):
+        logger.arm(GAINS, Limits(0, 0, 0, 0, START_SPINDLE + 1, START_SPINDLE + 2))
+    assert logger.counters.retries == 1
+    logger.close()
+
+
+def test_a_damaged_command_is_sent_again(make_board: MakeBoard) -> None:
+    cable, logger = behind_a_bad_cable(make_board())
+    logger.identify()
+    cable.outgoing = once(lambda data: data[:2] + b"\x55" + data[3:])
     logger.arm(GAINS, WIDEST)
     assert logger.counters.retries == 1
     logger.close()
 
 
 def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: MakeBoard) -> None:
-    board = FaultyBoard(make_board())
-    logger = logger_of(board)
+    cable, logger = behind_a_bad_cable(make_board())
     logger.start()
     first = logger.read(0.1)
     assert first.lost == 0
@@ -308,7 +318,7 @@ def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: Mak
         changed = frames[3][:20] + bytes([frames[3][20] ^ 1 or 2]) + frames[3][21:]
         return b"".join([*frames[:3], changed, *frames[4:8], *frames[6:8], *frames[10:]])
 
-    board.from_board = once(damage)
+    cable.incoming = once(damage)
     batch = logger.read(0.1)
     number = first.samples["sequence"][-1] + 1
     expected = [number + k for k in range(50) if k not in (3, 8, 9)]
@@ -324,43 +334,39 @@ def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: Mak
 
 
 def test_frames_nobody_expected_are_counted() -> None:
-    board = FaultyBoard(TeensyFake(PlainBench()))
-    logger = logger_of(board)
+    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
     logger.start()
     strange = encode_frame(bytes(42)) + encode_frame(b"\x01\x63ab") + encode_frame(b"\x01\x10ab")
-    board.from_board = once(lambda data: strange + data)
+    cable.incoming = once(lambda data: strange + data)
     assert len(logger.read(0.1).samples) == 50
     assert logger.counters.unknown_frames == 3
     logger.close()
 
 
 def test_disarm_is_not_believed_without_an_answer() -> None:
-    board = FaultyBoard(TeensyFake(PlainBench()))
-    transport = SimulatedTransport(board)
-    logger = TeensyLogger(transport)
+    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
     logger.arm(GAINS, WIDEST)
-    board.from_board = lambda _: b""
+    cable.incoming = lambda _: b""
     with pytest.raises(DisarmUnconfirmedError, match=r"not confirmed.*cut its supply"):
         logger.disarm()
     with pytest.raises(DisarmUnconfirmedError):
         logger.close()
     with pytest.raises(LinkLostError):
-        transport.read(0.0)
+        cable.read(0.0)
 
 
 def test_disarm_is_not_believed_when_the_board_says_it_is_still_armed() -> None:
-    board = FaultyBoard(TeensyFake(PlainBench()))
-    logger = logger_of(board)
+    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
     logger.arm(GAINS, WIDEST)
 
     def still_armed(data: bytes) -> bytes:
         ack = protocol.Ack(3, protocol.Kind.DISARM, Result.OK, protocol.STATUS_ARMED, 0)
         return encode_frame(protocol.encode_ack(ack)) if data else data
 
-    board.from_board = still_armed
+    cable.incoming = still_armed
     with pytest.raises(DisarmUnconfirmedError, match="still armed"):
         logger.disarm()
-    board.from_board = lambda data: data
+    cable.incoming = lambda data: data
     logger.close()
 
 

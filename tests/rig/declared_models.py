@@ -70,7 +70,7 @@ def record(
     """Simulate every n-th run of the diagnosis protocol, sensors and all."""
     runs = []
     for index, plan in enumerate(load_protocol("diagnosis").plans()[::every]):
-        t = np.arange(plan.target_angle_rad.size) * 1e-3
+        t = np.arange(plan.target_angle_rad.size, dtype=np.float64) * 1e-3
         columns = {
             name: np.zeros(t.size)
             for name in (

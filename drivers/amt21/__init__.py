@@ -1,0 +1,1 @@
+"""AMT21 absolute encoder over RS-485."""

@@ -1,0 +1,192 @@
+"""The driver of an AMT21: it is asked for every sample, at a steady rate."""
+
+import math
+
+import numpy as np
+
+from drivers.amt21 import protocol
+from drivers.counters import DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity
+from drivers.errors import FrameError, LinkError, LinkTimeoutError
+from drivers.registry import Driver
+from drivers.transport.serial_port import open_line
+from drivers.transport.transport import Transport
+
+TRIES = 3
+
+
+class Amt21:
+    """One encoder on an RS-485 line. Nothing else on the line may be asked at the same time.
+
+    Args:
+        transport: The way to the line; the device closes it.
+        address: The encoder's address.
+        multi_turn: Whether it also counts turns.
+        rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
+        reply_timeout_s: Time for an answer, on a USB adapter some milliseconds.
+    """
+
+    name = "amt21"
+
+    def __init__(
+        self,
+        transport: Transport,
+        address: int = protocol.DEFAULT_ADDRESS,
+        multi_turn: bool = False,
+        rate_hz: float = 200.0,
+        reply_timeout_s: float = 0.01,
+    ) -> None:
+        self._transport = transport
+        self._requests = [protocol.request(address, turns) for turns in (False, True)]
+        self._address = address
+        self._multi_turn = multi_turn
+        self._period_s = 1.0 / rate_hz
+        self._reply_timeout_s = reply_timeout_s
+        self._counters = DeviceCounters()
+        self._began_s = transport.now_s
+        self._asked = 0
+        self._lost = 0
+        angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
+        half = protocol.FULL_TURN // 2
+        turns = Channel("turns", "1", rate_hz, -half, half - 1, "whole turns")
+        self._channels = (angle, turns) if multi_turn else (angle,)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The angle, and the turns of a multi-turn encoder."""
+        return self._channels
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the line."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Ask for one position: the encoder says nothing else of itself.
+
+        Raises:
+            LinkTimeoutError: Nobody answers at this address.
+        """
+        if self._ask(turns=False) is None:
+            raise LinkTimeoutError(
+                f"No AMT21 answers at {self._transport.url}, address {self._address:#04x}.",
+                f"It was asked {TRIES} times.",
+                "Check supply, A and B, the address, and the bit rate (2 Mbit/s for types A to D).",
+            )
+        return DeviceIdentity("AMT21", "", "")
+
+    def start(self) -> None:
+        """Number the samples from 0, the first being due now."""
+        self._discard(self._transport.read(0.0))
+        self._began_s = self._transport.now_s
+        self._asked = self._lost = 0
+
+    def read(self, timeout_s: float) -> Batch:
+        """Ask when the next sample is due and return it, or nothing when it is not due in time."""
+        wait_s = self._began_s + self._asked * self._period_s - self._transport.now_s
+        self._discard(self._transport.read(max(0.0, min(wait_s, timeout_s))))
+        now_s = self._transport.now_s
+        if self._began_s + self._asked * self._period_s > now_s + 1e-9:
+            return self._batch(None, None)
+        missed = int((now_s - self._began_s) / self._period_s + 1e-6) - self._asked
+        if missed > 0:  # the caller came too late for these
+            self._lose(missed)
+        angle = self._ask(turns=False)
+        turns = self._ask(turns=True) if self._multi_turn and angle is not None else None
+        if angle is None or (self._multi_turn and turns is None):
+            self._lose(1)
+            return self._batch(None, None)
+        self._asked += 1
+        self._counters.frames += 1
+        return self._batch(angle, turns)
+
+    def stop(self) -> None:
+        """Do nothing: an encoder that is not asked is silent."""
+
+    def close(self) -> None:
+        """Let go of the line."""
+        self._transport.close()
+
+    def _lose(self, samples: int) -> None:
+        self._asked += samples
+        self._lost += samples
+        self._counters.gaps += 1
+        self._counters.lost += samples
+
+    def _batch(self, angle: int | None, turns: int | None) -> Batch:
+        count = 0 if angle is None else 1
+        values = {"angle_rad": 0.0 if angle is None else angle * protocol.RAD_PER_COUNT}
+        if self._multi_turn:
+            values["turns"] = 0.0 if turns is None else float(protocol.signed(turns))
+        return Batch(
+            {name: np.full(count, value) for name, value in values.items()},
+            np.full(count, self._transport.now_s),
+            "host",
+            np.full(count, self._asked - 1, np.int64),
+            np.zeros(count, np.uint8),
+            self._lost,
+        )
+
+    def _ask(self, turns: bool) -> int | None:
+        """Return the answer's value, None when no good one comes in `TRIES` questions."""
+        for attempt in range(TRIES):
+            if attempt:
+                self._counters.retries += 1
+            self._discard(self._transport.read(0.0))
+            self._transport.write(self._requests[turns])
+            reply = self._receive(self._requests[turns])
+            if not reply:
+                continue
+            try:
+                return protocol.decode_reply(reply)
+            except FrameError:
+                self._counters.crc_errors += 1
+                self._discard(reply)
+        self._counters.timeouts += 1
+        return None
+
+    def _receive(self, request: bytes) -> bytes:
+        """Return what came, without an echo of the question where the adapter makes one."""
+        give_up_s = self._transport.now_s + self._reply_timeout_s
+        came = b""
+        while len(came) < protocol.REPLY_SIZE:
+            remaining_s = give_up_s - self._transport.now_s
+            if remaining_s <= 0:
+                break
+            came += self._transport.read(remaining_s)
+        came += self._transport.read(0.0)
+        if len(came) == protocol.REPLY_SIZE + 1 and came.startswith(request):
+            self._discard(came[:1])
+            return came[1:]
+        return came
+
+    def _discard(self, data: bytes) -> None:
+        self._counters.discarded_bytes += len(data)
+
+
+def open_amt21(
+    url: str,
+    address: int = protocol.DEFAULT_ADDRESS,
+    multi_turn: bool = False,
+    rate_hz: float = 200.0,
+    baud_rate: int = 2_000_000,
+) -> Amt21:
+    """Open the encoder on a serial adapter.
+
+    Args:
+        url: The adapter.
+        address: The encoder's address, a multiple of 4.
+        multi_turn: Whether the encoder also counts turns.
+        rate_hz: How often it is asked.
+        baud_rate: 2 Mbit/s for types A to D; types E to H are set to 9600 to 115200.
+
+    Raises:
+        LinkError: The adapter cannot be opened, or the options are no encoder's.
+    """
+    try:
+        return Amt21(open_line(url, baud_rate), address, multi_turn, rate_hz)
+    except ValueError as error:
+        raise LinkError(f"No AMT21 can be asked so: {error}.") from error
+
+
+DRIVER = Driver("amt21", "Same Sky AMT21 absolute encoder, RS-485", open_amt21)

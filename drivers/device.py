@@ -1,0 +1,134 @@
+"""What every driver offers: typed channels, an identity, and samples in batches.
+
+A driver is made from an open link, speaks to one device, and does nothing in the background: time
+passes in `read`. Simulation swaps the link and nothing else.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class SampleFlag(IntFlag):
+    """What a device says about a sample; 0 is a good one.
+
+    The bits are those of a recording's flags, so that they pass on unchanged.
+    """
+
+    SATURATED = 1
+    STALE = 2
+    MISSING = 4
+    SUSPECT = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One quantity a device measures.
+
+    Attributes:
+        name: Column in a batch.
+        unit: Unit of its values; `count` where a calibration has yet to be applied, `1` for none.
+        rate_hz: Nominal sample rate.
+        lower: Lowest value the device can give, in `unit`; minus infinity where it is not known.
+        upper: Highest value the device can give.
+        description: What it is, in a few words.
+    """
+
+    name: str
+    unit: str
+    rate_hz: float
+    lower: float
+    upper: float
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceIdentity:
+    """Who answers; a part that the device does not tell is empty."""
+
+    model: str
+    serial: str
+    firmware: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """Samples in the order the device took them.
+
+    Attributes:
+        columns: Values by channel name, each float64 of shape (n,), in the channel's unit.
+        time_s: When each sample was taken (`device` clock) or had arrived (`host` clock), s,
+            shape (n,). The zero is arbitrary.
+        clock: Whose clock `time_s` is.
+        sequence: Number of each sample since `start`, int64, shape (n,); lost samples leave a gap
+            where the device numbers its samples.
+        flags: `SampleFlag` bits, uint8, shape (n,).
+        lost: Samples known to be lost since `start`, up to the end of this batch. None is made up
+            for.
+    """
+
+    columns: Mapping[str, NDArray[np.float64]]
+    time_s: NDArray[np.float64]
+    clock: Literal["device", "host"]
+    sequence: NDArray[np.int64]
+    flags: NDArray[np.uint8]
+    lost: int
+
+    def __len__(self) -> int:
+        return int(self.time_s.size)
+
+
+@runtime_checkable
+class Device(Protocol):
+    """One device over one link. Not for use by two threads at once."""
+
+    @property
+    def name(self) -> str:
+        """Short name of the kind of device, as registered."""
+        ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What `read` returns; complete once `identify` or `start` has been called."""
+        ...
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """What happened on the link since it was opened.
+
+        `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
+        """
+        ...
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            DriverError: Somebody else answers.
+        """
+        ...
+
+    def start(self) -> None:
+        """Let samples come; sequence numbers begin at 0."""
+        ...
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the samples that have come, waiting at most `timeout_s` for the first.
+
+        Raises:
+            LinkLostError: The link is gone.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Let no more samples come."""
+        ...
+
+    def close(self) -> None:
+        """Stop, and let go of the link. Closing twice does nothing."""
+        ...

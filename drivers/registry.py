@@ -1,0 +1,116 @@
+"""The installed drivers: objects in the entry point group `rig.drivers`, ours and third parties'.
+
+A driver's fake is a function in the group `rig.driver_fakes` under the same name; only tests and
+demonstrations load it.
+"""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from drivers.device import Device
+from drivers.errors import DriverError
+from drivers.transport.faulty import Faults
+
+DRIVERS = "rig.drivers"
+FAKES = "rig.driver_fakes"
+
+
+class UnknownDriverError(DriverError):
+    """No driver of that name is installed, or an installed one does not load."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A driver as it is registered.
+
+    Attributes:
+        name: Short name, as written in a configuration.
+        description: One line on the device.
+        open: Opens the device by URL; its keyword arguments, all with defaults, are its options.
+    """
+
+    name: str
+    description: str
+    open: Callable[..., Device]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of `open` and their defaults."""
+        parameters = list(inspect.signature(self.open).parameters.values())[1:]
+        return {parameter.name: parameter.default for parameter in parameters}
+
+
+OpenFake = Callable[[Faults], Device]
+"""Opens a driver on its fake; the given faults strike between the two."""
+
+
+def drivers() -> dict[str, Driver]:
+    """Return every installed driver by name.
+
+    Raises:
+        UnknownDriverError: An entry point does not load, or is no driver; none is skipped silently.
+    """
+    found = {}
+    for entry in sorted(entry_points(group=DRIVERS)):
+        driver = _load(entry)
+        if not isinstance(driver, Driver) or driver.name != entry.name:
+            raise UnknownDriverError(
+                f"{entry.value} is not the driver {entry.name!r}.",
+                f"Expected a drivers.registry.Driver of the name {entry.name!r}.",
+                f"Install {_package(entry)} again, or remove it.",
+            )
+        found[entry.name] = driver
+    return found
+
+
+def fakes() -> dict[str, OpenFake]:
+    """Return the function that opens each driver's fake, by the driver's name.
+
+    Raises:
+        UnknownDriverError: An entry point does not load.
+    """
+    return {entry.name: _load(entry) for entry in sorted(entry_points(group=FAKES))}
+
+
+def open_device(name: str, url: str, **options: Any) -> Device:
+    """Open a device by the name of its driver.
+
+    Args:
+        name: Name of the driver.
+        url: Where the device is.
+        **options: The driver's own options.
+
+    Raises:
+        UnknownDriverError: There is no such driver.
+        DriverError: The driver has no such option.
+        LinkError: The link cannot be opened.
+    """
+    known = drivers()
+    if name not in known:
+        raise UnknownDriverError(f"There is no driver {name!r}.", f"Installed: {', '.join(known)}.")
+    driver = known[name]
+    strange = sorted(set(options) - set(driver.options))
+    if strange:
+        raise DriverError(
+            f"The driver {name} has no option {', '.join(strange)}.",
+            f"Its options are: {', '.join(driver.options) or 'none'}.",
+        )
+    return driver.open(url, **options)
+
+
+def _load(entry: EntryPoint) -> Any:
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        raise UnknownDriverError(
+            f"The driver {entry.name!r} of {_package(entry)} cannot be loaded: {error}.",
+            f"Its entry point is {entry.value}.",
+            f"Install {_package(entry)} again, or remove it.",
+        ) from error
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else entry.module

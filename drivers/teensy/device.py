@@ -1,0 +1,112 @@
+"""The logger as a device among others: it only measures; `TeensyLogger` also moves things."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.counters import Arrivals, DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.errors import LinkError
+from drivers.registry import Driver
+from drivers.teensy.channels import RAW, TeensyChannel
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import (
+    STATUS_LIMIT_TRIPPED,
+    STATUS_SATURATED,
+    STATUS_WATCHDOG_TRIPPED,
+)
+from drivers.transport import open_transport
+from drivers.transport.transport import Transport
+
+LONGEST_SILENCE_S = 0.1
+"""A hundred samples."""
+
+
+class TeensyDevice:
+    """The logger's stream in units, time-stamped by its own clock. It is never armed.
+
+    Args:
+        transport: The way to the board; the device closes it.
+        wired: What the fields of a sample mean.
+    """
+
+    name = "teensy"
+
+    def __init__(self, transport: Transport, wired: Sequence[TeensyChannel] = RAW) -> None:
+        self._transport = transport
+        self._wired = tuple(wired)
+        self.logger = TeensyLogger(transport)
+        self._counters = DeviceCounters()
+        self._arrivals = Arrivals(self._counters, LONGEST_SILENCE_S)
+        self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is wired, in the order given."""
+        return tuple(wired.channel for wired in self._wired)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The link's counters, and the silences of the stream."""
+        return self._counters.as_dict() | self.logger.counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Ask the board who it is and whether it speaks this program's protocol.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            ProtocolMismatchError: It speaks another protocol.
+        """
+        identity = self.logger.identify()
+        return DeviceIdentity("Teensy logger", identity.serial, identity.firmware_version)
+
+    def start(self) -> None:
+        """Start the stream; sequence numbers begin at 0."""
+        self.logger.start()
+        self._arrivals.restart(self._transport.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the samples that have come, with the board's own time."""
+        batch = self.logger.read(timeout_s)
+        self._arrivals.number(len(batch.samples), self._transport.now_s)
+        return Batch(
+            {wired.channel.name: wired.values(batch.samples) for wired in self._wired},
+            np.multiply(batch.tick_us, 1e-6),
+            "device",
+            batch.samples["sequence"].astype(np.int64),
+            _flags(batch.samples["status"]),
+            batch.lost,
+        )
+
+    def stop(self) -> None:
+        """Stop the stream."""
+        self.logger.stop()
+
+    def close(self) -> None:
+        """Stop the stream where the board can still be reached, and let go of the link."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.stop()
+        except LinkError:
+            pass  # it is gone already
+        finally:
+            self.logger.close()
+
+
+def open_teensy(url: str) -> TeensyDevice:
+    """Open the logger at a serial port or a USB identity, its inputs in raw counts."""
+    return TeensyDevice(open_transport(url))
+
+
+DRIVER = Driver("teensy", "The 1 kHz logger on a Teensy 3.5 or 4.1", open_teensy)
+
+
+def _flags(status: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    flags = np.zeros(len(status), np.uint8)
+    flags[(status & STATUS_SATURATED) != 0] |= np.uint8(SampleFlag.SATURATED)
+    tripped = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
+    flags[(status & tripped) != 0] |= np.uint8(SampleFlag.SUSPECT)
+    return flags

@@ -1,0 +1,228 @@
+"""A bad cable: faults on what a device sends, around any transport, repeatable by a seed.
+
+Time is the inner transport's own, so that a fault that lasts takes no real time on a simulated one.
+`Faults` knows nothing of transports; a bus that is none can ask it what becomes of each message.
+"""
+
+import random
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+
+from drivers.errors import LinkLostError
+from drivers.transport.transport import Transport
+
+LONGEST_RUN = 16
+"""Most bytes of a stream one fault takes, changes or repeats."""
+
+
+class Fault(StrEnum):
+    """What can happen on the way from a device to the host."""
+
+    DROP = "drop"
+    """A run of bytes is missing; of packets, one is."""
+    CORRUPT = "corrupt"
+    """A run of bytes is changed; a packet is thrown away by its network's own checksum."""
+    DUPLICATE = "duplicate"
+    """A run of bytes comes twice; of packets, one does."""
+    DELAY = "delay"
+    """Bytes come late, and those behind them too; a late packet is overtaken."""
+    STALL = "stall"
+    """Nothing comes for a while, then all of it at once."""
+    DISCONNECT = "disconnect"
+    """The link is gone for good."""
+
+
+class Faults:
+    """Faults that wait to strike, and what each does to bytes.
+
+    Args:
+        seed: Seed of the places and values of damage.
+        rates: Probability that a fault strikes a chunk by itself, by fault; for long tests.
+    """
+
+    def __init__(self, seed: int = 0, rates: Mapping[Fault, float] | None = None) -> None:
+        self._random = random.Random(seed)
+        self._rates = dict(rates or {})
+        self._waiting: deque[tuple[Fault, float]] = deque()
+        self._stall_s: float | None = None
+        self._stalled_until_s = float("-inf")
+        self._held_until_s = float("-inf")
+        self.disconnected = False
+        """Whether the link has been cut."""
+        self.struck: Counter[Fault] = Counter()
+        """How often each fault has struck."""
+
+    def inject(self, fault: Fault, count: int = 1, duration_s: float = 0.3) -> None:
+        """Let a fault strike the next `count` chunks, in the order of the calls.
+
+        A stall begins, and a disconnection happens, at the next look at the link.
+
+        Args:
+            fault: What happens.
+            count: Chunks hit.
+            duration_s: How long a delay or a stall lasts.
+        """
+        if fault is Fault.DISCONNECT:
+            self.disconnected = True
+            self.struck[fault] += 1
+        elif fault is Fault.STALL:
+            self._stall_s = duration_s
+        else:
+            self._waiting.extend([(fault, duration_s)] * count)
+
+    def pass_on(self, chunk: bytes, now_s: float, whole: bool) -> list[tuple[float, bytes]]:
+        """Return what becomes of a chunk: pieces, each with the time from which it may be read.
+
+        Args:
+            chunk: Bytes from the device; a packet where `whole`.
+            now_s: Time of the link.
+            whole: Damage a packet as a whole rather than a run of a stream's bytes.
+        """
+        due_s = max(now_s, self.stalled_until_s(now_s))
+        pieces = [chunk]
+        overtaken = False
+        for fault, duration_s in self._striking():
+            self.struck[fault] += 1
+            if fault is Fault.DELAY:
+                due_s = max(due_s, now_s + duration_s)
+                overtaken = whole
+            elif fault is Fault.STALL:
+                self._stall_s = duration_s
+                due_s = max(due_s, self.stalled_until_s(now_s))
+            elif fault is Fault.DISCONNECT:
+                self.disconnected = True
+            else:
+                pieces = [part for piece in pieces for part in self._damage(fault, piece, whole)]
+        if not overtaken:
+            due_s = self._held_until_s = max(due_s, self._held_until_s)
+        return [(due_s, piece) for piece in pieces if piece]
+
+    def stalled_until_s(self, now_s: float) -> float:
+        """Return the time until which nothing comes; a stall that waits begins now."""
+        if self._stall_s is not None:
+            self._stalled_until_s = now_s + self._stall_s
+            self._stall_s = None
+            self.struck[Fault.STALL] += 1
+        return self._stalled_until_s
+
+    def _striking(self) -> list[tuple[Fault, float]]:
+        striking = [self._waiting.popleft()] if self._waiting else []
+        for fault, rate in self._rates.items():
+            if self._random.random() < rate:
+                striking.append((fault, 0.3))
+        return striking
+
+    def _damage(self, fault: Fault, data: bytes, whole: bool) -> list[bytes]:
+        if whole:
+            return [data, data] if fault is Fault.DUPLICATE else []
+        size = self._random.randint(1, min(LONGEST_RUN, len(data)))
+        first = self._random.randint(0, len(data) - size)
+        run, before, behind = data[first : first + size], data[:first], data[first + size :]
+        if fault is Fault.CORRUPT:
+            changed = bytes(byte ^ self._random.randint(1, 255) for byte in run)
+            return [before + changed + behind]
+        return [before + behind if fault is Fault.DROP else before + run + run + behind]
+
+
+Tap = Callable[[bytes], bytes]
+"""Changes bytes on their way; what it returns goes on in their place."""
+
+
+class FaultyTransport:
+    """Any transport behind a bad cable.
+
+    Args:
+        inner: The transport.
+        faults: The faults that strike; more can be injected at any time.
+        packets: Whether each read of `inner` is one packet rather than part of a stream.
+    """
+
+    def __init__(
+        self, inner: Transport, faults: Faults | None = None, packets: bool = False
+    ) -> None:
+        self._inner = inner
+        self.faults = faults or Faults()
+        self._packets = packets
+        self._held: list[tuple[float, bytes]] = []
+        self.incoming: Tap = unchanged
+        self.outgoing: Tap = unchanged
+
+    @property
+    def url(self) -> str:
+        """The URL of the inner transport."""
+        return self._inner.url
+
+    @property
+    def now_s(self) -> float:
+        """The clock of the inner transport, seconds."""
+        return self._inner.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the bytes that get through, waiting at most `timeout_s` for the first."""
+        give_up_s = self.now_s + timeout_s
+        while True:
+            self._require_link()
+            due = self._due()
+            if due:
+                return due
+            remaining_s = max(0.0, give_up_s - self.now_s)
+            next_due_s = min((due_s for due_s, _ in self._held), default=float("inf"))
+            chunk = self._inner.read(max(0.0, min(remaining_s, next_due_s - self.now_s)))
+            if chunk:
+                arrived = self.incoming(chunk)
+                if arrived:
+                    self._held += self.faults.pass_on(arrived, self.now_s, self._packets)
+            elif remaining_s <= 0.0:
+                self._require_link()
+                return self._due()
+
+    def write(self, data: bytes) -> None:
+        """Send `data`, as far as the taps let it."""
+        self._require_link()
+        changed = self.outgoing(data)
+        if changed:
+            self._inner.write(changed)
+
+    def close(self) -> None:
+        """Close the inner transport."""
+        self._inner.close()
+
+    def _due(self) -> bytes:
+        now_s = self.now_s
+        if now_s < self.faults.stalled_until_s(now_s):
+            return b""
+        due = [entry for entry in self._held if entry[0] <= now_s]
+        if self._packets:
+            due = due[:1]
+        for entry in due:
+            self._held.remove(entry)
+        return b"".join(data for _, data in due)
+
+    def _require_link(self) -> None:
+        if self.faults.disconnected:
+            self._inner.close()
+            raise LinkLostError(
+                f"The link to {self.url} is gone.",
+                "The device was unplugged.",
+                "Check the cable and start again.",
+            )
+
+
+def unchanged(data: bytes) -> bytes:
+    """Let bytes pass as they are."""
+    return data
+
+
+def once(tap: Tap) -> Tap:
+    """Return a tap that acts on the first non-empty bytes only."""
+    struck = False
+
+    def strike(data: bytes) -> bytes:
+        nonlocal struck
+        if struck or not data:
+            return data
+        struck = True
+        return tap(data)
+
+    return strike

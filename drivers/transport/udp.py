@@ -1,0 +1,127 @@
+"""UDP to one device: `udp:HOST:PORT`. Each read is one datagram.
+
+The socket is connected: the kernel drops datagrams from anyone else. Nothing listens for strangers;
+`listen_udp`, for fakes in another process, does so on the loopback interface unless told otherwise.
+"""
+
+import select
+import socket
+from time import monotonic
+
+from drivers.errors import LinkError, LinkLostError
+
+LARGEST_DATAGRAM = 65535
+RECEIVE_BUFFER = 1 << 20
+"""Bytes the kernel is asked to hold for a reader that is late: seconds of a 7 kHz stream."""
+
+
+class UdpTransport:
+    """Datagrams to and from one address.
+
+    Args:
+        url: The URL the user gave, for messages.
+        connected: A connected datagram socket.
+    """
+
+    def __init__(self, url: str, connected: socket.socket) -> None:
+        self._url = url
+        self._socket = connected
+        self._closed = False
+        connected.setblocking(False)
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+
+    @property
+    def url(self) -> str:
+        """The URL the transport was opened by."""
+        return self._url
+
+    @property
+    def now_s(self) -> float:
+        """The host's monotonic clock, seconds."""
+        return monotonic()
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the next datagram, waiting at most `timeout_s` for it."""
+        self._require_link()
+        try:
+            if not select.select([self._socket], [], [], max(0.0, timeout_s))[0]:
+                return b""
+            return self._socket.recv(LARGEST_DATAGRAM)
+        except BlockingIOError:
+            return b""  # a datagram with a bad checksum was there and is not
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def write(self, data: bytes) -> None:
+        """Send `data` as one datagram."""
+        self._require_link()
+        try:
+            self._socket.send(data)
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._closed = True
+        self._socket.close()
+
+    def _require_link(self) -> None:
+        if self._closed:
+            raise LinkLostError(f"{self._url} is closed.")
+
+    def _lost(self, error: OSError) -> LinkLostError:
+        return LinkLostError(
+            f"The link to {self._url} is gone.",
+            f"{error}.",
+            "Check that the device is powered and in this computer's network.",
+        )
+
+
+def open_udp(url: str) -> UdpTransport:
+    """Open `udp:HOST:PORT` (or `udp://HOST:PORT`).
+
+    Raises:
+        LinkError: The URL is not so written, or the host is unknown or out of reach.
+    """
+    host, port = split_address(url)
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[
+            0
+        ]
+        connected = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise LinkError(
+            f"{url} cannot be opened.", f"{error}.", "Check the host's name."
+        ) from error
+    try:
+        connected.connect(address)
+    except OSError as error:
+        connected.close()
+        raise LinkError(f"{url} cannot be reached.", f"{error}.", "Check the network.") from error
+    return UdpTransport(url, connected)
+
+
+def listen_udp(port: int = 0, host: str = "127.0.0.1") -> socket.socket:
+    """Return a socket that takes datagrams, on the loopback interface unless told otherwise.
+
+    Args:
+        port: Port; any free one when 0.
+        host: Address to listen on.
+    """
+    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listening.bind((host, port))
+    return listening
+
+
+def split_address(url: str) -> tuple[str, int]:
+    """Return host and port of `udp:HOST:PORT`.
+
+    Raises:
+        LinkError: It is not so written.
+    """
+    host, colon, port = url.removeprefix("udp:").removeprefix("//").rpartition(":")
+    if not (colon and host and port.isdecimal() and 0 < int(port) < 65536):
+        raise LinkError(
+            f"{url!r} is no UDP address.", "It needs a host and a port.", "Write udp:HOST:PORT."
+        )
+    return host.strip("[]"), int(port)

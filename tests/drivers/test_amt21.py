@@ -1,0 +1,95 @@
+"""The AMT21: its check bits, its questions and answers, an adapter that echoes."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.amt21 import protocol
+from drivers.amt21.driver import Amt21, open_amt21
+from drivers.amt21.fake import Amt21Fake
+from drivers.errors import FrameError, LinkError, LinkTimeoutError
+from drivers.transport.simulated import SimulatedTransport
+
+VECTORS = {0: 0xC000, 1: 0x8001, 0x1234: 0x9234, 0x2000: 0x6000, 0x21AB: 0x61AB, 0x3FFF: 0x3FFF}
+
+
+@pytest.mark.parametrize(("value", "word"), VECTORS.items())
+def test_the_check_bits_are_those_of_known_answers(value: int, word: int) -> None:
+    reply = word.to_bytes(2, "little")
+    assert protocol.encode_reply(value) == reply
+    assert protocol.decode_reply(reply) == value
+
+
+@given(value=st.integers(0, 2**14 - 1), bit=st.integers(0, 15))
+def test_one_changed_bit_is_refused(value: int, bit: int) -> None:
+    word = int.from_bytes(protocol.encode_reply(value), "little") ^ 1 << bit
+    with pytest.raises(FrameError):
+        protocol.decode_reply(word.to_bytes(2, "little"))
+
+
+@pytest.mark.parametrize("reply", [b"", b"\x00", b"\x00\xc0\x00"])
+def test_an_answer_has_two_bytes(reply: bytes) -> None:
+    with pytest.raises(FrameError):
+        protocol.decode_reply(reply)
+
+
+def test_it_asks_at_its_rate_and_reads_the_angle() -> None:
+    fake = Amt21Fake(counts_a_tick=100)
+    device = Amt21(SimulatedTransport(fake), rate_hz=100.0)
+    assert device.identify().model == "AMT21"
+    device.start()
+    batches = [device.read(0.1) for _ in range(400)]
+    angles = [float(batch.columns["angle_rad"][0]) for batch in batches]
+    expected = [2 * math.pi * (1000 * k % 2**14) / 2**14 for k in range(400)]
+    assert angles == pytest.approx(expected)
+    assert [int(batch.sequence[0]) for batch in batches] == list(range(400))
+    assert batches[-1].time_s[0] - batches[0].time_s[0] == pytest.approx(3.99)
+    assert len(device.read(0.001)) == 0
+
+
+def test_turns_are_signed() -> None:
+    fake = Amt21Fake(counts_a_tick=-20, multi_turn=True)
+    device = Amt21(SimulatedTransport(fake), multi_turn=True, rate_hz=1.0)
+    device.start()
+    for second in range(4):
+        batch = device.read(2.0)
+        total = batch.columns["turns"][0] * 2**14 + batch.columns["angle_rad"][0] * 2**14 / math.tau
+        assert total == pytest.approx(-20_000 * second)
+    assert batch.columns["turns"][0] == -4
+
+
+def test_an_echoing_adapter_is_dealt_with_and_seen() -> None:
+    device = Amt21(SimulatedTransport(Amt21Fake(echo=True)))
+    device.start()
+    assert device.read(0.1).columns["angle_rad"].tolist() == [0.0]
+    assert device.counters["discarded_bytes"] == 1
+    assert device.counters["crc_errors"] == 0
+
+
+def test_another_address_stays_silent() -> None:
+    device = Amt21(SimulatedTransport(Amt21Fake(address=0x58)))
+    with pytest.raises(LinkTimeoutError, match="0x54"):
+        device.identify()
+    device.start()
+    batch = device.read(0.1)
+    assert (len(batch), batch.lost) == (0, 1)
+    assert device.counters["timeouts"] == 2
+
+
+def test_a_caller_that_comes_late_has_lost_samples() -> None:
+    transport = SimulatedTransport(Amt21Fake())
+    device = Amt21(transport, rate_hz=100.0)
+    device.start()
+    device.read(0.1)
+    transport.read(0.055)
+    late = device.read(0.1)
+    assert (int(late.sequence[0]), late.lost) == (5, 4)
+
+
+def test_an_address_is_a_multiple_of_four() -> None:
+    with pytest.raises(ValueError, match="multiple of 4"):
+        protocol.request(0x55)
+    with pytest.raises(LinkError, match="multiple of 4"):
+        open_amt21("loop://", address=0x55)

@@ -1,0 +1,162 @@
+"""What every registered driver keeps, on its own fake: found by the registry, none left out."""
+
+import inspect
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.device import Batch, Device, SampleFlag
+from drivers.errors import DriverError, LinkLostError
+from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
+from drivers.transport.faulty import Fault, Faults
+
+NAMES = sorted(drivers())
+PROJECT = Path(__file__).parents[2] / "pyproject.toml"
+STRIKES = 8
+
+
+def opened(name: str, faults: Faults | None = None) -> Device:
+    return fakes()[name](faults or Faults())
+
+
+def troubles(device: Device) -> int:
+    return sum(count for name, count in device.counters.items() if name != "frames")
+
+
+def read_some(device: Device, wanted: int, reads: int = 400) -> list[Batch]:
+    """Read until `wanted` samples have come, however many reads may come back empty."""
+    batches: list[Batch] = []
+    for _ in range(reads):
+        batches.append(device.read(0.1))
+        if sum(len(batch) for batch in batches) >= wanted:
+            return batches
+    pytest.fail(f"{wanted} samples did not come in {reads} reads: {dict(device.counters)}")
+
+
+def check(device: Device, batches: list[Batch]) -> None:
+    """Hold batches against what a batch promises."""
+    channels = {channel.name: channel for channel in device.channels}
+    sequence = np.concatenate([batch.sequence for batch in batches])
+    time_s = np.concatenate([batch.time_s for batch in batches])
+    assert (np.diff(sequence) > 0).all()
+    assert (np.diff(time_s) >= 0).all()
+    assert len({batch.clock for batch in batches}) == 1
+    lost = [batch.lost for batch in batches]
+    assert lost == sorted(lost)
+    for batch in batches:
+        assert set(batch.columns) == set(channels)
+        assert batch.flags.dtype == np.uint8
+        good = (batch.flags & ~np.uint8(SampleFlag.STALE)) == 0
+        for name, values in batch.columns.items():
+            assert values.dtype == np.float64
+            assert values.shape == batch.time_s.shape == batch.sequence.shape == batch.flags.shape
+            assert np.isfinite(values[good]).all()
+            assert (values[good] >= channels[name].lower).all()
+            assert (values[good] <= channels[name].upper).all()
+
+
+def test_the_built_in_drivers_are_installed() -> None:
+    declared = tomllib.loads(PROJECT.read_text())["project"]["entry-points"][DRIVERS]
+    assert set(declared) <= set(NAMES), "install the project again: make setup"
+    assert set(NAMES) == set(fakes())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_documented(name: str) -> None:
+    driver = drivers()[name]
+    assert isinstance(driver, Driver)
+    assert driver.description
+    assert all(default is not inspect.Parameter.empty for default in driver.options.values())
+    readme = Path(inspect.getfile(driver.open)).with_name("README.md").read_text()
+    for heading in ("## Wiring", "## Limits", "## Source"):
+        assert heading in readme
+    device = opened(name)
+    assert inspect.getdoc(inspect.getmodule(type(device)))
+    assert inspect.getdoc(type(device))
+    for method in ("channels", "counters", "identify", "start", "read", "stop", "close"):
+        assert inspect.getdoc(getattr(type(device), method)), method
+    device.close()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
+    for _ in range(2):
+        device = opened(name)
+        assert isinstance(device, Device)
+        assert device.name == name
+        assert device.identify().model
+        device.start()
+        assert device.channels
+        for channel in device.channels:
+            assert channel.name
+            assert channel.unit
+            assert channel.description
+            assert channel.rate_hz > 0
+            assert channel.lower < channel.upper
+        assert len({channel.name for channel in device.channels}) == len(device.channels)
+        batches = read_some(device, 60)
+        check(device, batches)
+        assert batches[0].sequence[0] == 0
+        assert batches[-1].lost == 0
+        assert troubles(device) == 0, dict(device.counters)
+        assert device.counters["frames"] > 0
+        device.stop()
+        device.start()
+        again = read_some(device, 5)
+        assert again[0].lost == 0
+        assert next(batch for batch in again if len(batch)).sequence[0] == 0
+        device.close()
+        device.close()
+        with pytest.raises(LinkLostError):
+            device.read(0.1)
+
+
+@pytest.mark.parametrize("fault", [fault for fault in Fault if fault is not Fault.DISCONNECT])
+@pytest.mark.parametrize("name", NAMES)
+def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
+    faults = Faults(seed=2)
+    device = opened(name, faults)
+    device.start()
+    rate_hz = device.channels[0].rate_hz
+    batches = read_some(device, 30)
+    before = troubles(device)
+    faults.inject(fault, STRIKES, duration_s=max(0.3, 10 / rate_hz))
+    errors = []
+    for _ in range(60):
+        try:
+            batches.append(device.read(max(0.1, 2 / rate_hz)))
+        except DriverError as error:
+            errors.append(error)
+    assert faults.struck[fault] > 0
+    assert troubles(device) > before or errors, dict(device.counters)
+    settled = troubles(device)
+    batches += read_some(device, 30)
+    assert troubles(device) == settled, "the fault is over and the driver still stumbles"
+    check(device, batches)
+    device.close()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_cut_link_is_said_and_it_can_be_opened_again(name: str) -> None:
+    faults = Faults()
+    device = opened(name, faults)
+    device.start()
+    read_some(device, 10)
+    faults.inject(Fault.DISCONNECT)
+    for _ in range(2):
+        with pytest.raises(LinkLostError, match=r"\w"):
+            device.read(0.1)
+    device.close()
+    again = opened(name)
+    again.start()
+    check(again, read_some(again, 10))
+    again.close()
+
+
+def test_an_unknown_driver_or_option_is_named() -> None:
+    with pytest.raises(DriverError, match=r"no driver 'nonesuch'.*teensy"):
+        open_device("nonesuch", "/dev/null")
+    with pytest.raises(DriverError, match="no option colour"):
+        open_device("teensy", "/dev/null", colour="red")
