@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint bench figures firmware clean
+.PHONY: setup demo test lint bench blind figures firmware clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -34,6 +34,11 @@ lint: $(VENV)/.developing firmware
 
 bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
+
+# resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster
+BLIND ?=
+blind: $(VENV)/.installed
+	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md --baselines $(BLIND)
 
 figures: $(VENV)/.installed
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done

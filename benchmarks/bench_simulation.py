@@ -5,8 +5,9 @@ import numpy as np
 from benchmarks.ratio import Ratio, best_of
 from drivers.teensy import control
 from rig.simulation.bench import SimulatedBench
+from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect
-from rig.simulation.parameters import REFERENCE_GAINS
+from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters
 
 DURATION_S = 20.0
 DEAREST = ("gear_eccentricity", "eccentric_pulley", "current_ripple", "motor_ripple")
@@ -20,14 +21,15 @@ def measure() -> list[Ratio]:
     target = np.round(683.0 * (1.0 + np.cos(phase))).astype(np.int32)
     load_ma = np.full(ticks, 500, np.int32)
 
-    def seconds(effects: list[HiddenEffect]) -> float:
-        bench = SimulatedBench(effects=effects)
+    def seconds(effects: list[HiddenEffect], plant: PlantParameters | None = None) -> float:
+        bench = SimulatedBench(plant, effects=effects)
         state, gains = control.new_state(), np.array(REFERENCE_GAINS)
         bench.advance(ticks, target, load_ma, True, state, gains)  # compiles
         return best_of(lambda: bench.advance(ticks, target, load_ma, True, state, gains), 5)
 
     plain_s = seconds([])
     loaded_s = seconds([HiddenEffect(name) for name in DEAREST])
+    twin_s = seconds([], DECLARED_PLANT)
     return [
         Ratio(
             "simulated rig over real time, controller in the loop, one core",
@@ -40,5 +42,11 @@ def measure() -> list[Ratio]:
             DURATION_S / loaded_s,
             150.0,
             detail=f"{DURATION_S:g} s simulated in {loaded_s * 1e3:.1f} ms",
+        ),
+        Ratio(
+            "the simulated twin over real time, smooth friction, one core",
+            DURATION_S / twin_s,
+            150.0,
+            detail=f"{DURATION_S:g} s simulated in {twin_s * 1e3:.1f} ms",
         ),
     ]

@@ -74,6 +74,10 @@ class PlantParameters:
         stop_closed_rad: Jaw angle of the closed stop. Assumed.
         stop_stiffness_n_m_rad: Assumed.
         stop_damping_n_m_s_rad: Assumed.
+        motor_creep_speed_rad_s: Speed of the motor over which its dry friction changes sign; 0 is
+            friction that sticks. No dry friction does that: it makes a rig of which a smooth change
+            of sign is the whole truth.
+        spindle_creep_speed_rad_s: The same of spindle and jaw.
     """
 
     substeps_ratio: float = _fixed(20.0)
@@ -105,6 +109,8 @@ class PlantParameters:
     stop_closed_rad: float = _fixed(1.45)
     stop_stiffness_n_m_rad: float = 40.0
     stop_damping_n_m_s_rad: float = 5e-3
+    motor_creep_speed_rad_s: float = _fixed(0.0)
+    spindle_creep_speed_rad_s: float = _fixed(0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

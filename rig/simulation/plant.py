@@ -91,6 +91,34 @@ def clip(value: float, limit: float) -> float:
 
 
 @numba.njit()
+def braking(speed: float, most: float, creep_speed: float) -> float:
+    """Return the speed that friction takes in a step: all of it at most, or in proportion to it.
+
+    With a creep speed the friction is its level times tanh(speed after the step / creep speed),
+    the tangent as its Pade approximant, solved by Newton steps.
+
+    Args:
+        speed: Speed the other torques would give.
+        most: What full friction takes in the step.
+        creep_speed: Speed at which three quarters of the friction are there; 0 for dry friction.
+    """
+    if creep_speed <= 0.0:
+        return clip(speed, most)
+    if abs(speed) > most + 3.0 * creep_speed:
+        return clip(speed, most)
+    per_creep = 1.0 / creep_speed
+    gain = most * per_creep
+    after = speed / (1.0 + gain)
+    for _ in range(2):
+        x = min(max(after * per_creep, -3.0), 3.0)
+        per_below = 1.0 / (3.0 + x * x)
+        root = (9.0 - x * x) * per_below / 3.0
+        share = x * (27.0 + x * x) * per_below / 9.0
+        after -= (after + most * share - speed) / (1.0 + gain * root * root)
+    return clip(speed - after, most)
+
+
+@numba.njit()
 def _any(strength: NDArray[np.float64], kinds: NDArray[np.int64]) -> bool:
     for kind in kinds:  # noqa: SIM110 - a compiled loop
         if strength[kind] != 0.0:
@@ -242,7 +270,7 @@ def step_tick(
         motor_speed += dt_motor * (
             motor_torque - p.motor_viscous_n_m_s_rad * motor_speed - gear * twist_torque
         )
-        motor_speed -= clip(motor_speed, dt_motor * motor_limit)
+        motor_speed -= braking(motor_speed, dt_motor * motor_limit, p.motor_creep_speed_rad_s)
         rotor_torque = (motor_speed - before) / dt_motor
         motor += dt * motor_speed
 
@@ -262,7 +290,9 @@ def step_tick(
             spindle_torque -= hidden_cable.cable_presliding_n_m(row, bristle)
             bristle += dt * hidden_cable.cable_presliding_rate(row, bristle, spindle_speed)
         spindle_speed += dt_spindle * spindle_torque
-        spindle_speed -= clip(spindle_speed, dt_spindle * spindle_limit)
+        spindle_speed -= braking(
+            spindle_speed, dt_spindle * spindle_limit, p.spindle_creep_speed_rad_s
+        )
         proximal = spindle_per_twist * twist_torque + rotor_torque
         spindle += dt * spindle_speed
 
@@ -283,7 +313,7 @@ def step_tick(
         if jaw_effect:
             jaw_torque -= hidden_cable.jaw_torque_n_m(effects, jaw)
         jaw_speed += dt_jaw * jaw_torque
-        impulse = clip(jaw_speed, dt_jaw * jaw_friction)
+        impulse = braking(jaw_speed, dt_jaw * jaw_friction, p.spindle_creep_speed_rad_s)
         jaw_speed -= impulse
         distal = load + load_share * impulse / dt_jaw
         jaw += dt * jaw_speed

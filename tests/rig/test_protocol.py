@@ -19,7 +19,7 @@ def test_the_reference_protocol_is_fifty_runs_of_twenty_seconds():
     assert len({plan.name for plan in plans}) == 50
 
 
-@pytest.mark.parametrize("name", ["reference", "thorough", "quick"])
+@pytest.mark.parametrize("name", ["reference", "thorough", "quick", "diagnosis"])
 def test_shipped_plans_are_whole_and_move_the_spindle_without_jumps(name):
     for plan in load_protocol(name).plans():
         assert plan.target_angle_rad.shape == plan.load_command_a.shape

@@ -1,0 +1,218 @@
+"""The blind study itself: cases give nothing away, scoring is strict, a study resumes."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from estimation.derived import zero_phase_channels
+from rig.importers.registry import open_campaign
+from rig.simulation.hidden import NAMES, HiddenEffect
+from tests.blind import baselines
+from tests.blind.generate import CLASSES, CONTROLS, Answer, draw, write
+from tests.blind.run import blind
+from tests.blind.score import outcome, right, wilson
+from tests.blind.truths import TRUTHS
+
+FAKE = """
+import json, pathlib, sys
+case, out = map(pathlib.Path, sys.argv[1:])
+assert sorted(p.suffix for p in case.iterdir()) == [".mcap"], "logs only"
+with (out.parent / "asked.txt").open("a") as log:
+    print(case.name, file=log)
+pathlib.Path(out).write_text(json.dumps({"findings": [], "next_experiment": None}))
+"""
+
+
+def finding(verdict: str, family: str, balance: str = "motor", **more: Any) -> dict[str, Any]:
+    base: dict[str, Any] = {"also_in": [], "alternatives": [], "depends_on": []}
+    return base | {"verdict": verdict, "family": family, "balance": balance} | more
+
+
+def said(*findings: dict[str, Any], following: object = None) -> dict[str, Any]:
+    return {"findings": list(findings), "next_experiment": following}
+
+
+def hidden(kind: str, *names: str, either: tuple[str, ...] = ()) -> Answer:
+    return Answer("case-x", kind, tuple(HiddenEffect(n) for n in names), (0,), "", either)
+
+
+def test_every_hidden_effect_has_an_answer() -> None:
+    assert set(TRUTHS) == set(NAMES)
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_a_draw_is_seeded_and_its_name_gives_nothing_away(kind: str) -> None:
+    drawn = [draw(kind, number, 7) for number in range(30)]
+    assert drawn == [draw(kind, number, 7) for number in range(30)]
+    assert len({answer.case for answer in drawn}) == 30
+    assert all(kind not in answer.case for answer in drawn)
+    assert all(len(a.effects) == {"pair": 2, "control": 0}.get(kind, 1) for a in drawn)
+
+
+def test_weak_cases_have_a_third_of_the_strength() -> None:
+    def strengths(kind: str) -> list[float]:
+        effects = [draw(kind, k, 1).effects[0] for k in range(60)]
+        return [effect.strength / TRUTHS[effect.name].scale for effect in effects]
+
+    assert np.mean(strengths("weak")) == pytest.approx(0.3 * np.mean(strengths("strong")), rel=0.1)
+
+
+@pytest.mark.parametrize("number", range(len(CONTROLS)))
+def test_a_case_is_a_folder_of_logs_and_the_answer_lies_elsewhere(
+    tmp_path: Path, number: int
+) -> None:
+    answer = draw("control", number, 1)
+    folder = write(answer, tmp_path / "cases", tmp_path / "answers", runs=1)
+    assert [path.suffix for path in folder.iterdir()] == [".mcap"]
+    kept = json.loads((tmp_path / "answers" / f"{answer.case}.json").read_text())
+    assert kept["variant"] == CONTROLS[number]
+    (recording,) = open_campaign(folder)
+    assert 13.0 < recording.duration_s < 15.0
+    assert len(zero_phase_channels(recording, ["motor_velocity_rad_s"])) == len(recording)
+    for text in (recording.source, recording.notes, recording.rig):
+        assert CONTROLS[number] not in text
+
+
+def test_a_hidden_effect_is_in_the_runs_that_have_it_only(tmp_path: Path) -> None:
+    effect = (HiddenEffect("cable_growing_friction", 2.0),)
+    torque = []
+    for runs in ((), (0,)):
+        answer = Answer("case-00000000ab", "partial", effect, runs)
+        folder = write(answer, tmp_path / str(len(runs)), tmp_path / "answers", runs=2)
+        torque.append([recording["proximal_torque_n_m"] for recording in open_campaign(folder)])
+    assert np.std(torque[1][0] - torque[0][0]) > 1e-3
+    assert np.array_equal(torque[1][1], torque[0][1])
+
+
+@pytest.mark.parametrize(
+    ("answer", "diagnosis", "result"),
+    [
+        (hidden("control"), said(), "nothing found"),
+        (hidden("control"), said(finding("something_missing", "unknown")), "false finding"),
+        (hidden("strong", "motor_ripple"), None, "failed"),
+        (hidden("strong", "motor_ripple"), said(), "nothing found"),
+        (
+            hidden("strong", "motor_ripple"),
+            said(finding("identified", "ripple.motor")),
+            "right name",
+        ),
+        (
+            hidden("strong", "motor_ripple"),
+            said(finding("identified", "ripple.motor", "stretch")),
+            "wrong name",
+        ),
+        (
+            hidden("strong", "motor_ripple"),
+            said(finding("identified", "ripple.motor"), finding("identified", "friction.drag")),
+            "wrong name",
+        ),
+        (
+            hidden("weak", "motor_ripple"),
+            said(finding("one_of", "ripple.current", alternatives=["ripple.motor"])),
+            "one of",
+        ),
+        (
+            hidden("strong", "torque_constant_sag"),
+            said(finding("identified", "sensor.gain_nonlinear")),
+            "right name",
+        ),
+        (
+            hidden("pair", "motor_ripple", "gear_backlash"),
+            said(finding("identified", "ripple.motor")),
+            "nothing found",
+        ),
+        (
+            hidden("outside", "jaw_detent"),
+            said(finding("depends_on", "unknown", "cable", depends_on=["spindle_angle"])),
+            "depends on",
+        ),
+        (
+            hidden("outside", "jaw_detent"),
+            said(finding("depends_on", "unknown", "cable", depends_on=["jaw_angle", "time"])),
+            "something missing",
+        ),
+        (
+            hidden("outside", "cable_load_notch"),
+            said(finding("identified", "friction.position", "cable")),
+            "wrong name",
+        ),
+        (
+            hidden(
+                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
+            ),
+            said(finding("identified", "friction.load")),
+            "wrong name",
+        ),
+        (
+            hidden(
+                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
+            ),
+            said(
+                finding("one_of", "friction.load", alternatives=["friction.position"]),
+                following={"protocol": "x"},
+            ),
+            "one of",
+        ),
+        (
+            hidden(
+                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
+            ),
+            said(finding("one_of", "friction.load", alternatives=["friction.position"])),
+            "something missing",
+        ),
+    ],
+)
+def test_a_diagnosis_is_scored(
+    answer: Answer, diagnosis: dict[str, Any] | None, result: str
+) -> None:
+    assert outcome(answer, diagnosis) == result
+    best = {"control": "nothing found", "outside": "depends on", "confounded": "one of"}
+    assert right(answer, result) == (result == best.get(answer.kind, "right name"))
+
+
+def test_wilsons_interval_is_the_published_one() -> None:
+    assert wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson(0, 100)[0] == 0.0
+
+
+def test_a_study_scores_reports_and_resumes(tmp_path: Path) -> None:
+    fake = tmp_path / "fake.py"
+    fake.write_text(FAKE)
+    app = typer.Typer()
+    app.command()(blind)
+    out, report = tmp_path / "study", tmp_path / "blind.md"
+
+    def study(counts: str) -> dict[str, Any]:
+        words = ["--out", str(out), "--counts", counts, "--runs", "1", "--report", str(report)]
+        words += ["--command", f"{sys.executable} {fake} {{case}} {{out}}", "--json"]
+        result = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert result.exit_code == 0
+        return dict(json.loads(result.stdout)["results"])
+
+    assert study("control=1")["control/0"]["outcome"] == "nothing found"
+    both = study("control=1,strong=1")
+    assert both["strong/0"]["outcome"] == "nothing found"
+    assert not both["strong/0"]["right"]
+    assert len((out / "asked.txt").read_text().split()) == 2  # the first was not asked again
+    assert not any((out / "cases").iterdir())
+    text = report.read_text()
+    assert "| control | 1 | 1/1 (21-100 %) | 0/1 (0-79 %) |" in text
+    assert "seed 1" in text
+
+
+def test_textbook_methods_find_a_plain_effect_and_more() -> None:
+    random = np.random.default_rng(0)
+    declared, clear, idle = (random.standard_normal((4000, 1)) for _ in range(3))
+    noise = 0.1 * random.standard_normal(4000)
+    table = baselines.Table(
+        declared[:, 0] + 0.5 * clear[:, 0] + noise, declared, {"clear": clear, "idle": idle}
+    )
+    for name, method in baselines.METHODS.items():
+        assert method(table) == ["clear"], name
