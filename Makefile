@@ -1,38 +1,47 @@
 # Every target does its own set-up: a local .venv made with venv and pip.
 PYTHON ?= python3
+CXX    ?= g++
 VENV   := .venv
 BIN    := $(VENV)/bin
-STAMP  := $(VENV)/.installed
-# the C++ firmware core is optional: without a compiler the Python fake speaks for the board
-CXX    ?= g++
+PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint bench firmware clean
+.PHONY: setup demo test lint bench figures firmware clean
 
-$(STAMP): pyproject.toml
+# what users run; nothing in it needs a compiler
+$(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,learn]'
+	$(PIP) -e '.[learn]'
 	touch $@
 
-setup: $(STAMP) firmware
+# what developers add: linters, tests, and the oracles they compare with
+$(VENV)/.developing: $(VENV)/.installed
+	$(PIP) -e '.[dev,learn]'
+	touch $@
+
+setup: $(VENV)/.installed firmware
 
 demo: setup
 	$(BIN)/rig demo
 
 test: lint
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
-lint: setup
+lint: $(VENV)/.developing firmware
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
-bench: setup
+bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
 
+figures: $(VENV)/.installed
+	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done
+
+# the C++ core is optional: without a compiler the Python fake speaks for the board
 firmware:
 	@if command -v $(CXX) >/dev/null 2>&1; then $(MAKE) --no-print-directory -C firmware CXX=$(CXX); \
-	else echo "no C++ compiler ($(CXX)): the Python fake will stand in for the firmware" >&2; fi
+	else echo "no C++ compiler ($(CXX)): left out the firmware in the loop" >&2; fi
 
 clean:
 	rm -rf $(VENV) firmware/build

@@ -48,8 +48,8 @@ def measure() -> list[Ratio]:
             with path.open("rb") as file:
                 deque(make_reader(file).iter_messages(), maxlen=0)
 
-        arrays_s = best_of(lambda: read_log(path), 5)
-        messages_s = best_of(iterate, 2)
+        arrays_s = best_of(lambda: read_log(path), 15)
+        messages_s = best_of(iterate, 3)
     return [
         Ratio(
             "reading a log as arrays over ordered iteration with mcap",

@@ -1,4 +1,4 @@
-"""Writing a text file so that a reader sees the old one or the new one, never half of either."""
+"""Writing a file so that a reader sees the old one or the new one, never half of either."""
 
 import os
 import tempfile
@@ -15,12 +15,25 @@ def write_text_atomic(path: Path, text: str) -> None:
     Raises:
         OSError: The folder cannot be made or written.
     """
+    write_bytes_atomic(path, text.encode("utf-8"))
+
+
+def write_bytes_atomic(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name beside the target and rename it.
+
+    Args:
+        path: Target; its folder is made when it is missing.
+        content: All of it.
+
+    Raises:
+        OSError: The folder cannot be made or written.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     part = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         part.chmod(0o644)  # mkstemp keeps its file private

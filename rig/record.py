@@ -25,7 +25,8 @@ from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
 from rig.motion import Motion, motion_of
 from rig.protocol import Protocol, RunPlan
-from rig.session import Reading, Session
+from rig.reading import Reading
+from rig.session import Session
 
 MANIFEST = "campaign.json"
 
@@ -97,6 +98,27 @@ def check_disk_space(folder: Path, plans: Iterable[RunPlan]) -> None:
         )
 
 
+def read_manifest(folder: Path) -> tuple[Protocol, Config]:
+    """Return the protocol and the configuration a campaign was begun with.
+
+    Raises:
+        UsageError: The folder holds no campaign.
+    """
+    manifest = folder / MANIFEST
+    try:
+        described = json.loads(manifest.read_text())
+        return (
+            Protocol.model_validate(described["protocol"]),
+            Config.model_validate(described["config"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"{folder} holds no campaign that could go on.",
+            f"{manifest.name}: {error}",
+            "Name the folder that `rig record` made.",
+        ) from error
+
+
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
 ) -> list[RunPlan]:
@@ -130,7 +152,7 @@ def open_campaign_folder(
         write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
     plans = protocol.plans()
     check_disk_space(folder, plans)
-    return [plan for plan in plans if not _log_path(folder, plan).exists()]
+    return [plan for plan in plans if not _is_recorded(_log_path(folder, plan))]
 
 
 def record_campaign(
@@ -227,7 +249,7 @@ def _new_log(
         Attached("config.json", "application/json", settings),
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
     ]
-    _set_aside_part(path)
+    _set_aside(path)
     streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
     return LogWriter(path, info, streams, attachments=attachments)
 
@@ -250,8 +272,6 @@ def _end_of_run(
     result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
 ) -> RunEnd:
     return RunEnd(
-        clean=result.complete,
-        reason="" if result.complete else result.remark,
         expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
         counters=counters,
         zeros_after=_mean_counts(after),
@@ -268,15 +288,23 @@ def _log_path(folder: Path, plan: RunPlan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 
-def _set_aside_part(path: Path) -> None:
-    """Rename what an aborted run left, so that the run can be made again and nothing is lost."""
-    part = path.with_name(path.name + PART_SUFFIX)
-    attempt = 1
-    while part.exists():
-        aside = path.with_name(f"{path.stem}.aborted-{attempt}.mcap{PART_SUFFIX}")
-        if not aside.exists():
-            part.rename(aside)
-        attempt += 1
+def _is_recorded(path: Path) -> bool:
+    """Say whether a run went to its end; one that was aborted is made again."""
+    if not path.exists():
+        return False
+    end = read_log(path, topics=(), tolerant=True, checksums=False).end
+    return end is not None and end.clean
+
+
+def _set_aside(path: Path) -> None:
+    """Rename what an aborted attempt left: the run can be made again and nothing is lost."""
+    for ending in (".mcap", ".mcap" + PART_SUFFIX):
+        left = path.with_name(path.stem + ending)
+        attempts = itertools.count(1)
+        while left.exists():
+            aside = path.with_name(f"{path.stem}.aborted-{next(attempts)}{ending}")
+            if not aside.exists():
+                left.rename(aside)
 
 
 def _epoch_ns(session: Session, folder: Path) -> int:

@@ -7,8 +7,7 @@ first, and the disarming is confirmed by the logger itself.
 
 import signal
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -19,23 +18,14 @@ from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
 from drivers.errors import DriverError
-from drivers.teensy.driver import SampleBatch, TeensyLogger
-from drivers.teensy.protocol import (
-    MAX_SETPOINTS,
-    STATUS_ARMED,
-    STATUS_LIMIT_TRIPPED,
-    STATUS_QUEUE_DRY,
-    STATUS_SATURATED,
-    STATUS_WATCHDOG_TRIPPED,
-    TICK_US,
-    Identity,
-    Limits,
-)
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity
 from drivers.transport.transport import Transport
-from estimation.recording import Flag
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
 from rig.motion import settling
+from rig.reading import Reading, reading_of, with_setpoints
+from rig.safety import board_limits, check_board, check_samples, check_setpoints
 
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
@@ -51,49 +41,6 @@ STALL_S = 1.0
 
 class LoggerStalledError(RigError):
     """The logger sends nothing although it should stream at 1 kHz."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """A stretch of samples, as counts and in SI.
-
-    Attributes:
-        counts: Raw samples, structured, shape (n,).
-        tick_us: Device clock without its wrap, us, shape (n,).
-        time_s: Device clock since the session's first sample, s, shape (n,).
-        columns: SI channels, closing-positive, each of shape (n,).
-        flags: `Flag` bits, shape (n,).
-        setpoint: Index of the setpoint played in each sample, -1 where none was, shape (n,).
-        lost: Samples lost since the session began.
-    """
-
-    counts: NDArray[np.void]
-    tick_us: NDArray[np.int64]
-    time_s: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
-    flags: NDArray[np.uint8]
-    setpoint: NDArray[np.int64]
-    lost: int
-
-    @property
-    def armed(self) -> bool:
-        """Whether the logger was armed in the newest sample."""
-        return bool(_has(self.counts["status"], STATUS_ARMED)[-1])
-
-    def __len__(self) -> int:
-        return int(self.time_s.size)
-
-    def where(self, keep: NDArray[np.bool_]) -> "Reading":
-        """Return the samples a mask keeps."""
-        return Reading(
-            self.counts[keep],
-            self.tick_us[keep],
-            self.time_s[keep],
-            {name: values[keep] for name, values in self.columns.items()},
-            self.flags[keep],
-            self.setpoint[keep],
-            self.lost,
-        )
 
 
 class Session:
@@ -119,7 +66,7 @@ class Session:
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
-            ways_out.callback(self._logger.close)
+            ways_out.callback(self._close)
             self.identity = self._logger.identify()
             ways_out.callback(self._stop_streaming)
             ways_out.enter_context(_sigterm_as_interrupt())
@@ -191,21 +138,24 @@ class Session:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
+        limits = self.config.limits
+        check_setpoints(limits, target_angle_rad, load_command_a)
         targets = self._to_counts("target_angle_rad", target_angle_rad)
         loads_ma = self._to_counts("load_command_a", load_command_a)
-        self._check_setpoints(target_angle_rad, load_command_a)
         lead = round(LEAD_S * TICKS_A_SECOND)
-        self._logger.arm(self.config.controller.gains(), self._board_limits())
+        self._logger.arm(self.config.controller.gains(), board_limits(limits, self.calibrations))
         queued = played = 0
+        newest_sequence: int | None = None
         while played < targets.size:
             while queued < min(played + lead, targets.size):
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
                 self._logger.queue(targets[block], loads_ma[block])
                 queued = block.stop
             reading = self._read()
-            self._check_board(reading)
-            reading = _number(reading, played)
+            check_board(reading)
+            reading = with_setpoints(reading, played, targets.size, newest_sequence)
             played = max(played, int(reading.setpoint.max()) + 1)
+            newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading
 
     def settle(self) -> None:
@@ -228,10 +178,16 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
-        reading = self._convert(batch)
+        if self._first_tick_us is None:
+            self._first_tick_us = int(batch.tick_us[0])
+        reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
         self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
-        self._check_limits(reading)
+        try:
+            check_samples(self.config.limits, reading)
+        except SafetyTripError:
+            self.safe()
+            raise
         return reading
 
     def _follow_clock(self) -> None:
@@ -239,91 +195,9 @@ class Session:
         if exchange is not None:
             self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
 
-    def _convert(self, batch: SampleBatch) -> Reading:
-        if self._first_tick_us is None:
-            self._first_tick_us = int(batch.tick_us[0])
-        status = batch.samples["status"]
-        flags = np.zeros(len(status), np.uint8)
-        flags[_has(status, STATUS_SATURATED)] |= np.uint8(Flag.SATURATED)
-        flags[_has(status, STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED)] |= np.uint8(
-            Flag.SUSPECT
-        )
-        flags[_has(status, STATUS_ARMED) & _has(status, STATUS_QUEUE_DRY)] |= np.uint8(Flag.STALE)
-        return Reading(
-            batch.samples,
-            batch.tick_us,
-            np.multiply(batch.tick_us - self._first_tick_us, 1e-6),
-            self.calibrations.apply(batch.samples, self.zeros),
-            flags,
-            np.full(len(flags), -1),
-            batch.lost,
-        )
-
     def _to_counts(self, channel: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
         line = self.calibrations.channels[channel]
         return np.round(values / line.slope + line.zero_counts).astype(np.int32)
-
-    def _board_limits(self) -> Limits:
-        """Return the limits the board checks itself, in its own counts."""
-        limits = self.config.limits
-        low, high = sorted(
-            self._to_counts("spindle_angle_rad", np.array([-1.0, 1.0]) * limits.spindle_angle_rad)
-        )
-        return Limits(
-            max_current=self._size("motor_current_a", limits.motor_current_a),
-            max_load_ma=self._size("load_command_a", limits.load_command_a),
-            max_proximal=self._size("proximal_torque_n_m", limits.proximal_torque_n_m),
-            max_distal=self._size("distal_torque_n_m", limits.distal_torque_n_m),
-            min_spindle=int(low),
-            max_spindle=int(high),
-        )
-
-    def _size(self, channel: str, value: float) -> int:
-        """Return a size in SI as counts, zeros left aside."""
-        return round(abs(value / self.calibrations.channels[channel].slope))
-
-    def _check_setpoints(
-        self, target_angle_rad: NDArray[np.float64], load_command_a: NDArray[np.float64]
-    ) -> None:
-        limits = self.config.limits
-        for name, values, limit in (
-            ("spindle_angle_rad", target_angle_rad, limits.spindle_angle_rad),
-            ("load_command_a", load_command_a, limits.load_command_a),
-        ):
-            if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > limit:
-                raise SafetyTripError(
-                    f"The trajectory asks for {name} = {np.abs(values).max():.3g}.",
-                    f"The configured limit is {limit:g}; nothing was moved.",
-                    f"Change the protocol, or [limits] {name} if the rig can take it.",
-                )
-
-    def _check_limits(self, reading: Reading) -> None:
-        for name, limit in self.config.limits.model_dump().items():
-            values = reading.columns.get(name)
-            if values is None or values.size == 0:
-                continue
-            worst = float(np.abs(values).max())
-            if worst > limit:
-                self.safe()
-                raise SafetyTripError(
-                    f"{name} reached {worst:.3g}, the limit is {limit:g}.",
-                    f"At {reading.time_s[int(np.abs(values).argmax())]:.3f} s of the session;"
-                    " the rig is disarmed.",
-                    "Find out what the jaw met before going on; limits stand under [limits].",
-                )
-
-    def _check_board(self, reading: Reading) -> None:
-        status = int(np.bitwise_or.reduce(reading.counts["status"]))
-        for bit, what, why in (
-            (STATUS_LIMIT_TRIPPED, "The logger tripped one of its own limits.", ""),
-            (
-                STATUS_WATCHDOG_TRIPPED,
-                "The logger's watchdog tripped.",
-                "It heard nothing from this computer for 250 ms while armed.",
-            ),
-        ):
-            if status & bit:
-                raise SafetyTripError(what, why, "The rig is in its safe state until armed again.")
 
     def _stop_streaming(self) -> None:
         try:
@@ -335,25 +209,14 @@ class Session:
                 "Cut the motor supply by hand and look at the rig.",
             ) from error
         finally:
-            self._logger.stop()
+            # a logger that did not confirm will not answer this either; the first error counts
+            with suppress(DriverError):
+                self._logger.stop()
 
-
-def _has(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
-    present: NDArray[np.bool_] = (status & np.uint16(bits)) != 0
-    return present
-
-
-def _number(reading: Reading, played: int) -> Reading:
-    """Number the setpoints of a reading, `played` being the first one not played yet.
-
-    The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
-    are taken to have played theirs: the sequence numbers say how many there were.
-    """
-    dry = _has(reading.counts["status"], STATUS_QUEUE_DRY)
-    step = np.diff(reading.counts["sequence"].astype(np.int64), prepend=0)
-    step[0] = 1
-    setpoint = played - 1 + np.cumsum(np.where(dry, 0, step))
-    return replace(reading, setpoint=np.where(dry, -1, setpoint))
+    def _close(self) -> None:
+        """Let go of the link; whether the rig was disarmed has been settled before."""
+        with suppress(DriverError):
+            self._logger.close()
 
 
 @contextmanager

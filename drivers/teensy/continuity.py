@@ -36,8 +36,10 @@ class Continuity:
         if not len(samples):
             return samples, np.empty(0, np.int64)
         before = self._last_sequence
-        numbers: NDArray[np.int64] = samples["sequence"].astype(np.int64)
-        steps: NDArray[np.int64] = np.diff(numbers, prepend=before % _WRAP)
+        steps = _steps(samples["sequence"], before)
+        if (steps == 1).all():
+            self._last_sequence = before + len(samples)
+            return samples, self._unwrap(samples["tick_us"])
         sequence = before + np.cumsum((steps + _WRAP // 2) % _WRAP - _WRAP // 2)
         newest_before = np.maximum.accumulate(np.concatenate(([before], sequence[:-1])))
         fresh = sequence > newest_before
@@ -50,13 +52,20 @@ class Continuity:
             self._counters.lost += int(missing.sum())
             self.lost += int(missing.sum())
             self._last_sequence = int(sequence[-1])
-        return samples, self._unwrap(samples["tick_us"].astype(np.int64))
+        return samples, self._unwrap(samples["tick_us"])
 
-    def _unwrap(self, wrapped_us: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _unwrap(self, wrapped_us: NDArray[np.uint32]) -> NDArray[np.int64]:
         if not len(wrapped_us):
-            return wrapped_us
+            return np.empty(0, np.int64)
         last_us = int(wrapped_us[0]) if self._last_tick_us is None else self._last_tick_us
-        steps_us: NDArray[np.int64] = np.diff(wrapped_us, prepend=last_us)
-        tick_us = last_us + np.cumsum(steps_us % _WRAP)
+        tick_us = last_us + np.cumsum(_steps(wrapped_us, last_us))
         self._last_tick_us = int(tick_us[-1])
         return tick_us
+
+
+def _steps(wrapped: NDArray[np.uint32], before: int) -> NDArray[np.int64]:
+    """Return how far a 32-bit count went with each value, 0 to 2^32 - 1, from `before` on."""
+    count = np.empty(len(wrapped) + 1, np.uint32)
+    count[0] = before % _WRAP
+    count[1:] = wrapped
+    return (count[1:] - count[:-1]).astype(np.int64)

@@ -139,14 +139,22 @@ class TeensyLogger:
             limits: What the board holds against every sample.
 
         Raises:
-            CommandRefusedError: A gain or a limit is not finite or out of range.
+            CommandRefusedError: A gain or a limit is not finite or out of range, or the board
+                tripped at once.
         """
         self._require_identity()
         values = np.asarray(gains, np.float64)
         if values.shape != (len(protocol.GAIN_NAMES),):
             raise DriverError(f"The controller has 5 gains, not {values.shape}.")
         self._may_be_armed = True
-        self._command(Kind.ARM, protocol.encode_arm(self._number(), values, limits))
+        ack = self._command(Kind.ARM, protocol.encode_arm(self._number(), values, limits))
+        if not ack.status & protocol.STATUS_ARMED:
+            raise CommandRefusedError(
+                f"The board at {self._link.transport.url} was armed and is not any more.",
+                "It tripped before its answer came through.",
+                "Look at the status of its samples, then arm it again.",
+                Result.NOT_ARMED,
+            )
 
     def start(self) -> None:
         """Start the stream of samples; their sequence numbers begin at 0."""

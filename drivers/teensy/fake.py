@@ -8,7 +8,7 @@ test holds the two against each other byte for byte.
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ SAMPLE_WIRE = SAMPLE_DTYPE.itemsize + 4
 """Bytes of a sample frame on the wire."""
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
 _LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
-_ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS, Kind.STOP)
+_ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
 
 
@@ -299,8 +299,9 @@ class TeensyFake:
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]
         samples["target"] = target[:fitting]
-        for name, column in _COLUMNS.items():
-            samples[name] = _clip(counts[:fitting, column], samples.dtype[name])
+        within = np.clip(counts[:fitting], _LOWEST, _HIGHEST)
+        for column, name in enumerate(_COLUMNS):
+            samples[name] = within[:, column]
         samples["dropped"] = self._dropped
         self._sequence = (self._sequence + ticks) % 2**32
         self._dropped = (self._dropped + ticks - fitting) % 2**16
@@ -308,23 +309,20 @@ class TeensyFake:
             self._out += encode_frames(samples.view(np.uint8).reshape(fitting, -1))
 
 
-_COLUMNS = {
-    "motor": MOTOR,
-    "spindle": SPINDLE,
-    "jaw": JAW,
-    "proximal": PROXIMAL,
-    "distal": DISTAL,
-    "current": CURRENT,
-    "fsr": FSR,
-    "command_e4": COMMAND_E4,
-    "load_ma": LOAD_MA,
-}
-
-
-def _clip(counts: NDArray[np.int32], kind: np.dtype[Any]) -> NDArray[np.int32]:
-    """Hold counts within the range of their field in a sample."""
-    bounds = np.iinfo(kind)
-    return np.clip(counts, bounds.min, bounds.max)
+_COLUMNS = (
+    "motor",
+    "spindle",
+    "jaw",
+    "proximal",
+    "distal",
+    "current",
+    "fsr",
+    "command_e4",
+    "load_ma",
+)
+_RANGES = [np.iinfo(SAMPLE_DTYPE[name]) for name in _COLUMNS]
+_LOWEST = np.array([bounds.min for bounds in _RANGES])
+_HIGHEST = np.array([bounds.max for bounds in _RANGES])
 
 
 def _saturation(counts: NDArray[np.int32]) -> NDArray[np.uint16]:

@@ -261,7 +261,16 @@ def encode_hello_reply(sequence: int, serial: str, protocol_hash: int = PROTOCOL
 
 def encode_ack(ack: Ack) -> bytes:
     """Return the payload of an acknowledgement."""
-    return np.array((VERSION, Kind.ACK, *astuple(ack)), ACK_DTYPE).tobytes()
+    fields = (
+        VERSION,
+        Kind.ACK,
+        ack.sequence,
+        ack.command,
+        ack.result,
+        ack.status,
+        ack.queue_free,
+    )
+    return np.array(fields, ACK_DTYPE).tobytes()
 
 
 def encode_pong(sequence: int, token: int, tick_us: int) -> bytes:

@@ -98,7 +98,7 @@ class Board {
             acknowledge(kind, sequence, last_result_);  // a repeat: its answer was lost
         } else {
             const Result result = execute(kind, payload + kHeaderSize, size - kHeaderSize);
-            if (kind != kDisarm) {
+            if (kind == kArm || kind == kStart || kind == kSetpoints) {
                 has_last_ = true;
                 last_kind_ = kind;
                 last_sequence_ = sequence;

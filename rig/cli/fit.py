@@ -45,4 +45,20 @@ def fit(
         model_file.write(fitted, out)
         screen.print(f"Model: {out}", markup=False)
     if json_:
-        emit_json({"model": fitted, "held_out": error, "out": out})
+        parameters = [
+            {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, fitted.target)}
+            | {"estimate": term.values[p.name]}
+            for term in fitted.terms
+            for p in term.parameters
+        ]
+        emit_json(
+            {
+                "model": fitted.name,
+                "target": fitted.target,
+                "unit": fitted.unit,
+                "parameters": parameters,
+                "evidence": fitted.evidence,
+                "held_out": error,
+                "out": out,
+            }
+        )

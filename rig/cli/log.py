@@ -114,6 +114,7 @@ def _logs(path: Path) -> list[Path]:
 def _described(log: "LogFile") -> dict[str, Any]:
     """Return what `info` tells about a log."""
     from rig.log.check import stream_time_s
+    from rig.log.convert import exclusion
 
     topics = []
     for name, topic in log.topics.items():
@@ -140,6 +141,7 @@ def _described(log: "LogFile") -> dict[str, Any]:
         "marks": log.marks,
         "stretches": log.stretches,
         "attachments": {item.name: len(item.data) for item in log.attachments},
+        "excluded": exclusion(log),
         "damaged": bool(log.damage),
     }
 
@@ -154,7 +156,8 @@ def _show_info(log: dict[str, Any]) -> None:
         conditions = ", ".join(f"{name} = {value}" for name, value in run.conditions.items())
         screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions or '-'}")
         screen.print(f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}")
-        screen.print(f"  excluded: {run.excluded}" if run.excluded else "  counts as evidence")
+        excluded = log["excluded"]
+        screen.print(f"  excluded: {excluded}" if excluded else "  counts as evidence")
     state = "not closed" if end is None else "clean" if end.clean else f"not clean: {end.reason}"
     screen.print(f"  end {state}{'; the file is damaged' if log['damaged'] else ''}")
     table = Table(box=None, pad_edge=True)

@@ -11,8 +11,9 @@ from rig.cli.output import JsonFlag, console, emit_json, progress
 
 def record(
     protocol: Annotated[
-        str, typer.Option("--protocol", "-p", help="Protocol file, or a shipped one by name.")
-    ] = "quick",
+        str | None,
+        typer.Option("--protocol", "-p", help="Protocol file or shipped name; quick if none."),
+    ] = None,
     config: Annotated[
         Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
     ] = None,
@@ -29,17 +30,27 @@ def record(
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
     from rig.config import load_config
+    from rig.errors import UsageError
     from rig.logger import open_logger
     from rig.protocol import load_protocol
-    from rig.record import RunResult, open_campaign_folder, record_campaign
+    from rig.record import RunResult, open_campaign_folder, read_manifest, record_campaign
     from rig.session import Session
 
     screen = console()
-    settings = load_config(config)
-    if seed is not None:
-        settings = settings.changed(simulation={"seed": seed})
-    plan = load_protocol(protocol)
-    folder = resume or out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
+    if resume is not None:
+        if (protocol, config, out, seed) != (None, None, None, None):
+            raise UsageError(
+                "--resume goes on as the campaign was begun.",
+                "Protocol, configuration, folder and seed are those of the campaign.",
+                f"Type `rig record --resume {resume}` alone.",
+            )
+        plan, settings = read_manifest(resume)
+        folder = resume
+    else:
+        plan, settings = load_protocol(protocol or "quick"), load_config(config)
+        if seed is not None:
+            settings = settings.changed(simulation={"seed": seed})
+        folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
     results: list[RunResult] = []

@@ -7,9 +7,11 @@ from estimation.campaign import Campaign, Run
 from estimation.recording import Recording
 from rig.errors import DataError
 from rig.log.check import logs_in, looks_like_log
-from rig.log.convert import SAMPLE_TOPIC, exclusion, recording_from_log
+from rig.log.convert import exclusion, recording_from_log
 from rig.log.reader import LogFile, damaged, read_log
 from rig.log.repair import repaired_path
+from rig.log.streams import SAMPLE
+from rig.log.writer import PART_SUFFIX
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,9 @@ class LogImporter:
 
     In a folder the runs stand in the order they were started, those without a recorded start by
     file name before them. A repaired log stands in for its original. A log whose recorder did not
-    close it is opened too, excluded from evidence with the reason.
+    close it is opened too, excluded from evidence with the reason. Where a run was tried again, its
+    earlier attempts are left out: a log that ended as planned stands for all of that run's logs
+    that did not, and where none did, the last one stands.
     """
 
     name: str = "log"
@@ -42,7 +46,7 @@ class LogImporter:
             )
         heads = [_head(item) for item in paths]
         heads.sort(key=lambda log: (log.run.started_at_ns or 0) if log.run else 0)
-        return Campaign(tuple(_run(log) for log in heads))
+        return Campaign(tuple(_run(log) for log in _last_attempts(heads)))
 
 
 def _head(path: Path) -> LogFile:
@@ -54,21 +58,41 @@ def _head(path: Path) -> LogFile:
             "The record of the run is missing: the file is damaged, or not written by rig.",
             f"Run `rig log check {path}`.",
         )
-    if log.end is not None and log.damage:
+    if log.damage and not _unfinished(log):
         raise damaged(log)
     return log
 
 
+def _last_attempts(heads: list[LogFile]) -> list[LogFile]:
+    """Leave out the logs of runs that were tried again."""
+    attempts: dict[str, list[LogFile]] = {}
+    for log in heads:
+        attempts.setdefault(_name(log), []).append(log)
+    kept = []
+    for same in attempts.values():
+        planned = [log for log in same if not _unfinished(log) and log.end and log.end.clean]
+        kept += planned or same[-1:]
+    return [log for log in heads if log in kept]
+
+
+def _name(log: LogFile) -> str:
+    return log.run.name if log.run else log.path.stem
+
+
+def _unfinished(log: LogFile) -> bool:
+    """Whether its recorder did not finish the log."""
+    return log.end is None or log.path.suffix == PART_SUFFIX
+
+
 def _run(head: LogFile) -> Run:
     path = head.path
-    unfinished = head.end is None
+    unfinished = _unfinished(head)
 
     def load() -> Recording:
-        topics = None if unfinished else (SAMPLE_TOPIC,)
+        topics = None if unfinished else (SAMPLE,)
         return recording_from_log(read_log(path, topics, tolerant=unfinished))
 
-    name = head.run.name if head.run else path.stem
-    return Run(name, load=load, source=path, excluded=exclusion(head))
+    return Run(_name(head), load=load, source=path, excluded=exclusion(head))
 
 
 IMPORTER = LogImporter()

@@ -11,7 +11,8 @@ from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.replay import EstimateStream
 from rig.motion import motion_of
 from rig.protocol import RunPlan
-from rig.session import Reading, Session
+from rig.reading import Reading
+from rig.session import Session
 
 ZERO_S = 0.5
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import ExitCode
-from rig.log.container import MAGIC
+from rig.log.container import LIBRARY, MAGIC
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.scan import Damage
-from rig.log.writer import LIBRARY, PART_SUFFIX
+from rig.log.writer import PART_SUFFIX
 
 PLAN_TOLERANCE = 1e-3
 """Relative shortfall against the plan that two clocks explain."""
@@ -151,7 +151,8 @@ def report_on(log: LogFile) -> LogReport:
     topics = tuple(_topic_report(log, name, topic) for name, topic in log.topics.items())
     incomplete = [problem for topic in topics for problem in _shortfalls(topic)]
     damage = [item.what for item in log.damage]
-    if log.library.startswith(f"{LIBRARY} "):
+    if written_by_rig(log):
+        damage += [f"the definition of {name} is damaged" for name in log.unread]
         if log.run is None:
             damage.append("what was known about the run is lost")
         if log.end is None:
@@ -171,6 +172,11 @@ def report_on(log: LogFile) -> LogReport:
         damage=log.damage,
         unchecked_chunks=log.unchecked_chunks,
     )
+
+
+def written_by_rig(log: LogFile) -> bool:
+    """Whether a log states that rig wrote it, and so must have all that rig writes."""
+    return log.library.startswith(f"{LIBRARY} ")
 
 
 def _topic_report(log: LogFile, name: str, topic: Topic) -> TopicReport:
@@ -210,8 +216,8 @@ def stream_time_s(topic: Topic) -> NDArray[np.float64]:
         return time_s
     if not len(topic):
         return np.empty(0)
-    first = topic.log_time_ns.min()
-    return (topic.log_time_ns - first).astype(np.float64) * 1e-9
+    elapsed_ns: NDArray[np.uint64] = topic.log_time_ns - topic.log_time_ns.min()
+    return elapsed_ns.astype(np.float64) * 1e-9
 
 
 def not_finite(topic: Topic) -> NDArray[np.bool_]:

@@ -1,65 +1,16 @@
 """Between a log and a recording: every field of a recording survives the way there and back."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.channels import describe
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
 from rig.log.reader import LogFile
 from rig.log.run import RunEnd, RunInfo
-from rig.log.schema import Field, Stream
+from rig.log.streams import SAMPLE, sample_stream
 from rig.log.writer import LogWriter
-
-SAMPLE_TOPIC = "/rig/sample"
-COUNTS_TOPIC = "/rig/counts"
-
-_SEQUENCE = Field("sequence", "uint32", "", "counts the samples, lost ones too; wraps")
-
-
-def sample_stream(channels: Iterable[str], rate_hz: float | None = None) -> Stream:
-    """Return the stream of samples in SI units.
-
-    Args:
-        channels: Channel names without `time_s`, each ending in its unit.
-        rate_hz: Expected rate, Hz.
-
-    Raises:
-        UnknownUnitError: A name carries no unit.
-        LayoutError: A name is not possible in ROS 2.
-    """
-    fields = [
-        Field(channel.name, "float64", channel.unit, channel.description)
-        for channel in map(describe, ("time_s", *channels))
-    ]
-    flags = Field("flags", "uint32", "", "1 saturated, 2 stale, 4 missing, 8 suspect")
-    return Stream(SAMPLE_TOPIC, "rig_msgs/msg/Sample", (*fields, _SEQUENCE, flags), rate_hz)
-
-
-def counts_stream(rate_hz: float | None = None) -> Stream:
-    """Return the stream of raw counts as the logger board sends them, with the rig's raw signs."""
-    counts = {
-        "motor": "motor encoder count",
-        "spindle": "spindle encoder count",
-        "jaw": "jaw encoder count",
-        "target": "target of the spindle, encoder count",
-        "proximal": "torque sensor at the spindle, converter count",
-        "distal": "torque sensor at the jaw, converter count",
-        "current": "motor current, converter count",
-        "fsr": "force-sensing resistor, converter count",
-        "command_e4": "motor command, 1e-4 of full scale",
-        "load_ma": "current commanded to the load motor, mA",
-    }
-    fields = [Field(name, "int32", "", text) for name, text in counts.items()]
-    others = (
-        _SEQUENCE,
-        Field("tick_us", "uint32", "", "clock of the board, microseconds; wraps"),
-        Field("status", "uint32", "", "status bits of the board"),
-    )
-    return Stream(COUNTS_TOPIC, "rig_msgs/msg/Counts", (*fields, *others), rate_hz)
 
 
 def log_times_ns(time_s: FloatArray, started_at_ns: int | None) -> NDArray[np.uint64]:
@@ -114,7 +65,7 @@ def write_recording(path: Path, recording: Recording) -> Path:
         DataError: Metadata or times cannot be written.
     """
     rate_hz = recording.sample_rate_hz if len(recording) > 1 else None
-    stream = sample_stream(recording.columns, rate_hz)
+    stream = sample_stream(tuple(recording.columns), rate_hz)
     log_time_ns = log_times_ns(recording.time_s, recording.started_at_ns)
     sequence = np.arange(len(recording), dtype=np.uint32)
     rows: dict[str, NDArray[np.generic]] = {
@@ -129,8 +80,8 @@ def write_recording(path: Path, recording: Recording) -> Path:
             writer.mark(mark)
         for stretch in recording.stretches:
             writer.stretch(stretch)
-        writer.write(SAMPLE_TOPIC, rows, log_time_ns)
-        return writer.close(RunEnd(expected_samples={SAMPLE_TOPIC: len(recording)}))
+        writer.write(SAMPLE, rows, log_time_ns)
+        return writer.close(RunEnd(expected_samples={SAMPLE: len(recording)}))
     except BaseException:
         writer.discard()
         raise
@@ -150,14 +101,14 @@ def recording_from_log(log: LogFile) -> Recording:
             holds unknown flags.
         RecordingError: The samples' time does not increase.
     """
-    if SAMPLE_TOPIC not in log.topics or log.run is None:
+    if SAMPLE not in log.topics or log.run is None:
         raise DataError(
             f"{log.path} holds no run of the rig.",
             f"It has the topics {', '.join((*log.topics, *log.unread)) or 'none'}"
             f" and {'a' if log.run else 'no'} record of the run.",
             f"Run `rig log check {log.path}`.",
         )
-    topic = log.topics[SAMPLE_TOPIC]
+    topic = log.topics[SAMPLE]
     if (topic.rows["flags"] > np.iinfo(np.uint8).max).any():
         raise DataError(
             f"{log.path} holds flags this version does not know.",

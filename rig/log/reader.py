@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from mcap.records import Channel
 from numpy.typing import NDArray
 
 from estimation.recording import Mark, Stretch
 from rig.errors import DataError, UsageError
 from rig.log.chunks import Layout, read_chunks
-from rig.log.container import Attached
+from rig.log.container import LIBRARY, Attached
 from rig.log.run import (
     END_RECORD,
     MARK_RECORD,
@@ -23,7 +24,7 @@ from rig.log.run import (
     from_metadata,
 )
 from rig.log.scan import Damage, NotALogError, Skeleton, scan
-from rig.log.schema import LayoutError, Stream
+from rig.log.schema import CHECKSUM_KEY, LayoutError, Stream
 
 
 class DamagedLogError(DataError):
@@ -177,22 +178,34 @@ def _layouts(skeleton: Skeleton) -> tuple[dict[int, Layout], tuple[str, ...]]:
     """Return the layout of each channel of fixed size by number, and the topics of the others."""
     layouts: dict[int, Layout] = {}
     unread = []
-    for number, channel in skeleton.channels.items():
-        schema = skeleton.schemas.get(channel.schema_id)
-        try:
-            if schema is None or (schema.encoding, channel.message_encoding) != ("ros2msg", "cdr"):
-                raise LayoutError(f"{channel.topic} is not ROS 2 CDR.")
-            rate = channel.metadata.get("rate_hz")
-            stream = Stream.from_definition(
-                channel.topic, schema.name, schema.data.decode(), float(rate) if rate else None
-            )
-            if any(layout.topic == stream.topic for layout in layouts.values()):
-                raise LayoutError(f"{channel.topic} has two channels.")
-        except (LayoutError, ValueError):
-            unread.append(channel.topic)
-            continue
-        layouts[number] = Layout(channel.topic, stream)
+    for number, channels in skeleton.channels.items():
+        taken = {layout.topic for layout in layouts.values()}
+        stream = _stream(skeleton, channels)
+        if stream is None or stream.topic in taken:
+            unread.append(channels[0].topic)
+        else:
+            layouts[number] = Layout(stream.topic, stream)
     return layouts, tuple(unread)
+
+
+def _stream(skeleton: Skeleton, channels: list[Channel]) -> Stream | None:
+    """Return the stream of a channel, from the first of its records that is sound."""
+    for channel in channels:
+        for schema in skeleton.schemas.get(channel.schema_id, []):
+            if (schema.encoding, channel.message_encoding) != ("ros2msg", "cdr"):
+                continue
+            rate = channel.metadata.get("rate_hz")
+            try:
+                stream = Stream.from_definition(
+                    channel.topic, schema.name, schema.data.decode(), float(rate) if rate else None
+                )
+            except (LayoutError, ValueError):
+                continue
+            stated = channel.metadata.get(CHECKSUM_KEY)
+            ours = skeleton.library.startswith(f"{LIBRARY} ")
+            if stated == stream.checksum or (stated is None and not ours):
+                return stream
+    return None
 
 
 def _with_records(log: LogFile, metadata: list[tuple[str, dict[str, str]]]) -> LogFile:

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from rig.errors import DataError, UsageError
-from rig.log.check import LogReport, Verdict, report_on
+from rig.log.check import LogReport, Verdict, report_on, written_by_rig
+from rig.log.container import LIBRARY
 from rig.log.reader import LogFile, read_log
 from rig.log.run import RunEnd, RunInfo
-from rig.log.writer import LIBRARY, PART_SUFFIX, LogWriter
+from rig.log.writer import PART_SUFFIX, LogWriter
 
 REPAIR_RECORD = "rig.repair"
 
@@ -67,7 +68,7 @@ def repair_log(path: Path, out: Path | None = None) -> RepairReport:
     result = RepairReport(path, None, recovered, lost, dict(log.salvaged), report.problems)
     if report.verdict is not Verdict.DAMAGED:
         return result
-    if log.unread or not log.topics:
+    if not log.topics or (log.unread and not written_by_rig(log)):
         raise RepairError(
             f"{path} holds nothing that can be repaired.",
             f"Its topics are: {', '.join(log.unread) or 'none'}; a repair knows messages of fixed"

@@ -1,18 +1,21 @@
 """What is known about a run before and after it is recorded, and how it is kept in a log.
 
-Both are MCAP metadata records: one text per field, each of them JSON. `rig.run` is written first,
-so that a killed recorder does not lose it. `rig.end` is written last; its absence means that the
+Both are MCAP metadata records: one text per field, each of them JSON, and a checksum, since MCAP
+has none there and a flipped bit in a condition would go unnoticed. `rig.run` is written first, so
+that a killed recorder does not lose it. `rig.end` is written last; its absence means that the
 recorder did not close the file.
 """
 
 import json
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from estimation.recording import Flag, Instrument, Mark, Stretch
 from rig.errors import DataError
+from rig.log.schema import CHECKSUM_KEY
 
 RUN_RECORD = "rig.run"
 END_RECORD = "rig.end"
@@ -101,15 +104,23 @@ def to_metadata(record: Record) -> dict[str, str]:
                 "Metadata holds text, finite numbers, lists and tables of them.",
                 "Leave out what is not known instead of writing NaN.",
             ) from None
-    return metadata
+    return metadata | {CHECKSUM_KEY: _checksum(metadata)}
+
+
+def _checksum(metadata: Mapping[str, str]) -> str:
+    """Return the CRC-32 of all entries but the checksum itself, eight hexadecimal digits."""
+    items = sorted(item for item in metadata.items() if item[0] != CHECKSUM_KEY)
+    return f"{zlib.crc32(json.dumps(items).encode()):08x}"
 
 
 def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
     """Return the record that `to_metadata` wrote; fields it does not know are ignored.
 
     Raises:
-        DataError: A value is not JSON, or of the wrong kind.
+        DataError: The record does not match its checksum, or a value is of the wrong kind.
     """
+    if metadata.get(CHECKSUM_KEY) != _checksum(metadata):
+        raise DataError(f"The {kind.__name__} record of the log does not match its checksum.")
     try:
         known = {item.name for item in fields(kind)}
         values = {name: json.loads(text) for name, text in metadata.items() if name in known}

@@ -8,7 +8,7 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -30,6 +30,8 @@ from mcap.records import (
 
 from rig.errors import DataError
 from rig.log.container import CHUNK_HEAD, MAGIC
+
+T = TypeVar("T", Schema, Channel)
 
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
@@ -104,12 +106,15 @@ class Indexed:
 
 @dataclass
 class Skeleton:
-    """Everything of a file but the messages in its chunks, in file order."""
+    """Everything of a file but the messages in its chunks, in file order.
+
+    Schemas and channels stand at the start and in the summary: where the two differ, both are kept.
+    """
 
     profile: str = ""
     library: str = ""
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, list[Schema]] = field(default_factory=dict)
+    channels: dict[int, list[Channel]] = field(default_factory=dict)
     chunks: list[ChunkRef] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
@@ -299,12 +304,14 @@ def _take(
 
 def _keep(
     skeleton: Skeleton,
-    known: dict[int, Schema] | dict[int, Channel],
-    record: Schema | Channel,
+    known: dict[int, list[T]],
+    record: T,
     position: int,
 ) -> None:
-    """Keep the first record of a number; a later one that differs is damage."""
-    if known.setdefault(record.id, record) != record:  # type: ignore[arg-type]
+    """Keep the first record of a number, and a later one that differs, which is damage."""
+    versions = known.setdefault(record.id, [record])
+    if record not in versions:
+        versions.append(record)
         what = f"{type(record).__name__.lower()} {record.id} differs from its first record"
         skeleton.damage.append(Damage(position, 0, what))
 

@@ -9,6 +9,7 @@ Sources: OMG DDS-XTypes 1.3, 7.4.1 (plain CDR); ROS 2 design article "Interface 
 
 import json
 import re
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,9 @@ MESSAGE_OPCODE = 5
 
 MESSAGE_HEAD_BYTES = 2 + 4 + 8 + 8
 """Bytes of an MCAP message record before its data: channel, sequence, log time, publish time."""
+
+CHECKSUM_KEY = "crc32"
+"""Where the checksum of a channel, and of a metadata record of ours, stands in its metadata."""
 
 _NAME = re.compile(r"[a-z](_?[a-z0-9])*")
 _TYPE = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
@@ -137,11 +141,23 @@ class Stream:
         )
 
     @property
+    def checksum(self) -> str:
+        """CRC-32 of topic, type, definition and rate, eight hexadecimal digits.
+
+        MCAP protects chunks and attachments, but not schemas and channels. Without this a flipped
+        bit in an unfinished log could rename a field or change its unit unnoticed.
+        """
+        rate = "" if self.rate_hz is None else repr(float(self.rate_hz))
+        whole = "\n".join([self.topic, self.message_type, rate, self.schema_text])
+        return f"{zlib.crc32(whole.encode()):08x}"
+
+    @property
     def channel_metadata(self) -> dict[str, str]:
-        """Units, descriptions and the expected rate as MCAP channel metadata (JSON values)."""
+        """Units, descriptions and expected rate (JSON), and the checksum, for the MCAP channel."""
         metadata = {
             "units": json.dumps({field.name: field.unit for field in self.fields}),
             "descriptions": json.dumps({field.name: field.description for field in self.fields}),
+            CHECKSUM_KEY: self.checksum,
         }
         if self.rate_hz is not None:
             metadata["rate_hz"] = json.dumps(self.rate_hz)

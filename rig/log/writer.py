@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.recording import Mark, Stretch
 from rig import __version__
 from rig.errors import RigError, UsageError
-from rig.log.container import Attached, Container
+from rig.log.container import LIBRARY, Attached, Container
 from rig.log.messages import Rows, message_records, packed_rows
 from rig.log.run import (
     END_RECORD,
@@ -38,9 +38,6 @@ from rig.log.run import (
 from rig.log.schema import Stream
 
 PART_SUFFIX = ".part"
-
-LIBRARY = "rig"
-"""What our logs name as the writing library, before the version."""
 
 MAX_LOSS_S = 0.25
 """The most data, s, that a killed recorder loses, if it calls `write` or `poll` every 50 ms."""

@@ -18,7 +18,16 @@ from numpy.typing import NDArray
 from drivers.teensy import control
 from drivers.teensy import limits as board_limits
 from rig.errors import UsageError
-from rig.simulation import hidden, noise, parameters, plant, sensors
+from rig.simulation import (
+    hidden,
+    hidden_cable,
+    hidden_drive,
+    hidden_sensors,
+    noise,
+    parameters,
+    plant,
+    sensors,
+)
 from rig.simulation.parameters import PlantParameters, SensorParameters
 
 REFERENCE_START_COUNT = 1366
@@ -40,7 +49,18 @@ def _fingerprint() -> str:
     It is the only closure variable: a function held that way would change the key in each process.
     """
     digest = hashlib.sha256()
-    for module in (control, board_limits, hidden, noise, parameters, plant, sensors):
+    for module in (
+        control,
+        board_limits,
+        hidden,
+        hidden_cable,
+        hidden_drive,
+        hidden_sensors,
+        noise,
+        parameters,
+        plant,
+        sensors,
+    ):
         digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 

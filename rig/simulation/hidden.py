@@ -1,13 +1,13 @@
 """Hidden effects: physics the simulated rig can hold and an estimator's model does not declare.
 
-Each effect is a compiled function of the plant's own quantities and one row of a table: a strength
-and up to two numbers that shape it. Strength 0 leaves the plant exactly as it is, bit for bit: the
-effect is not evaluated. Strength 1 is clear but not dominant. On the default rig, low-passed at
-50 Hz, effects of drive and gear are a quarter to three quarters of the variance that a linear
-balance leaves in motor current; effects of cable and jaw add 4 to 7 mN m rms to proximal torque or
-1 to 5 mrad to the jaw angle.
+Each effect is a compiled function (`hidden_drive`, `hidden_cable`, `hidden_sensors`) of the plant's
+own quantities and one row of a table, kept here: a strength and up to two numbers that shape it.
+Strength 0 leaves the plant exactly as it is, bit for bit: the effect is not evaluated. Strength 1
+is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are a
+quarter to three quarters of the variance that a linear balance leaves in motor current; effects of
+cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
 
-The forms are this module's own and are deliberately not those an estimator would try first
+The forms are these modules' own and are deliberately not those an estimator would try first
 (rational functions in place of exponentials, side bands, contact damping), so that finding an
 effect is not recognising one's own formula.
 """
@@ -16,7 +16,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -134,6 +133,122 @@ KINDS: tuple[Kind, ...] = (
         "spring of rising stiffness near the closed end",
         (Shape("contact_angle_rad", 0.8, 1.0),),
     ),
+    Kind(
+        "motor_asymmetry",
+        "extra friction of the motor on opening",
+        (Shape("motor_speed_rad_s", 0.5, 2.0),),
+    ),
+    Kind(
+        "motor_drag",
+        "friction of motor and gear that rises faster than the speed",
+        (Shape("motor_speed_rad_s", 16.0, 24.0),),
+    ),
+    Kind(
+        "current_ripple",
+        "torque constant that ripples k times a motor turn, modulated once a turn",
+        (Shape("periods_per_turn", 2.0, 6.0, whole=True), _PHASE),
+    ),
+    Kind(
+        "winding_heat",
+        "torque constant that falls as the winding warms",
+        (Shape("time_s", 3.0, 8.0),),
+    ),
+    Kind(
+        "torque_lag",
+        "motor torque behind the measured current by two lags in a row",
+        (Shape("time_s", 1.4e-3, 2.2e-3),),
+        strongest=1.2,
+    ),
+    Kind(
+        "gear_stiffening",
+        "gear that grows stiffer with its twist",
+        (Shape("twist_rad", 8e-3, 16e-3),),
+    ),
+    Kind(
+        "gear_two_state",
+        "friction that switches on at high speed and off at low speed",
+        (Shape("motor_speed_rad_s", 12.0, 20.0),),
+    ),
+    Kind(
+        "gear_angle_viscous",
+        "viscous friction beyond one spindle angle",
+        (Shape("spindle_angle_rad", -0.65, -0.4),),
+    ),
+    Kind(
+        "cable_growing_friction",
+        "friction of the cable that grows along its travel",
+        (Shape("spindle_angle_rad", -1.2, -1.0), Shape("width_rad", 0.3, 0.6)),
+    ),
+    Kind(
+        "cable_load_notch",
+        "worn spot of the cable that rubs in proportion to its tension",
+        (Shape("spindle_angle_rad", -0.75, -0.3), Shape("width_rad", 0.1, 0.2)),
+    ),
+    Kind(
+        "friction_step",
+        "friction of the cable that rises at one time",
+        (Shape("time_s", 5.0, 10.0),),
+    ),
+    Kind(
+        "cable_hysteresis",
+        "wires that rub on each other while the cable is stretched",
+        (Shape("stretch_rad", 0.02, 0.04),),
+    ),
+    Kind(
+        "spindle_ripple",
+        "torque ripple along the spindle angle, k periods a turn, with a second harmonic",
+        (Shape("periods_per_turn", 12.0, 30.0), _PHASE),
+    ),
+    Kind(
+        "eccentric_pulley",
+        "pulley whose lever arm varies along the spindle angle",
+        (Shape("periods_per_turn", 7.0, 14.0), _PHASE),
+    ),
+    Kind(
+        "jaw_mass",
+        "mass that moves with the jaw",
+        (),
+    ),
+    Kind(
+        "jaw_detent",
+        "notch the jaw falls into",
+        (Shape("jaw_angle_rad", 0.5, 0.9), Shape("width_rad", 0.08, 0.16)),
+    ),
+    Kind(
+        "proximal_bend",
+        "gain of the spindle's torque sensor that rises with torque",
+        (Shape("torque_n_m", 0.08, 0.15),),
+    ),
+    Kind(
+        "proximal_creep",
+        "creep of the spindle's torque sensor",
+        (Shape("time_s", 0.4, 1.2),),
+    ),
+    Kind(
+        "proximal_lag",
+        "spindle's torque sensor behind two lags in a row",
+        (Shape("time_s", 0.02, 0.04),),
+    ),
+    Kind(
+        "distal_drift",
+        "drift of the jaw torque sensor's zero, fast at first",
+        (Shape("time_s", 3.0, 9.0),),
+    ),
+    Kind(
+        "distal_crosstalk",
+        "motor current that the jaw's torque sensor picks up",
+        (Shape("current_a", 0.2, 0.5),),
+    ),
+    Kind(
+        "jaw_delay",
+        "jaw encoder that answers late, smeared over three ticks",
+        (Shape("delay_tick", 12.0, 28.0),),
+    ),
+    Kind(
+        "jaw_encoder_wave",
+        "error of the jaw encoder along its own angle, with a second harmonic",
+        (Shape("periods_per_turn", 10.0, 24.0), _PHASE),
+    ),
 )
 """Every kind of hidden effect; the place in this tuple is the row of the table."""
 
@@ -150,6 +265,29 @@ KINDS: tuple[Kind, ...] = (
     CABLE_CREEP,
     JAW_SPRING,
     END_STOP_SPRING,
+    MOTOR_ASYMMETRY,
+    MOTOR_DRAG,
+    CURRENT_RIPPLE,
+    WINDING_HEAT,
+    TORQUE_LAG,
+    GEAR_STIFFENING,
+    GEAR_TWO_STATE,
+    GEAR_ANGLE_VISCOUS,
+    CABLE_GROWING_FRICTION,
+    CABLE_LOAD_NOTCH,
+    FRICTION_STEP,
+    CABLE_HYSTERESIS,
+    SPINDLE_RIPPLE,
+    ECCENTRIC_PULLEY,
+    JAW_MASS,
+    JAW_DETENT,
+    PROXIMAL_BEND,
+    PROXIMAL_CREEP,
+    PROXIMAL_LAG,
+    DISTAL_DRIFT,
+    DISTAL_CROSSTALK,
+    JAW_DELAY,
+    JAW_ENCODER_WAVE,
 ) = range(len(KINDS))
 
 NAMES: tuple[str, ...] = tuple(kind.name for kind in KINDS)
@@ -216,115 +354,3 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
         values = [*effect.shape, *(shape.middle for shape in shapes[len(effect.shape) :])]
         rows[place] = [effect.strength, *values, *[0.0] * (2 - len(values))]
     return rows
-
-
-@numba.njit()
-def motor_ripple_n_m(row: Row, motor_angle_rad: float) -> float:
-    """Ripple at the motor shaft: A sin(k q + p) (1 + 0.35 sin q), A = 0.08 mN m at strength 1."""
-    carrier = math.sin(row[FIRST] * motor_angle_rad + row[SECOND])
-    return row[STRENGTH] * 0.08e-3 * carrier * (1.0 + 0.35 * math.sin(motor_angle_rad))
-
-
-@numba.njit()
-def gear_load_friction_n_m(row: Row, twist_torque_n_m: float) -> float:
-    """Extra Coulomb level at the spindle: 0.15 T |T| / (|T| + T0)."""
-    load = abs(twist_torque_n_m)
-    return row[STRENGTH] * 0.15 * load * load / (load + row[FIRST])
-
-
-@numba.njit()
-def gear_stribeck_n_m(row: Row, motor_speed_rad_s: float) -> float:
-    """Extra Coulomb level at the motor: F / (1 + x + x^3), x = |w| / w0, F = 0.35 mN m."""
-    x = abs(motor_speed_rad_s) / row[FIRST]
-    return row[STRENGTH] * 0.35e-3 / (1.0 + x + x * x * x)
-
-
-@numba.njit()
-def gear_backlash_n_m(
-    row: Row, twist_rad: float, twist_rate_rad_s: float, stiffness: float
-) -> float:
-    """Contact torque: k p (1 + c p'), p = |twist| - gap, never pulling, in place of k twist."""
-    penetration = abs(twist_rad) - row[STRENGTH] * row[FIRST]
-    if penetration <= 0.0:
-        return 0.0
-    rate = twist_rate_rad_s if twist_rad > 0.0 else -twist_rate_rad_s
-    torque = max(stiffness * penetration * (1.0 + row[SECOND] * rate), 0.0)
-    return torque if twist_rad > 0.0 else -torque
-
-
-@numba.njit()
-def gear_eccentricity_rad(row: Row, spindle_angle_rad: float) -> float:
-    """Position error of the gear: e (sin(n q + p) + 0.3 sin(2 n q)), e = 2 mrad at strength 1."""
-    angle = row[FIRST] * spindle_angle_rad
-    return row[STRENGTH] * 2e-3 * (math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle))
-
-
-@numba.njit()
-def gear_eccentricity_slope(row: Row, spindle_angle_rad: float) -> float:
-    """Derivative of the position error with the spindle angle: what keeps it free of energy."""
-    angle = row[FIRST] * spindle_angle_rad
-    wave = math.cos(angle + row[SECOND]) + 0.6 * math.cos(2.0 * angle)
-    return row[STRENGTH] * 2e-3 * row[FIRST] * wave
-
-
-@numba.njit()
-def torque_constant_sag_ratio(row: Row, current_a: float) -> float:
-    """Factor of the torque constant: 1 - 0.25 x / (1 + x), x = |i| / i0; never negative."""
-    x = abs(current_a) / row[FIRST]
-    return max(1.0 - row[STRENGTH] * 0.25 * x / (1.0 + x), 0.0)
-
-
-@numba.njit()
-def current_sensor_bend_ratio(row: Row, current_a: float) -> float:
-    """Factor of the measured current: 1 + 0.2 x^2 / (1 + x^2), x = i / i0."""
-    x = current_a / row[FIRST]
-    return 1.0 + row[STRENGTH] * 0.2 * x * x / (1.0 + x * x)
-
-
-@numba.njit()
-def cable_position_friction_n_m(row: Row, spindle_angle_rad: float) -> float:
-    """Extra Coulomb level at the spindle: F / (1 + x^2)^2, x = (q - q0) / width, F = 15 mN m."""
-    x = (spindle_angle_rad - row[FIRST]) / row[SECOND]
-    bump = 1.0 / (1.0 + x * x)
-    return row[STRENGTH] * 15e-3 * bump * bump
-
-
-@numba.njit()
-def cable_presliding_rate(row: Row, bristle: float, spindle_speed: float) -> float:
-    """Rate of the bristle's bend u in -1..1: u' = w / z0 (1 - u^3 sgn w)."""
-    bend = bristle * bristle * bristle
-    return spindle_speed / row[FIRST] * (1.0 - (bend if spindle_speed > 0.0 else -bend))
-
-
-@numba.njit()
-def cable_presliding_n_m(row: Row, bristle: float) -> float:
-    """Torque of the bent bristle on the spindle: F u, F = 12 mN m at strength 1."""
-    return row[STRENGTH] * 12e-3 * bristle
-
-
-@numba.njit()
-def cable_creep_n_m(row: Row, strain_rad: float, stiffness: float) -> float:
-    """Tension of the branch that relaxes: 0.2 k e, e the strain not yet relaxed."""
-    return row[STRENGTH] * 0.2 * stiffness * strain_rad
-
-
-@numba.njit()
-def cable_creep_rate(row: Row, strain_rad: float) -> float:
-    """Rate of relaxation: e (1 + |e| / 0.1 rad) / T."""
-    return strain_rad * (1.0 + abs(strain_rad) / 0.1) / row[FIRST]
-
-
-@numba.njit()
-def jaw_spring_n_m(row: Row, jaw_angle_rad: float) -> float:
-    """Torque that opposes closing: k x / (1 + |x| / x0), x = q - rest, k = 0.04 N m/rad."""
-    x = jaw_angle_rad - row[FIRST]
-    return row[STRENGTH] * 0.04 * x / (1.0 + abs(x) / row[SECOND])
-
-
-@numba.njit()
-def end_stop_spring_n_m(row: Row, jaw_angle_rad: float) -> float:
-    """Torque that opposes closing: k p^1.5, p = q - contact, k = 0.15 N m at strength 1."""
-    penetration = jaw_angle_rad - row[FIRST]
-    if penetration <= 0.0:
-        return 0.0
-    return row[STRENGTH] * 0.15 * penetration * math.sqrt(penetration)

@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden
+from rig.simulation import hidden, hidden_cable, hidden_drive, hidden_sensors
 from rig.simulation.parameters import PlantParameters
 
 TICK_S = 1e-3
@@ -45,10 +45,22 @@ TICK_S = 1e-3
     CREEP_STRAIN,
     PROXIMAL_DRIFT,
     DISTAL_DRIFT,
-    STATE_SIZE,
-) = range(15)
-"""Places in the state, SI units: motion, currents, what the torque sensors see, the states of two
-hidden effects and the drift of the two torque zeros."""
+    CLOCK,
+    HYSTERESIS,
+    HEAT,
+    TWO_STATE,
+    LAG_FIRST,
+    LAG_SECOND,
+    CREEP_FAST,
+    CREEP_SLOW,
+    SENSOR_LAG_FIRST,
+    SENSOR_LAG_SECOND,
+    RING,
+) = range(25)
+STATE_SIZE = RING + hidden_sensors.RING
+"""Places in the state, SI units: motion, currents, what the torque sensors see, the drift of the
+two torque zeros, the time since the start, and the states of hidden effects; the last ones are the
+jaw angles that a delayed encoder remembers."""
 
 _Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
 
@@ -76,6 +88,14 @@ def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray
 def clip(value: float, limit: float) -> float:
     """Return the value brought into plus and minus the limit."""
     return min(max(value, -limit), limit)
+
+
+@numba.njit()
+def _any(strength: NDArray[np.float64], kinds: NDArray[np.int64]) -> bool:
+    for kind in kinds:  # noqa: SIM110 - a compiled loop
+        if strength[kind] != 0.0:
+            return True
+    return False
 
 
 @numba.njit()
@@ -114,66 +134,110 @@ def step_tick(
     load_share = p.load_friction_n_m / jaw_friction if jaw_friction > 0.0 else 0.0
     strength = effects[:, hidden.STRENGTH]
     ripple = strength[hidden.MOTOR_RIPPLE] != 0.0
-    load_friction = strength[hidden.GEAR_LOAD_FRICTION] != 0.0
-    stribeck = strength[hidden.GEAR_STRIBECK] != 0.0
+    current_ripple = strength[hidden.CURRENT_RIPPLE] != 0.0
+    sag = strength[hidden.TORQUE_CONSTANT_SAG] != 0.0
+    heated = strength[hidden.WINDING_HEAT] != 0.0
+    late = strength[hidden.TORQUE_LAG] != 0.0
     backlash = strength[hidden.GEAR_BACKLASH] != 0.0
     eccentric = strength[hidden.GEAR_ECCENTRICITY] != 0.0
-    sag = strength[hidden.TORQUE_CONSTANT_SAG] != 0.0
-    tight = strength[hidden.CABLE_POSITION_FRICTION] != 0.0
+    stiffening = strength[hidden.GEAR_STIFFENING] != 0.0
+    two_state = strength[hidden.GEAR_TWO_STATE] != 0.0
+    motor_friction = _any(strength, hidden_drive.MOTOR_FRICTIONS)
+    spindle_friction = _any(strength, hidden_cable.SPINDLE_FRICTIONS)
     presliding = strength[hidden.CABLE_PRESLIDING] != 0.0
+    spindle_ripple = strength[hidden.SPINDLE_RIPPLE] != 0.0
+    pulley = strength[hidden.ECCENTRIC_PULLEY] != 0.0
     creep = strength[hidden.CABLE_CREEP] != 0.0
-    spring = strength[hidden.JAW_SPRING] != 0.0
-    end_stop = strength[hidden.END_STOP_SPRING] != 0.0
+    hysteresis = strength[hidden.CABLE_HYSTERESIS] != 0.0
+    jaw_effect = _any(strength, hidden_cable.JAW_TORQUES)
+    lag_gain = 1.0
+    if late:
+        row = effects[hidden.TORQUE_LAG]
+        lag_gain = min(2.0 * dt / (row[hidden.STRENGTH] * row[hidden.FIRST]), 1.0)
+    if strength[hidden.JAW_MASS] != 0.0:
+        mass = hidden_cable.jaw_mass_kg_m2(effects[hidden.JAW_MASS])
+        dt_jaw = dt / (p.jaw_inertia_kg_m2 + mass)
 
     motor, motor_speed = state[MOTOR_ANGLE], state[MOTOR_SPEED]
     spindle, spindle_speed = state[SPINDLE_ANGLE], state[SPINDLE_SPEED]
     jaw, jaw_speed = state[JAW_ANGLE], state[JAW_SPEED]
     current, load_current = state[CURRENT], state[LOAD_CURRENT]
     bristle, strain = state[BRISTLE], state[CREEP_STRAIN]
+    bend, heat, rubbing = state[HYSTERESIS], state[HEAT], state[TWO_STATE]
+    lag_first, lag_second = state[LAG_FIRST], state[LAG_SECOND]
+    clock = state[CLOCK]
     proximal, distal = state[PROXIMAL_TORQUE], state[DISTAL_TORQUE]
 
     for _ in range(steps):
         current += current_gain * (target - current)
         load_current += load_gain * (load_target_a - load_current)
-        motor_torque = p.torque_constant_n_m_a * current
+        torque_current = current
+        if late:
+            lag_first += lag_gain * (current - lag_first)
+            lag_second += lag_gain * (lag_first - lag_second)
+            torque_current = lag_second
+        motor_torque = p.torque_constant_n_m_a * torque_current
+        if heated:
+            row = effects[hidden.WINDING_HEAT]
+            heat += dt * hidden_drive.winding_heat_rate(row, heat, current)
+            motor_torque *= hidden_drive.winding_heat_ratio(row, heat)
+        if current_ripple:
+            motor_torque *= hidden_drive.current_ripple_ratio(effects[hidden.CURRENT_RIPPLE], motor)
         if sag:
-            motor_torque *= hidden.torque_constant_sag_ratio(
+            motor_torque *= hidden_drive.torque_constant_sag_ratio(
                 effects[hidden.TORQUE_CONSTANT_SAG], current
             )
         if ripple:
-            motor_torque += hidden.motor_ripple_n_m(effects[hidden.MOTOR_RIPPLE], motor)
+            motor_torque += hidden_drive.motor_ripple_n_m(effects[hidden.MOTOR_RIPPLE], motor)
 
         twist = gear * motor - spindle
         twist_rate = gear * motor_speed - spindle_speed
         spindle_per_twist = 1.0
         if eccentric:
             row = effects[hidden.GEAR_ECCENTRICITY]
-            slope = hidden.gear_eccentricity_slope(row, spindle)
-            twist += hidden.gear_eccentricity_rad(row, spindle)
+            slope = hidden_drive.gear_eccentricity_slope(row, spindle)
+            twist += hidden_drive.gear_eccentricity_rad(row, spindle)
             twist_rate += slope * spindle_speed
             spindle_per_twist -= slope
         if backlash:
-            twist_torque = hidden.gear_backlash_n_m(
+            twist_torque = hidden_drive.gear_backlash_n_m(
                 effects[hidden.GEAR_BACKLASH], twist, twist_rate, p.gear_stiffness_n_m_rad
             )
         else:
             twist_torque = p.gear_stiffness_n_m_rad * twist
+        if stiffening:
+            twist_torque *= hidden_drive.gear_stiffening_ratio(
+                effects[hidden.GEAR_STIFFENING], twist
+            )
         twist_torque += p.gear_damping_n_m_s_rad * twist_rate
 
         stretch = p.cable_ratio * spindle + p.jaw_zero_rad - jaw
         stretch_rate = p.cable_ratio * spindle_speed - jaw_speed
+        lever = p.cable_ratio
+        if pulley:
+            row = effects[hidden.ECCENTRIC_PULLEY]
+            slope = hidden_cable.eccentric_pulley_slope(row, spindle)
+            stretch += hidden_cable.eccentric_pulley_rad(row, spindle)
+            stretch_rate += slope * spindle_speed
+            lever += slope
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
         if creep:
             row = effects[hidden.CABLE_CREEP]
-            cable += hidden.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
-            strain += dt * (stretch_rate - hidden.cable_creep_rate(row, strain))
+            cable += hidden_cable.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
+            strain += dt * (stretch_rate - hidden_cable.cable_creep_rate(row, strain))
+        if hysteresis:
+            row = effects[hidden.CABLE_HYSTERESIS]
+            cable += hidden_cable.cable_hysteresis_n_m(row, bend)
+            bend += dt * hidden_cable.cable_hysteresis_rate(row, bend, stretch_rate)
 
         motor_limit = p.motor_friction_n_m
-        if load_friction:
-            row = effects[hidden.GEAR_LOAD_FRICTION]
-            motor_limit += gear * hidden.gear_load_friction_n_m(row, twist_torque)
-        if stribeck:
-            motor_limit += hidden.gear_stribeck_n_m(effects[hidden.GEAR_STRIBECK], motor_speed)
+        if motor_friction:
+            if two_state:
+                row = effects[hidden.GEAR_TWO_STATE]
+                rubbing = hidden_drive.gear_two_state(row, rubbing, motor_speed)
+            motor_limit += hidden_drive.motor_friction_n_m(
+                effects, motor_speed, spindle, twist_torque, gear, rubbing
+            )
         before = motor_speed
         motor_speed += dt_motor * (
             motor_torque - p.motor_viscous_n_m_s_rad * motor_speed - gear * twist_torque
@@ -185,17 +249,18 @@ def step_tick(
         spindle_limit = p.spindle_friction_n_m + p.cable_load_friction_ratio * abs(cable)
         spindle_torque = (
             spindle_per_twist * twist_torque
-            - p.cable_ratio * cable
+            - lever * cable
             - p.spindle_viscous_n_m_s_rad * spindle_speed
         )
-        if tight:
-            spindle_limit += hidden.cable_position_friction_n_m(
-                effects[hidden.CABLE_POSITION_FRICTION], spindle
-            )
+        if spindle_friction:
+            spindle_limit += hidden_cable.spindle_friction_n_m(effects, spindle, cable, clock)
+        if spindle_ripple:
+            row = effects[hidden.SPINDLE_RIPPLE]
+            spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)
         if presliding:
             row = effects[hidden.CABLE_PRESLIDING]
-            spindle_torque -= hidden.cable_presliding_n_m(row, bristle)
-            bristle += dt * hidden.cable_presliding_rate(row, bristle, spindle_speed)
+            spindle_torque -= hidden_cable.cable_presliding_n_m(row, bristle)
+            bristle += dt * hidden_cable.cable_presliding_rate(row, bristle, spindle_speed)
         spindle_speed += dt_spindle * spindle_torque
         spindle_speed -= clip(spindle_speed, dt_spindle * spindle_limit)
         proximal = spindle_per_twist * twist_torque + rotor_torque
@@ -215,10 +280,8 @@ def step_tick(
                 + p.stop_damping_n_m_s_rad * jaw_speed,
                 0.0,
             )
-        if spring:
-            jaw_torque -= hidden.jaw_spring_n_m(effects[hidden.JAW_SPRING], jaw)
-        if end_stop:
-            jaw_torque -= hidden.end_stop_spring_n_m(effects[hidden.END_STOP_SPRING], jaw)
+        if jaw_effect:
+            jaw_torque -= hidden_cable.jaw_torque_n_m(effects, jaw)
         jaw_speed += dt_jaw * jaw_torque
         impulse = clip(jaw_speed, dt_jaw * jaw_friction)
         jaw_speed -= impulse
@@ -230,4 +293,7 @@ def step_tick(
     state[JAW_ANGLE], state[JAW_SPEED] = jaw, jaw_speed
     state[CURRENT], state[LOAD_CURRENT] = current, load_current
     state[BRISTLE], state[CREEP_STRAIN] = bristle, strain
+    state[HYSTERESIS], state[HEAT], state[TWO_STATE] = bend, heat, rubbing
+    state[LAG_FIRST], state[LAG_SECOND] = lag_first, lag_second
+    state[CLOCK] = clock + TICK_S
     state[PROXIMAL_TORQUE], state[DISTAL_TORQUE] = proximal, distal

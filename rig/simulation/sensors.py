@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden, plant
+from rig.simulation import hidden, hidden_sensors, plant
 from rig.simulation.noise import normal
 from rig.simulation.parameters import SensorParameters
 
@@ -50,7 +50,8 @@ def sample(
     """Write the seven sampled counts of this tick and let the torque zeros drift by one tick.
 
     Args:
-        state: State of the plant, shape (`plant.STATE_SIZE`,); only its drifts are changed.
+        state: State of the plant, shape (`plant.STATE_SIZE`,); only its drifts and the sensors' own
+            states are changed.
         s: From `scales_of`.
         effects: From `hidden.table`.
         seed: Scrambled seed of the bench.
@@ -67,18 +68,44 @@ def sample(
     counts[SPINDLE] = int(
         np.floor(-state[plant.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
     )
-    counts[JAW] = int(np.floor(state[plant.JAW_ANGLE] / TURN_RAD * s.jaw_count_per_turn))
+    strength = effects[:, hidden.STRENGTH]
+    jaw = state[plant.JAW_ANGLE]
+    if strength[hidden.JAW_ENCODER_WAVE] != 0.0:
+        jaw += hidden_sensors.jaw_encoder_wave_rad(effects[hidden.JAW_ENCODER_WAVE], jaw)
+    if strength[hidden.JAW_DELAY] != 0.0:
+        jaw = hidden_sensors.delayed(effects[hidden.JAW_DELAY], state[plant.RING :], tick, jaw)
+    counts[JAW] = int(np.floor(jaw / TURN_RAD * s.jaw_count_per_turn))
 
     per_count = 1.0 / s.torque_n_m_per_count
     limit = s.torque_limit_count
+    seen = state[plant.PROXIMAL_TORQUE]
+    if strength[hidden.PROXIMAL_LAG] != 0.0:
+        places = state[plant.SENSOR_LAG_FIRST :]
+        seen = hidden_sensors.proximal_lag_n_m(
+            effects[hidden.PROXIMAL_LAG], places, seen, plant.TICK_S
+        )
+    if strength[hidden.PROXIMAL_CREEP] != 0.0:
+        places = state[plant.CREEP_FAST :]
+        seen += hidden_sensors.proximal_creep_n_m(
+            effects[hidden.PROXIMAL_CREEP], places, seen, plant.TICK_S
+        )
+    if strength[hidden.PROXIMAL_BEND] != 0.0:
+        seen *= hidden_sensors.proximal_bend_ratio(effects[hidden.PROXIMAL_BEND], seen)
     proximal = (
-        state[plant.PROXIMAL_TORQUE]
+        seen
         + s.proximal_offset_n_m
         + state[plant.PROXIMAL_DRIFT]
         + s.proximal_noise_n_m * normal(seed, tick, 2)
     )
+    seen = state[plant.DISTAL_TORQUE]
+    if strength[hidden.DISTAL_DRIFT] != 0.0:
+        seen += hidden_sensors.distal_drift_n_m(effects[hidden.DISTAL_DRIFT], state[plant.CLOCK])
+    if strength[hidden.DISTAL_CROSSTALK] != 0.0:
+        seen += hidden_sensors.distal_crosstalk_n_m(
+            effects[hidden.DISTAL_CROSSTALK], state[plant.CURRENT]
+        )
     distal = (
-        state[plant.DISTAL_TORQUE]
+        seen
         + s.distal_offset_n_m
         + state[plant.DISTAL_DRIFT]
         + s.distal_noise_n_m * normal(seed, tick, 3)
@@ -87,8 +114,10 @@ def sample(
     counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
 
     current = state[plant.CURRENT]
-    if effects[hidden.CURRENT_SENSOR_BEND, hidden.STRENGTH] != 0.0:
-        current *= hidden.current_sensor_bend_ratio(effects[hidden.CURRENT_SENSOR_BEND], current)
+    if strength[hidden.CURRENT_SENSOR_BEND] != 0.0:
+        current *= hidden_sensors.current_sensor_bend_ratio(
+            effects[hidden.CURRENT_SENSOR_BEND], current
+        )
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
     counts[CURRENT] = _converted(
         current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count

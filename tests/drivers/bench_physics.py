@@ -88,3 +88,45 @@ class PlainBench:
                 outputs.ctypes.data,
             )
             step(self.state, outputs[0], outputs[1])
+
+
+class ScriptedBench:
+    """No physics: the inputs of each tick, shape (n, 7), are given; then the last ones stay."""
+
+    def __init__(self, inputs: NDArray[np.int32]) -> None:
+        self.inputs = np.ascontiguousarray(inputs, np.int32)
+        self.ticks = 0
+
+    def next_inputs(self) -> NDArray[np.int32]:
+        row = self.inputs[min(self.ticks, len(self.inputs) - 1)]
+        self.ticks += 1
+        return row
+
+    def advance(
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        armed: bool,
+        control_state: NDArray[np.float64],
+        gains: NDArray[np.float64],
+        limits: NDArray[np.int32],
+    ) -> NDArray[np.int32]:
+        rows = np.zeros((ticks, 9), np.int32)
+        for k, row in enumerate(rows):
+            row[:7] = self.next_inputs()
+            armed = armed and not beyond_limits(limits, row[1], row[3], row[4], row[5])
+            if armed:
+                row[7] = control_tick(control_state, gains, target[k], row[1], row[0])
+                row[8] = load_ma[k]
+        return rows
+
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        tick = TICK_FUNCTION(tick_address)
+        outputs = np.zeros(2, np.int32)
+        for k in range(ticks):
+            inputs = self.next_inputs()
+            clock_us = (tick_us + 1000 * k) % 2**32
+            tick(board_address, clock_us, inputs.ctypes.data, outputs.ctypes.data)

@@ -5,14 +5,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
 from drivers.teensy.firmware_fake import firmware_library
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
-
-settings.register_profile("no deadline", deadline=None)
-settings.load_profile("no deadline")
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
 """The C++ core and the Python fake answer the same commands with the same bytes."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from drivers.teensy import protocol
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, Limits
-from tests.drivers.bench_physics import PlainBench
+from tests.drivers.bench_physics import PlainBench, ScriptedBench
 
 GAINS = np.array([20.0, 0.05, -1.0, 0.2, 10000.0])
 WIDEST = Limits.widest()
@@ -55,11 +56,16 @@ def answers(board: TeensyFake | FirmwareBoard, script: list[Action]) -> list[byt
     return given_bytes
 
 
-def assert_twins(script: list[Action], library: Path, start_tick_us: int = 0) -> bytes:
+def assert_twins(
+    script: list[Action],
+    library: Path,
+    start_tick_us: int = 0,
+    make_bench: Callable[[], PlainBench | ScriptedBench] = PlainBench,
+) -> bytes:
     """Run a script on both and return the bytes they agree on."""
-    fake = answers(TeensyFake(PlainBench(), start_tick_us=start_tick_us), script)
+    fake = answers(TeensyFake(make_bench(), start_tick_us=start_tick_us), script)
     core = answers(
-        FirmwareBoard(PlainBench(), start_tick_us=start_tick_us, library=library), script
+        FirmwareBoard(make_bench(), start_tick_us=start_tick_us, library=library), script
     )
     for index, (ours, theirs) in enumerate(zip(fake, core, strict=True)):
         assert ours == theirs, f"action {index}: {script[index]!r}"
@@ -106,6 +112,53 @@ def test_saturation_and_a_host_that_does_not_read(library: Path) -> None:
     assert last["sequence"] == 4505
 
 
+EDGES = {
+    "motor": [0],
+    "spindle": [-4001, -4000, 4000, 4001],
+    "jaw": [-(2**31), 2**31 - 1],
+    "proximal": [-32769, -32768, -32767, -5801, -5800, 5800, 5801, 32766, 32767, 32768],
+    "distal": [-32769, -32768, -32767, -30001, -30000, 30000, 30001, 32767],
+    "current": [-32768, -1501, -1500, 1500, 1501, 32766, 32767],
+    "fsr": [-1, 4094, 4095, 4096, 65536],
+}
+
+
+@pytest.mark.parametrize("limits", [WIDEST, TIGHT], ids=["widest", "tight"])
+@pytest.mark.parametrize("channel", list(EDGES))
+def test_the_edges_of_every_channel(library: Path, channel: str, limits: Limits) -> None:
+    seen = set()
+    for value in EDGES[channel]:
+        inputs = np.zeros((4, 7), np.int32)
+        inputs[2, list(EDGES).index(channel)] = value
+        script = [command(Kind.START, 1), arm(2, limits), setpoints(3, [0] * 9), 6]
+        data = assert_twins(script, library, make_bench=lambda inputs=inputs: ScriptedBench(inputs))
+        seen |= statuses(data)
+    limited = limits == TIGHT and channel in ("spindle", "proximal", "distal", "current")
+    assert any(status & protocol.STATUS_LIMIT_TRIPPED for status in seen) == limited
+    converted = channel in ("proximal", "distal", "current", "fsr")
+    assert any(status & protocol.STATUS_SATURATED for status in seen) == converted
+
+
+@settings(max_examples=40)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([10, 3000, 2**31 - 1]),
+    st.lists(st.floats(-50, 50), min_size=3, max_size=3),
+    st.floats(0, 1),
+    st.floats(0, 10000),
+)
+def test_the_controllers_round_alike(
+    library: Path, seed: int, size: int, pid: list[float], weight: float, limit: float
+) -> None:
+    random = np.random.default_rng(seed)
+    inputs = np.zeros((300, 7), np.int32)
+    inputs[:, :2] = random.integers(-size - 1, size, (300, 2), endpoint=True)
+    wanted = random.integers(-size - 1, size, 100, endpoint=True).tolist()
+    gains = np.array([*(gain * 100 / size for gain in pid), weight, limit])
+    script = [command(Kind.START, 1), arm(2, gains=gains), setpoints(3, wanted), 240]
+    assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
+
+
 def test_refusals(library: Path) -> None:
     nan = GAINS.copy()
     nan[0] = np.nan
@@ -128,6 +181,7 @@ def test_a_repeated_command_is_answered_again_and_not_carried_out_again(library:
     script: list[Action] = [command(Kind.START, 1), arm(2), setpoints(3, sweep(0)), 10]
     script += [setpoints(3, sweep(0)), 10, command(Kind.START, 1), 5, command(Kind.HELLO, 3)]
     script += [setpoints(3, sweep(0)), 120, command(Kind.DISARM, 9), command(Kind.DISARM, 9)]
+    script += [command(Kind.START, 10), 5, command(Kind.DISARM, 11), command(Kind.START, 10), 5]
     assert_twins(script, library)
 
 

@@ -288,6 +288,16 @@ def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard)
     logger.close()
 
 
+def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: MakeBoard) -> None:
+    cable, logger = behind_a_bad_cable(make_board())
+    logger.identify()
+    cable.incoming = once(lambda _: b"")
+    with pytest.raises(CommandRefusedError, match="not any more"):
+        logger.arm(GAINS, Limits(0, 0, 0, 0, START_SPINDLE + 1, START_SPINDLE + 2))
+    assert logger.counters.retries == 1
+    logger.close()
+
+
 def test_a_damaged_command_is_sent_again(make_board: MakeBoard) -> None:
     cable, logger = behind_a_bad_cable(make_board())
     logger.identify()

@@ -24,7 +24,7 @@ def test_a_section_can_be_changed_without_touching_the_original():
     ("old", "new", "message"),
     [
         ("kp =", "kpp =", r"kpp: there is no such key; did you mean 'kp'"),
-        ("motor_current_a = 2.0", "motor_current_a = -2.0", "greater than 0"),
+        ("motor_current_a = 0.6", "motor_current_a = -0.6", "greater than 0"),
         ('name = "simulated rig"', "", "name: Field required"),
         ("lever_arm_m = 0.012", "lever_arm_m = inf", "finite"),
     ],

@@ -10,7 +10,15 @@ from drivers.teensy import control
 from rig import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
-from rig.simulation.hidden import KINDS, NAMES, HiddenEffect, UnknownHiddenEffectError, draw, table
+from rig.simulation.hidden import (
+    KINDS,
+    NAMES,
+    HiddenEffect,
+    Kind,
+    UnknownHiddenEffectError,
+    draw,
+    table,
+)
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
 
@@ -175,6 +183,59 @@ def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
     past = [mean(c, "proximal_torque_n_m", -0.15, -0.1) for c in (stopped, plain)]
     assert before[0] == pytest.approx(before[1], abs=1e-4)
     assert past[0] > past[1] + 5e-3
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=NAMES)
+def test_every_effect_shows_and_leaves_the_rig_under_control(kind: Kind, plain: Columns) -> None:
+    shape = (1.0,) if kind.name == "friction_step" else ()
+    columns = sweep([HiddenEffect(kind.name, kind.strongest, shape)])
+    error = columns["target_angle_rad"] - columns["spindle_angle_rad"]
+    assert np.degrees(error[200:].std()) < 1.0
+    assert any(columns[name].tobytes() != values.tobytes() for name, values in plain.items())
+
+
+def test_a_stiffening_gear_twists_less_than_in_proportion() -> None:
+    def twist(effects: Sequence[HiddenEffect], load_a: float) -> float:
+        columns = sweep(effects, load_a=load_a)
+        difference = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
+        return float(difference[closing(columns)].mean())
+
+    def growth(effects: Sequence[HiddenEffect]) -> float:
+        return twist(effects, 0.9) / twist(effects, 0.1)
+
+    assert growth([HiddenEffect("gear_stiffening", 1.0)]) < 0.9 * growth([])
+
+
+def test_the_late_jaw_encoder_answers_its_delay_later(plain: Columns) -> None:
+    late = sweep([HiddenEffect("jaw_delay", 1.0, (20.0,))])
+    inside = closing(plain)
+    behind = plain["jaw_angle_rad"][inside] - late["jaw_angle_rad"][inside]
+    assert behind.mean() == pytest.approx(20e-3 * 0.5 * 0.913, rel=0.1)
+
+
+def test_the_asymmetric_motor_costs_current_on_opening_only(plain: Columns) -> None:
+    uneven = sweep([HiddenEffect("motor_asymmetry", 1.0, (0.5,))])
+    change = uneven["motor_current_a"] - plain["motor_current_a"]
+    opening = np.arange(change.size) > 0.6 * change.size
+    constant = PlantParameters().torque_constant_n_m_a
+    assert abs(change[closing(plain)].mean()) < 1e-3
+    assert change[opening][:800].mean() == pytest.approx(-0.3e-3 / constant, rel=0.15)
+
+
+def test_the_warm_winding_needs_more_current_later() -> None:
+    hold = np.full(8000, OPEN_RAD + 0.5)
+    start = round(-(OPEN_RAD + 0.5) * 8192 / (2 * np.pi))
+    bench = SimulatedBench(effects=[HiddenEffect("winding_heat", 1.0, (3.0,))], start_count=start)
+    current = play(bench, hold, np.full(8000, 0.9))["motor_current_a"]
+    assert current[-500:].mean() > 1.02 * current[1000:1500].mean()
+
+
+def test_the_two_state_friction_remembers_that_it_was_fast() -> None:
+    effect = [HiddenEffect("gear_two_state", 1.0, (14.0,))]
+    slow = mean(sweep(effect, 0.08), "motor_current_a") - mean(sweep([], 0.08), "motor_current_a")
+    fast = mean(sweep(effect, 0.6), "motor_current_a") - mean(sweep([], 0.6), "motor_current_a")
+    assert abs(slow) < 2e-3
+    assert fast > 8e-3
 
 
 @pytest.mark.parametrize("name", NAMES)

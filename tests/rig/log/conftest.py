@@ -8,8 +8,9 @@ import pytest
 
 from estimation.recording import Flag, Instrument, Mark, Stretch
 from rig.log.container import Attached
-from rig.log.convert import COUNTS_TOPIC, SAMPLE_TOPIC, counts_stream, log_times_ns, sample_stream
+from rig.log.convert import log_times_ns
 from rig.log.run import RunEnd, RunInfo
+from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 
 RATE_HZ = 1000.0
@@ -32,7 +33,7 @@ def blocks(samples: int, drop: frozenset[int] = frozenset()):
         log_time_ns = log_times_ns(time_s, STARTED_AT_NS)
         rows = {name: column[sequence] for name, column in zip(CHANNELS, columns, strict=True)}
         rows |= {"time_s": time_s, "sequence": sequence, "flags": np.zeros(sequence.size, int)}
-        names = [field.name for field in counts_stream().fields][:10]
+        names = [field.name for field in COUNTS_STREAM.fields][:10]
         raw = {name: column[sequence] for name, column in zip(names, counts, strict=True)}
         raw |= {"sequence": sequence, "tick_us": sequence * 1000, "status": sequence * 0}
         yield rows, raw, log_time_ns
@@ -58,15 +59,15 @@ def write_log(
         details={"protocol": {"kind": "sine", "frequencies_hz": [0.5, 1.0]}},
     )
     attachments = [Attached("rig.toml", "application/toml", b"[rig]\nname = 'bench 1'\n")]
-    streams = [sample_stream(CHANNELS, RATE_HZ), counts_stream(RATE_HZ)]
+    streams = [sample_stream(CHANNELS, RATE_HZ), COUNTS_STREAM]
     with LogWriter(path, run, streams, attachments=attachments) as writer:
         for rows, raw, log_time_ns in blocks(samples, drop):
-            writer.write(SAMPLE_TOPIC, rows, log_time_ns)
-            writer.write(COUNTS_TOPIC, raw, log_time_ns)
+            writer.write(SAMPLE, rows, log_time_ns)
+            writer.write(COUNTS, raw, log_time_ns)
         writer.mark(Mark(0.1, "finger on the jaw"))
         writer.stretch(Stretch(0.2, 0.3, Flag.SUSPECT, "re-index", "spindle_angle_rad"))
         end = RunEnd(
-            expected_samples={SAMPLE_TOPIC: samples},
+            expected_samples={SAMPLE: samples},
             counters={"crc_errors": 2},
             zeros_after={"proximal_torque_n_m": 1.6e-3},
             drift={"proximal_torque_n_m": 1e-4},

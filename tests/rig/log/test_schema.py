@@ -76,4 +76,5 @@ def test_units_are_in_the_channel_metadata():
         "units": '{"motor_current_a": "A"}',
         "descriptions": '{"motor_current_a": "drive"}',
         "rate_hz": "1000.0",
+        "crc32": stream.checksum,
     }

@@ -9,12 +9,12 @@ from mcap_ros2.decoder import DecoderFactory
 
 from estimation.recording import Flag, Mark, Stretch
 from rig.errors import DataError, UsageError
-from rig.log.convert import COUNTS_TOPIC, SAMPLE_TOPIC, counts_stream
 from rig.log.messages import UnflaggedSampleError
 from rig.log.reader import DamagedLogError, read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.scan import NotALogError
 from rig.log.schema import Field, Stream
+from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE
 from rig.log.writer import FLUSH_AFTER_S, MAX_LOSS_S, LogExistsError, LogWriteError, LogWriter
 
 STREAM = Stream(
@@ -59,7 +59,7 @@ def test_mcap_ros2_support_decodes_equal_values(log):
             assert message.log_time == topic.log_time_ns[k]
             assert message.sequence == topic.rows["sequence"][k]
             place[channel.topic] += 1
-    assert place == {SAMPLE_TOPIC: 600, COUNTS_TOPIC: 600}
+    assert place == {SAMPLE: 600, COUNTS: 600}
 
 
 def test_rosbags_decodes_equal_values(log):
@@ -74,7 +74,7 @@ def test_rosbags_decodes_equal_values(log):
             assert equal(decoded, topic.rows[k])
             assert timestamp == topic.log_time_ns[k]
             place[connection.topic] += 1
-    assert place == {SAMPLE_TOPIC: 600, COUNTS_TOPIC: 600}
+    assert place == {SAMPLE: 600, COUNTS: 600}
 
 
 def test_the_file_satisfies_the_reference_reader_with_all_checksums(log):
@@ -95,7 +95,7 @@ def test_everything_known_about_the_run_is_read_back(log):
     assert read.run.instrument.serial == "0042"
     assert read.run.details == {"protocol": {"kind": "sine", "frequencies_hz": [0.5, 1.0]}}
     assert read.end == RunEnd(
-        expected_samples={SAMPLE_TOPIC: 600},
+        expected_samples={SAMPLE: 600},
         counters={"crc_errors": 2},
         zeros_after={"proximal_torque_n_m": 1.6e-3},
         drift={"proximal_torque_n_m": 1e-4},
@@ -104,11 +104,11 @@ def test_everything_known_about_the_run_is_read_back(log):
     assert read.marks == (Mark(0.1, "finger on the jaw"),)
     assert read.stretches == (Stretch(0.2, 0.3, Flag.SUSPECT, "re-index", "spindle_angle_rad"),)
     assert read.attachments[0].data == b"[rig]\nname = 'bench 1'\n"
-    assert [f.unit for f in read.topics[SAMPLE_TOPIC].stream.fields][:4] == ["s", "A", "rad", "N m"]
+    assert [f.unit for f in read.topics[SAMPLE].stream.fields][:4] == ["s", "A", "rad", "N m"]
 
 
 def test_only_the_wanted_topics_are_read(log):
-    assert list(read_log(log, [COUNTS_TOPIC]).topics) == [COUNTS_TOPIC]
+    assert list(read_log(log, [COUNTS]).topics) == [COUNTS]
     assert read_log(log, ()).topics == {}
     with pytest.raises(UsageError, match="no topic /rig/nothing"):
         read_log(log, ["/rig/nothing"])
@@ -161,10 +161,14 @@ def test_while_recording_the_file_is_called_part_and_a_clean_close_renames_it(tm
 
 def test_an_exception_closes_the_log_and_says_why_it_is_not_clean(tmp_path):
     path = tmp_path / "a.mcap"
-    writer = LogWriter(path, RunInfo("a"), [STREAM])
-    with pytest.raises(RuntimeError, match="motor stalled"), writer:
-        writer.write("/t", rows(5), times(5))
-        raise RuntimeError("motor stalled")
+
+    def record():
+        with LogWriter(path, RunInfo("a"), [STREAM]) as writer:
+            writer.write("/t", rows(5), times(5))
+            raise RuntimeError("motor stalled")
+
+    with pytest.raises(RuntimeError, match="motor stalled"):
+        record()
     read = read_log(path)
     assert len(read.topics["/t"]) == 5
     assert (read.end.clean, read.end.reason) == (False, "RuntimeError: motor stalled")
@@ -179,18 +183,18 @@ def test_a_log_is_never_overwritten(tmp_path, taken):
 
 
 def test_a_full_disk_is_reported_and_leaves_the_part(tmp_path, monkeypatch):
-    writer = LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM])
-    writer.write("/t", rows(5), times(5))
-    writer.flush()
-    container = writer._container
-
     def full(channel, messages):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(container, "add_chunk", full)
-    with pytest.raises(LogWriteError, match="No space left") as caught, writer:
-        writer.write("/t", rows(5, 5), times(5, 5))
-        writer.flush()
+    def record():
+        with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
+            writer.write("/t", rows(5), times(5))
+            writer.flush()
+            monkeypatch.setattr(writer._container, "add_chunk", full)
+            writer.write("/t", rows(5, 5), times(5, 5))
+
+    with pytest.raises(LogWriteError, match="No space left") as caught:
+        record()
     assert "rig log repair" in caught.value.fix
     assert len(read_log(tmp_path / "a.mcap.part", tolerant=True).topics["/t"]) == 5
 
@@ -294,7 +298,7 @@ def test_a_large_block_is_cut_into_chunks_and_read_back(tmp_path):
 
 
 def test_the_end_of_a_run_that_cannot_be_written_leaves_the_writer_open(tmp_path):
-    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [counts_stream()]) as writer:
+    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [COUNTS_STREAM]) as writer:
         with pytest.raises(DataError, match="drift"):
             writer.close(RunEnd(drift={"proximal_torque_n_m": np.nan}))
         writer.close(RunEnd(drift_verdict="not judged"))

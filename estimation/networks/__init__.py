@@ -1,0 +1,1 @@
+"""Small feed-forward networks: trained with torch, used with NumPy alone."""

@@ -1,0 +1,299 @@
+"""Levenberg-Marquardt training with Bayesian regularisation.
+
+The objective is F = beta E_D + alpha E_W: the sum of squared errors of the mapped outputs and the
+sum of squared weights. Each accepted Levenberg-Marquardt step is followed by one evidence update:
+gamma = p - alpha tr (beta J'J + alpha I)^-1, alpha = gamma / (2 E_W), beta = (n - gamma) / (2 E_D)
+for p weights and n residuals. J'J is summed over blocks of rows, so memory does not grow with the
+data.
+
+Sources: D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992); F. D. Foresee and
+M. T. Hagan, "Gauss-Newton approximation to Bayesian learning", ICNN 1997; start of the weights
+after D. Nguyen and B. Widrow, IJCNN 1990.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from estimation.networks.network import Network, NetworkError, to_unit
+from estimation.recording import FloatArray
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+BLOCK = 8192
+"""Rows whose Jacobian is held at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How a network is trained.
+
+    Attributes:
+        nodes: Hidden nodes.
+        iterations: Accepted steps at the most.
+        patience: Converged when the error fell by less than `tolerance` over so many steps.
+        tolerance: Relative fall of the root mean square error.
+        seed: Seed of the first weights.
+    """
+
+    nodes: int = 30
+    iterations: int = 1000
+    patience: int = 50
+    tolerance: float = 5e-3
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """How a training went.
+
+    Attributes:
+        network: The trained network.
+        iterations: Accepted steps.
+        converged: Whether it stopped because nothing changed any more.
+        reason: Why it stopped.
+        effective_parameters: gamma, the number of weights the data determines.
+        parameters: Number of weights.
+        rmse: Error on the training rows in units of half the range of the outputs.
+    """
+
+    network: Network
+    iterations: int
+    converged: bool
+    reason: str
+    effective_parameters: float
+    parameters: int
+    rmse: float
+
+
+def has_torch() -> bool:
+    """Say whether torch is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("torch") is not None
+
+
+def train(
+    inputs: FloatArray,
+    targets: FloatArray,
+    names: tuple[Sequence[str], Sequence[str]],
+    settings: Settings | None = None,
+    on_step: Callable[[int, float], None] = lambda step, rmse: None,
+) -> Training:
+    """Train a network on all rows at once.
+
+    Args:
+        inputs: Shape (n, d).
+        targets: Shape (n, o).
+        names: Names of the inputs and of the outputs.
+        settings: How to train; `Settings()` if None.
+        on_step: Called with the step's number and the error after each accepted step.
+
+    Raises:
+        NetworkError: torch is missing, a column is constant or not finite, or there are too few
+            rows.
+    """
+    if not has_torch():
+        raise NetworkError(
+            "A network cannot be trained: torch is not installed.",
+            "Only training needs it; a trained network runs without.",
+            "Install it: pip install 'rig[learn]'.",
+        )
+    settings = settings or Settings()
+    ranges = [_range(inputs, names[0]), _range(targets, names[1])]
+    fit = _Fit(to_unit(inputs, ranges[0]), to_unit(targets, ranges[1]), settings)
+    reason, converged = fit.run(on_step)
+    hidden, output = fit.weights()
+    return Training(
+        network=Network(tuple(names[0]), tuple(names[1]), ranges[0], ranges[1], hidden, output),
+        iterations=fit.steps,
+        converged=converged,
+        reason=reason,
+        effective_parameters=fit.gamma,
+        parameters=fit.count,
+        rmse=fit.rmse,
+    )
+
+
+def jacobian(network: Network, rows: FloatArray) -> FloatArray:
+    """Return the derivative of the mapped outputs by the weights, shape (n, o, weights).
+
+    The weights are ordered as `network.hidden`, then `network.output`, row by row.
+    """
+    import torch
+
+    unit = to_unit(rows, network.input_range)
+    x = torch.from_numpy(np.column_stack([unit, np.ones(len(unit))]))
+    hidden, output = (torch.from_numpy(np.array(w)) for w in (network.hidden, network.output))
+    found: FloatArray = _jacobian(x, hidden, output)[1].numpy()
+    return found
+
+
+def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
+    if values.ndim != 2 or values.shape[1] != len(names) or len(values) < 2:
+        raise NetworkError(f"Rows of shape {values.shape} do not hold {len(names)} columns.")
+    bounds = np.array([values.min(axis=0), values.max(axis=0)])
+    bad = [n for n, w in zip(names, np.ptp(bounds, axis=0), strict=True) if not 0 < w < np.inf]
+    if bad:
+        raise NetworkError(
+            f"A network cannot be trained on {', '.join(bad)}.",
+            "The values are constant or not finite.",
+        )
+    return bounds
+
+
+def _jacobian(x: "Tensor", hidden: "Tensor", output: "Tensor") -> tuple["Tensor", "Tensor"]:
+    """Return outputs, shape (n, o), and their derivative by all weights, shape (n, o, p)."""
+    import torch
+
+    nodes = torch.sigmoid(x @ hidden.T)
+    slope = nodes * (1 - nodes)
+    ones = torch.ones(len(x), 1, dtype=torch.float64)
+    last = torch.cat([nodes, ones], dim=1)
+    rows, count = len(x), hidden.numel() + output.numel()
+    found = torch.zeros(rows, len(output), count, dtype=torch.float64)
+    for k in range(len(output)):
+        by_hidden = (slope * output[k, :-1])[:, :, None] * x[:, None, :]
+        found[:, k, : hidden.numel()] = by_hidden.reshape(rows, -1)
+        first = hidden.numel() + k * last.shape[1]
+        found[:, k, first : first + last.shape[1]] = last
+    return last @ output.T, found
+
+
+class _Fit:
+    """One training: the mapped rows, the weights and the hyper-parameters."""
+
+    FIRST_DAMPING = 1e-3  # in units of the largest curvature
+    MOST_DAMPING = 1e10
+
+    def __init__(self, inputs: FloatArray, targets: FloatArray, settings: Settings) -> None:
+        import torch
+
+        self.settings = settings
+        self._x = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
+        self._y = torch.from_numpy(np.ascontiguousarray(targets))
+        generator = np.random.default_rng(settings.seed)
+        self._shapes = (
+            (settings.nodes, inputs.shape[1] + 1),
+            (targets.shape[1], settings.nodes + 1),
+        )
+        self._w = torch.from_numpy(
+            np.concatenate([first.ravel() for first in _first_weights(*self._shapes, generator)])
+        )
+        self.count = len(self._w)
+        self.steps = 0
+        self.gamma = float(self.count)
+        self.alpha = 0.0
+        self._squares = self._error(self._w)
+        self.beta = (self._y.numel() - self.count) / (2 * self._squares)
+        if self.beta <= 0:
+            raise NetworkError(
+                f"{len(inputs)} rows are too few for {self.count} weights.",
+                fix="Train on more rows, or with fewer nodes.",
+            )
+
+    @property
+    def rmse(self) -> float:
+        return float(np.sqrt(self._squares / self._y.numel()))
+
+    def weights(self) -> tuple[FloatArray, FloatArray]:
+        hidden, output = self._parts(self._w)
+        return hidden.numpy().copy(), output.numpy().copy()
+
+    def run(self, on_step: Callable[[int, float], None]) -> tuple[str, bool]:
+        """Train; return why it stopped and whether that is convergence."""
+        damping = self.FIRST_DAMPING
+        history = [self.rmse]
+        curvature, slope = self._normal()
+        while self.steps < self.settings.iterations:
+            damping = self._step(curvature, slope, damping)
+            if damping > self.MOST_DAMPING:
+                return "no step lowers the objective any more", True
+            self.steps += 1
+            curvature, slope = self._normal()
+            self._update_evidence(curvature)
+            history.append(self.rmse)
+            on_step(self.steps, self.rmse)
+            if self.steps >= self.settings.patience:
+                before = history[-1 - self.settings.patience]
+                if before - history[-1] < self.settings.tolerance * before:
+                    patience, tolerance = self.settings.patience, self.settings.tolerance
+                    return f"the error fell by less than {tolerance:g} in {patience} steps", True
+        return f"stopped after {self.steps} steps", False
+
+    def _parts(self, w: "Tensor") -> tuple["Tensor", "Tensor"]:
+        cut = self._shapes[0][0] * self._shapes[0][1]
+        return w[:cut].reshape(self._shapes[0]), w[cut:].reshape(self._shapes[1])
+
+    def _blocks(self) -> Iterator[tuple["Tensor", "Tensor"]]:
+        for first in range(0, len(self._x), BLOCK):
+            yield self._x[first : first + BLOCK], self._y[first : first + BLOCK]
+
+    def _error(self, w: "Tensor") -> float:
+        import torch
+
+        hidden, output = self._parts(w)
+        total = 0.0
+        for x, y in self._blocks():
+            estimate = torch.sigmoid(x @ hidden.T) @ output[:, :-1].T + output[:, -1]
+            total += float(((estimate - y) ** 2).sum())
+        return total
+
+    def _normal(self) -> tuple["Tensor", "Tensor"]:
+        """Return J'J and J'e."""
+        import torch
+
+        curvature = torch.zeros(self.count, self.count, dtype=torch.float64)
+        slope = torch.zeros(self.count, dtype=torch.float64)
+        hidden, output = self._parts(self._w)
+        for x, y in self._blocks():
+            estimate, block = _jacobian(x, hidden, output)
+            flat = block.reshape(-1, self.count)
+            curvature.addmm_(flat.T, flat)
+            slope.addmv_(flat.T, (estimate - y).reshape(-1))
+        return curvature, slope
+
+    def _step(self, curvature: "Tensor", slope: "Tensor", damping: float) -> float:
+        """Take the first step that lowers the objective; return the damping for the next one."""
+        import torch
+
+        objective = self.beta * self._squares + self.alpha * float(self._w @ self._w)
+        gradient = self.beta * slope + self.alpha * self._w
+        scale = self.beta * float(curvature.diagonal().max())
+        while damping <= self.MOST_DAMPING:
+            damped = self.beta * curvature
+            damped.diagonal().add_(self.alpha + damping * scale)
+            factor, failed = torch.linalg.cholesky_ex(damped)
+            if not failed:
+                tried = self._w - torch.cholesky_solve(gradient[:, None], factor)[:, 0]
+                squares = self._error(tried)
+                if self.beta * squares + self.alpha * float(tried @ tried) < objective:
+                    self._w, self._squares = tried, squares
+                    return max(damping / 10, 1e-14)
+            damping *= 4
+        return damping
+
+    def _update_evidence(self, curvature: "Tensor") -> None:
+        import torch
+
+        values = torch.linalg.eigvalsh(curvature).clamp(min=0) * self.beta
+        if self.alpha > 0:
+            self.gamma = float((values / (values + self.alpha)).sum())
+        self.alpha = self.gamma / (2 * float(self._w @ self._w))
+        self.beta = (self._y.numel() - self.gamma) / (2 * max(self._squares, 1e-300))
+
+
+def _first_weights(
+    hidden: tuple[int, int], output: tuple[int, int], generator: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return weights that spread the nodes' slopes over [-1, 1] (Nguyen and Widrow 1990)."""
+    nodes, wide = hidden[0], hidden[1] - 1
+    direction = generator.uniform(-1, 1, (nodes, wide))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    # a logistic node is as steep as a tanh node of half the weight
+    size = 2 * 0.7 * nodes ** (1 / wide)
+    bias = size * np.linspace(-1, 1, nodes) * np.sign(generator.uniform(-1, 1, nodes))
+    return np.column_stack([size * direction, bias]), generator.uniform(-0.5, 0.5, output)

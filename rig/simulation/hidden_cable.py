@@ -1,0 +1,182 @@
+"""Hidden effects of cable, spindle and jaw: compiled functions of one row of `hidden.table`."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.simulation.hidden import (
+    CABLE_GROWING_FRICTION,
+    CABLE_LOAD_NOTCH,
+    CABLE_POSITION_FRICTION,
+    END_STOP_SPRING,
+    FIRST,
+    FRICTION_STEP,
+    JAW_DETENT,
+    JAW_SPRING,
+    SECOND,
+    STRENGTH,
+    Row,
+)
+
+SPINDLE_FRICTIONS = np.array(
+    [CABLE_POSITION_FRICTION, CABLE_GROWING_FRICTION, CABLE_LOAD_NOTCH, FRICTION_STEP]
+)
+"""Effects that `spindle_friction_n_m` sums up."""
+
+JAW_TORQUES = np.array([JAW_SPRING, END_STOP_SPRING, JAW_DETENT])
+"""Effects that `jaw_torque_n_m` sums up."""
+
+
+@numba.njit()
+def spindle_friction_n_m(
+    effects: NDArray[np.float64], spindle_angle: float, cable_torque: float, clock_s: float
+) -> float:
+    """Return what the hidden effects add to the Coulomb level at the spindle."""
+    extra = 0.0
+    if effects[CABLE_POSITION_FRICTION, STRENGTH] != 0.0:
+        extra += cable_position_friction_n_m(effects[CABLE_POSITION_FRICTION], spindle_angle)
+    if effects[CABLE_GROWING_FRICTION, STRENGTH] != 0.0:
+        extra += cable_growing_friction_n_m(effects[CABLE_GROWING_FRICTION], spindle_angle)
+    if effects[CABLE_LOAD_NOTCH, STRENGTH] != 0.0:
+        extra += cable_load_notch_n_m(effects[CABLE_LOAD_NOTCH], spindle_angle, cable_torque)
+    if effects[FRICTION_STEP, STRENGTH] != 0.0:
+        extra += friction_step_n_m(effects[FRICTION_STEP], clock_s)
+    return extra
+
+
+@numba.njit()
+def jaw_torque_n_m(effects: NDArray[np.float64], jaw_angle: float) -> float:
+    """Return the hidden torque that opposes closing at the jaw."""
+    extra = 0.0
+    if effects[JAW_SPRING, STRENGTH] != 0.0:
+        extra += jaw_spring_n_m(effects[JAW_SPRING], jaw_angle)
+    if effects[END_STOP_SPRING, STRENGTH] != 0.0:
+        extra += end_stop_spring_n_m(effects[END_STOP_SPRING], jaw_angle)
+    if effects[JAW_DETENT, STRENGTH] != 0.0:
+        extra += jaw_detent_n_m(effects[JAW_DETENT], jaw_angle)
+    return extra
+
+
+@numba.njit()
+def cable_position_friction_n_m(row: Row, spindle_angle_rad: float) -> float:
+    """Extra Coulomb level at the spindle: F / (1 + x^2)^2, x = (q - q0) / width, F = 15 mN m."""
+    x = (spindle_angle_rad - row[FIRST]) / row[SECOND]
+    bump = 1.0 / (1.0 + x * x)
+    return row[STRENGTH] * 15e-3 * bump * bump
+
+
+@numba.njit()
+def cable_presliding_rate(row: Row, bristle: float, spindle_speed: float) -> float:
+    """Rate of the bristle's bend u in -1..1: u' = w / z0 (1 - u^3 sgn w)."""
+    bend = bristle * bristle * bristle
+    return spindle_speed / row[FIRST] * (1.0 - (bend if spindle_speed > 0.0 else -bend))
+
+
+@numba.njit()
+def cable_presliding_n_m(row: Row, bristle: float) -> float:
+    """Torque of the bent bristle on the spindle: F u, F = 12 mN m at strength 1."""
+    return row[STRENGTH] * 12e-3 * bristle
+
+
+@numba.njit()
+def cable_creep_n_m(row: Row, strain_rad: float, stiffness: float) -> float:
+    """Tension of the branch that relaxes: 0.2 k e, e the strain not yet relaxed."""
+    return row[STRENGTH] * 0.2 * stiffness * strain_rad
+
+
+@numba.njit()
+def cable_creep_rate(row: Row, strain_rad: float) -> float:
+    """Rate of relaxation: e (1 + |e| / 0.1 rad) / T."""
+    return strain_rad * (1.0 + abs(strain_rad) / 0.1) / row[FIRST]
+
+
+@numba.njit()
+def jaw_spring_n_m(row: Row, jaw_angle_rad: float) -> float:
+    """Torque that opposes closing: k x / (1 + |x| / x0), x = q - rest, k = 0.04 N m/rad."""
+    x = jaw_angle_rad - row[FIRST]
+    return row[STRENGTH] * 0.04 * x / (1.0 + abs(x) / row[SECOND])
+
+
+@numba.njit()
+def end_stop_spring_n_m(row: Row, jaw_angle_rad: float) -> float:
+    """Torque that opposes closing: k p^1.5, p = q - contact, k = 0.15 N m at strength 1."""
+    penetration = jaw_angle_rad - row[FIRST]
+    if penetration <= 0.0:
+        return 0.0
+    return row[STRENGTH] * 0.15 * penetration * math.sqrt(penetration)
+
+
+@numba.njit()
+def cable_growing_friction_n_m(row: Row, spindle_angle_rad: float) -> float:
+    """Extra Coulomb level at the spindle: F y^2 / (1 + y), y = (q - q0) / width, F = 12 mN m."""
+    y = max(spindle_angle_rad - row[FIRST], 0.0) / row[SECOND]
+    return row[STRENGTH] * 12e-3 * y * y / (1.0 + y)
+
+
+@numba.njit()
+def cable_load_notch_n_m(row: Row, spindle_angle_rad: float, cable_torque_n_m: float) -> float:
+    """Extra Coulomb level where the cable is worn: 0.4 |C| / (1 + x^2)^2, x = (q - q0) / width."""
+    x = (spindle_angle_rad - row[FIRST]) / row[SECOND]
+    bump = 1.0 / (1.0 + x * x)
+    return row[STRENGTH] * 0.4 * abs(cable_torque_n_m) * bump * bump
+
+
+@numba.njit()
+def friction_step_n_m(row: Row, clock_s: float) -> float:
+    """Extra Coulomb level at the spindle from a time on: F x / (1 + x), x = (t - t0) / 0.1 s.
+
+    F = 12 mN m at strength 1; the clock starts with the bench.
+    """
+    x = max(clock_s - row[FIRST], 0.0) / 0.1
+    return row[STRENGTH] * 12e-3 * x / (1.0 + x)
+
+
+@numba.njit()
+def cable_hysteresis_rate(row: Row, bend: float, stretch_rate_rad_s: float) -> float:
+    """Rate of the bend u: u' = e' / z0 (1 - u^2 (0.7 sgn(e' u) + 0.3)), Bouc-Wen of order 2."""
+    sign = 1.0 if stretch_rate_rad_s * bend > 0.0 else -1.0
+    return stretch_rate_rad_s / row[FIRST] * (1.0 - bend * bend * (0.7 * sign + 0.3))
+
+
+@numba.njit()
+def cable_hysteresis_n_m(row: Row, bend: float) -> float:
+    """Tension of the wires that rub on each other: F u, F = 10 mN m at strength 1."""
+    return row[STRENGTH] * 10e-3 * bend
+
+
+@numba.njit()
+def spindle_ripple_n_m(row: Row, spindle_angle_rad: float) -> float:
+    """Torque that opposes closing: A (sin(k q + p) + 0.3 sin(2 k q)), A = 7 mN m."""
+    angle = row[FIRST] * spindle_angle_rad
+    return row[STRENGTH] * 7e-3 * (math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle))
+
+
+@numba.njit()
+def eccentric_pulley_rad(row: Row, spindle_angle_rad: float) -> float:
+    """Cable wound beyond the round pulley's: 0.12 / n (sin(n q + p) + 0.15 sin(2 n q))."""
+    angle = row[FIRST] * spindle_angle_rad
+    wave = math.sin(angle + row[SECOND]) + 0.15 * math.sin(2.0 * angle)
+    return row[STRENGTH] * 0.12 / row[FIRST] * wave
+
+
+@numba.njit()
+def eccentric_pulley_slope(row: Row, spindle_angle_rad: float) -> float:
+    """Derivative of the cable wound with the spindle angle: the lever arm it adds."""
+    angle = row[FIRST] * spindle_angle_rad
+    return row[STRENGTH] * 0.12 * (math.cos(angle + row[SECOND]) + 0.3 * math.cos(2.0 * angle))
+
+
+@numba.njit()
+def jaw_mass_kg_m2(row: Row) -> float:
+    """Inertia that moves with the jaw beside its own: 0.12 g m^2 at strength 1."""
+    return row[STRENGTH] * 1.2e-4
+
+
+@numba.njit()
+def jaw_detent_n_m(row: Row, jaw_angle_rad: float) -> float:
+    """A notch the jaw falls into: A 3 x / (1 + x^2)^2, x = (q - q0) / width, A = 8 mN m."""
+    x = (jaw_angle_rad - row[FIRST]) / row[SECOND]
+    bump = 1.0 / (1.0 + x * x)
+    return row[STRENGTH] * 24e-3 * x * bump * bump

@@ -1,0 +1,91 @@
+"""The verbs as they are typed."""
+
+import json
+from typing import Any
+
+import pytest
+import typer
+
+from rig.cli.log import log_app
+from rig.errors import ExitCode, UsageError
+from rig.log.writer import LogExistsError
+
+
+@pytest.fixture
+def rig(capsys):
+    """Run `rig log ...` and return its exit code, the object on stdout and the text on stderr."""
+    app = typer.Typer()
+    app.add_typer(log_app)
+
+    def run(*words: Any) -> tuple[int, Any, str]:
+        code = app(["log", *map(str, words)], standalone_mode=False)
+        out, err = capsys.readouterr()
+        return int(code or 0), json.loads(out) if out else None, err
+
+    return run
+
+
+def test_info_for_people(rig, log):
+    code, out, err = rig("info", log)
+    assert (code, out) == (0, None)
+    for words in ("run of bench 1", "load_command_a = 0.3", "/rig/sample", "1000.00", "rig.toml"):
+        assert words in err
+    assert "2026-09-21T" in err
+
+
+def test_info_for_machines(rig, log):
+    code, out, err = rig("info", log, "--json")
+    assert (code, err) == (0, "")
+    (found,) = out["logs"]
+    assert found["run"]["conditions"] == {"load_command_a": 0.3, "object": "spring"}
+    assert found["topics"][0]["messages"] == 600
+    assert found["topics"][0]["fields"]["proximal_torque_n_m"] == "N m"
+    assert found["end"]["drift_verdict"] == "within limits"
+    assert found["damaged"] is False
+
+
+def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path, make_log):
+    make_log(tmp_path / "a.mcap")
+    assert rig("check", tmp_path)[0] == ExitCode.OK
+    make_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
+    code, _, err = rig("check", tmp_path)
+    assert code == ExitCode.FAILED
+    assert "gap at 0.0290 s, 3.0 ms: 2 samples, 30 to 31" in err
+    whole = make_log(tmp_path / "c.mcap")
+    whole.write_bytes(whole.read_bytes()[:-1])
+    code, out, _ = rig("check", tmp_path, "--json")
+    assert code == out["exit_code"] == ExitCode.DATA
+    assert [log["verdict"] for log in out["logs"]] == ["complete", "incomplete", "damaged"]
+    assert out["logs"][1]["topics"][0]["gaps"][0]["samples"] == 2
+
+
+def test_repair_says_what_was_saved_and_lost(rig, log):
+    assert "not damaged" in rig("repair", log)[2]
+    log.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
+    code, out, _ = rig("repair", log, "--json")
+    assert code == 0
+    assert out["repaired"].endswith("run.repaired.mcap")
+    assert 0 < out["recovered"]["/rig/sample"] < 600
+    with pytest.raises(LogExistsError):
+        rig("repair", log)
+    err = rig("repair", log, "--out", log.with_name("again.mcap"))[2]
+    assert "read it back equal" in err
+    assert "is unchanged" in err
+
+
+def test_export(rig, log, tmp_path):
+    code, out, _ = rig("export", log, "--format", "npz", "--json")
+    assert code == 0
+    assert len(out["written"]) == 2
+    err = rig("export", log, "--topic", "/rig/sample", "--out", tmp_path / "x.csv")[2]
+    assert err == f"wrote {tmp_path / 'x.csv'}\n"
+    with pytest.raises(UsageError, match="--force"):
+        rig("export", log, "--format", "npz")
+    rig("export", log, "--format", "npz", "--force")
+    with pytest.raises(UsageError, match="csv, parquet, npz"):
+        rig("export", log, "--format", "xls")
+
+
+def test_a_folder_without_logs(rig, tmp_path):
+    with pytest.raises(UsageError, match="no log"):
+        rig("check", tmp_path)

@@ -1,0 +1,121 @@
+import csv
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from estimation.recording import Flag, Recording, Stretch
+from rig.errors import UsageError
+from rig.log.convert import write_recording
+from rig.log.export import ExportExistsError, ExportFormat, export_log
+from rig.log.reader import DamagedLogError, read_log
+from rig.log.streams import COUNTS, SAMPLE
+
+
+def read_csv(path):
+    with path.open(newline="") as file:
+        names, *lines = csv.reader(file)
+    columns = np.array(lines, dtype=float).T
+    return dict(zip(names, columns, strict=True))
+
+
+def read_parquet(path):
+    table = pyarrow.parquet.read_table(path)
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def read_npz(path):
+    with np.load(path, allow_pickle=False) as data:
+        return dict(data)
+
+
+READERS = {
+    ExportFormat.CSV: read_csv,
+    ExportFormat.PARQUET: read_parquet,
+    ExportFormat.NPZ: read_npz,
+}
+
+
+@pytest.mark.parametrize("kind", list(ExportFormat))
+def test_every_value_is_exported_exactly(tmp_path, log, kind):
+    written = export_log(log, kind)
+    assert [item.name for item in written] == [
+        f"run.rig-sample.{kind.value}",
+        f"run.rig-counts.{kind.value}",
+    ]
+    assert sorted(item.name for item in tmp_path.iterdir()) == sorted(
+        ["run.mcap", *(item.name for item in written)]
+    )
+    source = read_log(log)
+    for path, topic in zip(written, (SAMPLE, COUNTS), strict=True):
+        columns = READERS[kind](path)
+        assert list(columns) == ["log_time_ns", *source.topics[topic].columns]
+        for name in source.topics[topic].columns:
+            np.testing.assert_array_equal(columns[name], source.topics[topic].rows[name])
+        assert columns["log_time_ns"].astype(np.uint64)[5] == pytest.approx(
+            source.topics[topic].log_time_ns[5], rel=1e-15
+        )
+
+
+@pytest.mark.parametrize("kind", list(ExportFormat))
+def test_flags_and_missing_values_are_exported(tmp_path, kind):
+    values = np.array([1.0, np.nan, 3.0])
+    recording = Recording("a", np.arange(3) * 1e-3, {"motor_current_a": values})
+    recording = recording.with_stretch(Stretch(1e-3, 1e-3, Flag.MISSING, "lost"))
+    path = write_recording(tmp_path / "a.mcap", recording)
+    (written,) = export_log(path, kind)
+    columns = READERS[kind](written)
+    np.testing.assert_array_equal(columns["motor_current_a"], values)
+    np.testing.assert_array_equal(columns["flags"], [0, 4, 0])
+
+
+def test_units_are_in_the_parquet_schema(log, tmp_path):
+    (written,) = export_log(log, ExportFormat.PARQUET, tmp_path / "x.parquet", SAMPLE)
+    field = pyarrow.parquet.read_schema(written).field("proximal_torque_n_m")
+    assert field.metadata[b"unit"] == b"N m"
+
+
+def test_one_topic_goes_to_the_named_file(log, tmp_path):
+    target = tmp_path / "counts.csv"
+    assert export_log(log, ExportFormat.CSV, target, COUNTS) == [target]
+
+
+def test_all_topics_go_to_a_folder(log, tmp_path):
+    written = export_log(log, ExportFormat.NPZ, tmp_path / "new" / "folder")
+    assert {item.parent for item in written} == {tmp_path / "new" / "folder"}
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="2 topics"):
+        export_log(log, ExportFormat.NPZ, tmp_path / "file")
+
+
+def test_a_file_that_is_there_is_kept_unless_forced(log, tmp_path):
+    target = tmp_path / "run.rig-counts.csv"
+    target.write_text("precious")
+    with pytest.raises(ExportExistsError, match="--force"):
+        export_log(log, ExportFormat.CSV)
+    assert target.read_text() == "precious"
+    assert not (tmp_path / "run.rig-sample.csv").exists()
+    export_log(log, ExportFormat.CSV, force=True)
+    assert target.read_text().startswith("log_time_ns,motor,spindle")
+
+
+def test_a_failure_leaves_no_half_file(log, tmp_path, monkeypatch):
+    def fail(file, **columns):
+        file.write(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(np, "savez_compressed", fail)
+    with pytest.raises(OSError, match="disk full"):
+        export_log(log, ExportFormat.NPZ)
+    assert [item.name for item in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_a_damaged_log_is_not_exported(log):
+    log.write_bytes(log.read_bytes()[:-50])
+    with pytest.raises(DamagedLogError, match="repair"):
+        export_log(log, ExportFormat.CSV)
+
+
+def test_a_topic_that_is_not_there(log):
+    with pytest.raises(UsageError, match="no topic"):
+        export_log(log, ExportFormat.CSV, topic="/rig/nothing")

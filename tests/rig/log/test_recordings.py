@@ -1,0 +1,221 @@
+"""Recordings survive the log, and logs open as campaigns."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from estimation.campaign import CampaignError
+from estimation.channels import CHANNELS
+from estimation.recording import Flag, Instrument, Mark, Recording, Stretch
+from rig.errors import DataError
+from rig.importers.log import IMPORTER
+from rig.importers.registry import Importer
+from rig.log.convert import recording_from_log, write_recording
+from rig.log.messages import UnflaggedSampleError
+from rig.log.reader import DamagedLogError, read_log
+from rig.log.repair import repair_log
+
+TEXT = st.text(max_size=20)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+NAMES = st.sampled_from(sorted(set(CHANNELS) - {"time_s"}))
+
+
+@st.composite
+def recordings(draw):
+    count = draw(st.integers(0, 40))
+    steps = draw(hnp.arrays(np.float64, count, elements=st.floats(1e-6, 10)))
+    column = hnp.arrays(np.float64, count, elements=FINITE)
+    marks = st.lists(st.builds(Mark, FINITE, TEXT), max_size=3)
+    stretch = st.builds(
+        Stretch, FINITE, FINITE, st.sampled_from(list(Flag)), TEXT, st.none() | NAMES
+    )
+    word = st.none() | TEXT
+    return Recording(
+        name=draw(TEXT),
+        time_s=np.cumsum(steps),
+        columns=draw(st.dictionaries(NAMES, column, max_size=4)),
+        flags=draw(hnp.arrays(np.uint8, count)),
+        conditions=draw(st.dictionaries(TEXT, FINITE | TEXT, max_size=3)),
+        rig=draw(TEXT),
+        instrument=Instrument(*(draw(word) for _ in range(4)), draw(st.none() | st.integers(0))),
+        notes=draw(TEXT),
+        marks=tuple(draw(marks)),
+        stretches=tuple(draw(st.lists(stretch, max_size=3))),
+        started_at_ns=draw(st.none() | st.integers(0, 2**62)),
+        calibrations=draw(st.dictionaries(TEXT, TEXT, max_size=2)),
+        source="bench",
+        excluded=draw(word),
+    )
+
+
+def assert_equal(one, other):
+    for name in (
+        *("name", "rig", "instrument", "notes", "marks", "stretches", "started_at_ns"),
+        *("source", "excluded"),
+    ):
+        assert getattr(one, name) == getattr(other, name), name
+    assert dict(one.conditions) == dict(other.conditions)
+    assert dict(one.calibrations) == dict(other.calibrations)
+    assert list(one.columns) == list(other.columns)
+    for name in ("time_s", *one.columns):
+        assert one[name].tobytes() == other[name].tobytes(), name
+    assert one.flags.tobytes() == other.flags.tobytes()
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(recording=recordings())
+def test_a_recording_survives_the_log(tmp_path, recording):
+    path = tmp_path / "a.mcap"
+    path.unlink(missing_ok=True)
+    write_recording(path, recording)
+    assert_equal(recording_from_log(read_log(path)), recording)
+
+
+def simple(name="run", started_at_ns=None, **changes):
+    fields = {"time_s": np.arange(50) * 1e-3, "columns": {"motor_current_a": np.ones(50)}}
+    return Recording(name, **(fields | changes), started_at_ns=started_at_ns)
+
+
+def test_a_value_that_is_not_a_number_survives_where_it_is_flagged(tmp_path):
+    values = np.ones(50)
+    values[7] = np.nan
+    recording = simple(columns={"motor_current_a": values})
+    with pytest.raises(UnflaggedSampleError, match="motor_current_a"):
+        write_recording(tmp_path / "a.mcap", recording)
+    assert list(tmp_path.iterdir()) == []
+    flagged = recording.with_stretch(Stretch(7e-3, 7e-3, Flag.MISSING, "not received"))
+    write_recording(tmp_path / "a.mcap", flagged)
+    assert_equal(
+        recording_from_log(read_log(tmp_path / "a.mcap")),
+        Recording(**{**flagged.__dict__, "source": str(tmp_path / "a.mcap")}),
+    )
+
+
+def test_log_times_are_the_start_plus_the_device_time(tmp_path):
+    write_recording(tmp_path / "a.mcap", simple(started_at_ns=10**18))
+    times = read_log(tmp_path / "a.mcap").topics["/rig/sample"].log_time_ns
+    np.testing.assert_array_equal(times, 10**18 + np.arange(50) * 1_000_000)
+
+
+@pytest.mark.parametrize(
+    ("start_s", "started_at_ns", "fits"),
+    [(-5.0, None, True), (-5.0, 10**18, True), (-5.0, 10**9, False), (1e12, None, False)],
+)
+def test_times_before_1970_or_beyond_reach_are_refused(tmp_path, start_s, started_at_ns, fits):
+    recording = simple(started_at_ns=started_at_ns, time_s=start_s + np.arange(50))
+    if fits:
+        write_recording(tmp_path / "a.mcap", recording)
+        back = recording_from_log(read_log(tmp_path / "a.mcap"))
+        np.testing.assert_array_equal(back.time_s, recording.time_s)
+    else:
+        with pytest.raises(DataError, match="times cannot be written"):
+            write_recording(tmp_path / "a.mcap", recording)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_the_importer_keeps_the_protocol():
+    assert isinstance(IMPORTER, Importer)
+
+
+def test_a_folder_opens_as_a_campaign_in_the_order_of_the_starts(tmp_path):
+    for name, start_ns in (("b", 10**18), ("a", 3 * 10**18), ("c", 2 * 10**18)):
+        write_recording(tmp_path / f"{name}.mcap", simple(name, start_ns))
+    (tmp_path / "notes.txt").write_text("not a log")
+    assert IMPORTER.recognises(tmp_path)
+    campaign = IMPORTER.open(tmp_path)
+    assert campaign.names == ("b", "c", "a")
+    assert [len(recording) for recording in campaign] == [50, 50, 50]
+    assert campaign.clock().gap_known.all()
+
+
+def test_a_single_log_opens_as_a_campaign_of_one(log):
+    assert IMPORTER.recognises(log)
+    (recording,) = IMPORTER.open(log)
+    assert recording.conditions["load_command_a"] == 0.3
+    assert recording.marks[0].text == "finger on the jaw"
+    assert "proximal_torque_n_m" in recording
+
+
+def test_runs_are_read_only_when_asked_for(tmp_path):
+    write_recording(tmp_path / "a.mcap", simple("a"))
+    campaign = IMPORTER.open(tmp_path)
+    (tmp_path / "a.mcap").unlink()
+    assert campaign.names == ("a",)
+    with pytest.raises(Exception, match="cannot be read"):
+        campaign.runs[0].recording()
+
+
+def test_an_exclusion_is_known_without_reading_samples(tmp_path):
+    write_recording(tmp_path / "a.mcap", simple("a", excluded="cable slipped"))
+    campaign = IMPORTER.open(tmp_path)
+    assert campaign.runs[0].excluded == "cable slipped"
+    assert len(campaign.evidence) == 0
+
+
+def kill(path):
+    """Leave what a killed recorder leaves."""
+    data = path.read_bytes()
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(data[: data.find(b"rig.end") - 20])
+    path.unlink()
+    return part
+
+
+def test_an_unclosed_log_is_opened_but_is_no_evidence_until_repaired(tmp_path, make_log):
+    write_recording(tmp_path / "whole.mcap", simple("whole"))
+    part = kill(make_log(tmp_path / "killed.mcap"))
+    campaign = IMPORTER.open(tmp_path)
+    assert set(campaign.names) == {"whole", "killed"}
+    assert campaign.evidence.names == ("whole",)
+    killed = next(r for r in campaign if r.name == "killed")
+    assert len(killed) == 600
+    assert "rig log repair" in killed.excluded
+
+    repair_log(part)
+    campaign = IMPORTER.open(tmp_path)
+    assert set(campaign.evidence.names) == {"whole", "killed"}
+    killed = next(r for r in campaign if r.name == "killed")
+    assert "did not end as planned: repaired" in killed.notes
+
+
+def test_the_attempt_that_ended_as_planned_stands_for_the_run(tmp_path, make_log):
+    first = kill(make_log(tmp_path / "sine.mcap"))
+    first = first.rename(tmp_path / "sine.aborted-1.mcap.part")
+    make_log(tmp_path / "sine.mcap")
+    (run,) = IMPORTER.open(tmp_path).runs
+    assert run.source == tmp_path / "sine.mcap"
+    repair_log(first)
+    (run,) = IMPORTER.open(tmp_path).runs
+    assert run.source == tmp_path / "sine.mcap"
+    assert run.excluded is None
+
+
+def test_two_whole_logs_of_one_name_are_refused(tmp_path):
+    write_recording(tmp_path / "a.mcap", simple("twin"))
+    write_recording(tmp_path / "b.mcap", simple("twin"))
+    with pytest.raises(CampaignError, match="twin"):
+        IMPORTER.open(tmp_path)
+
+
+def test_a_damaged_log_is_not_half_imported(tmp_path, log):
+    data = bytearray(log.read_bytes())
+    data[data.find(b"zstd") + 60] ^= 1
+    (tmp_path / "sub").mkdir()
+    damaged = tmp_path / "sub" / "run.mcap"
+    damaged.write_bytes(data)
+    campaign = IMPORTER.open(damaged)
+    with pytest.raises(DamagedLogError, match="rig log repair"):
+        campaign.runs[0].recording()
+    damaged.write_bytes(log.read_bytes()[:-1])
+    with pytest.raises(DamagedLogError, match="does not end as MCAP"):
+        IMPORTER.open(damaged)
+
+
+def test_a_folder_without_logs_is_not_recognised(tmp_path):
+    (tmp_path / "a.mcap").write_text("only the name of a log")
+    assert not IMPORTER.recognises(tmp_path)
+    (tmp_path / "a.mcap").unlink()
+    with pytest.raises(DataError, match="no log"):
+        IMPORTER.open(tmp_path)

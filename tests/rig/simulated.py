@@ -1,0 +1,59 @@
+"""Small protocols and sessions on the simulated rig that several tests share."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import STATUS_ARMED
+from drivers.transport.simulated import Board, SimulatedTransport
+from rig.config import Config, load_config
+from rig.protocol import Protocol
+from rig.simulation.logger import open_simulated_logger
+
+
+def short_protocol(runs: int = 3, duration_s: float = 1.0) -> Protocol:
+    """A protocol of a few short runs, one load each."""
+    loads = [round(0.1 * (k + 1), 1) for k in range(runs)]
+    table = {"kind": "sine", "frequencies_hz": [1.0], "loads_a": loads, "duration_s": duration_s}
+    return Protocol.model_validate({"name": "short", "runs": [table]})
+
+
+def simulated(**simulation: object) -> Config:
+    """The simulated rig's configuration, on the Python fake unless told otherwise."""
+    return load_config().changed(simulation={"firmware": False, **simulation})
+
+
+def transport(config: Config) -> SimulatedTransport:
+    """A transport to the configured simulated rig."""
+    return open_simulated_logger(config.simulation)
+
+
+class Wrapped:
+    """A board whose output goes through a function: for losing and damaging bytes."""
+
+    def __init__(self, board: Board, change: object) -> None:
+        self._board = board
+        self._change = change
+
+    def receive(self, data: bytes) -> None:
+        self._board.receive(data)
+
+    def advance(self, ticks: int) -> None:
+        self._board.advance(ticks)
+
+    def transmit(self) -> bytes:
+        return self._change(self._board.transmit())  # type: ignore[operator,no-any-return]
+
+
+def status_of(board: Board) -> NDArray[np.uint16]:
+    """Ask a board, by a fresh link, for the status of its next samples."""
+    logger = TeensyLogger(SimulatedTransport(board))
+    logger.identify()
+    logger.start()
+    status: NDArray[np.uint16] = logger.read(0.1).samples["status"]
+    return status
+
+
+def is_armed(board: Board) -> bool:
+    """Whether a board's motors are in force now."""
+    return bool((status_of(board)[-1] & STATUS_ARMED) != 0)

@@ -1,0 +1,64 @@
+"""The demonstration and the fit, as a user runs them."""
+
+import json
+
+import pytest
+
+from estimation import model_file
+from rig.cli.main import main
+from rig.log.reader import read_log
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    return tmp_path_factory.mktemp("demo") / "out"
+
+
+@pytest.fixture(scope="module")
+def told(demo):
+    """What `rig demo --json` prints, run once."""
+    import contextlib
+    import io
+
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        assert main(["demo", "--seed", "1", "--out", str(demo), "--json"]) == 0
+    return json.loads(out.getvalue())
+
+
+def test_the_demo_leaves_logs_a_model_and_a_report(demo, told):
+    assert len(list((demo / "logs").glob("*.mcap"))) == 12
+    page = (demo / "report.html").read_text()
+    assert "<svg" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert told["report"] == str(demo / "report.html")
+    assert told["structures"]
+
+
+def test_the_hidden_effect_is_not_told_to_whoever_reads_the_logs(demo, told):
+    from rig.simulation.hidden import NAMES
+
+    for path in (demo / "logs").glob("*.mcap"):
+        log = read_log(path)
+        content = json.dumps([dict(log.run.conditions), log.run.notes, dict(log.run.details)])
+        content += "".join(a.data.decode() for a in log.attachments)
+        assert not [name for name in NAMES if name in content]
+
+
+def test_a_fit_reports_the_error_on_runs_it_was_not_fitted_on(demo, told, tmp_path, capsys):
+    out = tmp_path / "grip.model.toml"
+    words = ["fit", str(demo / "logs"), "-m", "grip", "-o", str(out), "--json"]
+    assert main(words) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert 0 < result["held_out"]["rmse"] < 0.05
+    assert result["held_out"]["runs"] == 12
+    fitted = model_file.read(out)
+    assert fitted.is_fitted
+    assert main(["replay", str(demo / "logs"), "--model", str(out), "--speed", "0", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out.splitlines()[-1])["summary"]
+    assert summary["error_rms"] < 0.05
+
+
+def test_a_fit_of_what_is_not_there_says_so(tmp_path, capsys):
+    assert main(["fit", str(tmp_path / "none")]) == 2
+    assert "There is no file or folder" in capsys.readouterr().err

@@ -1,0 +1,203 @@
+"""Recording a campaign: whole logs, resumable, nothing overwritten."""
+
+import json
+from collections import namedtuple
+
+import numpy as np
+import pytest
+
+from drivers.teensy.firmware_fake import firmware_library
+from drivers.transport.simulated import SimulatedTransport
+from rig.cli.main import main
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
+from rig.log.check import Verdict, check_log
+from rig.log.reader import read_log
+from rig.log.streams import COUNTS, SAMPLE
+from rig.record import open_campaign_folder, record_campaign
+from rig.session import Session
+from tests.rig.simulated import Wrapped, short_protocol, simulated, transport
+
+
+def record(folder, config=None, protocol=None, resume=False, link=None, **options):
+    config = config or simulated()
+    plans = open_campaign_folder(folder, protocol or short_protocol(), config, resume)
+    with Session(config, link or transport(config)) as session:
+        return list(record_campaign(session, plans, folder, **options))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("campaign") / "runs"
+    record(path, notes="new cable")
+    return path
+
+
+def test_a_campaign_is_one_whole_log_a_run(folder):
+    logs = sorted(folder.glob("*.mcap"))
+    assert [log.stem for log in logs] == [
+        "000-sine-1Hz-0.1A",
+        "001-sine-1Hz-0.2A",
+        "002-sine-1Hz-0.3A",
+    ]
+    for log in logs:
+        report = check_log(log)
+        assert report.verdict is Verdict.COMPLETE
+    assert not list(folder.glob("*.part"))
+
+
+def test_the_runs_read_back_with_what_was_known(folder):
+    campaign = open_campaign(folder)
+    runs = list(campaign)
+    assert [r.conditions["load_command_a"] for r in runs] == [0.1, 0.2, 0.3]
+    for run in runs:
+        assert len(run) == 1000
+        assert run.time_s[0] == 0.0
+        assert run.notes.startswith("new cable")
+        assert run.instrument.serial == "SIM-TOOL-1"
+        assert set(run.calibrations) == {"reference"}
+        assert run.valid.all()
+    clock = campaign.clock()
+    assert clock.gap_known.all()
+    assert (np.diff(clock.start_s) > 1.0).all()
+
+
+def test_closing_is_positive_in_every_channel(folder):
+    run = list(open_campaign(folder))[2]
+    closing = np.gradient(run["spindle_angle_rad"]) > 5e-4
+    opening = np.gradient(run["spindle_angle_rad"]) < -5e-4
+    for channel in ("motor_current_a", "motor_command_ratio", "proximal_torque_n_m"):
+        assert run[channel][closing].mean() > run[channel][opening].mean()
+    for channel in ("motor_angle_rad", "jaw_angle_rad", "target_angle_rad"):
+        assert np.corrcoef(run[channel], run["spindle_angle_rad"])[0, 1] > 0.98
+    assert run["distal_torque_n_m"].mean() > 0
+
+
+def test_si_samples_and_counts_tell_the_same_story(folder):
+    log = read_log(sorted(folder.glob("*.mcap"))[0])
+    sample, counts = log.topics[SAMPLE].rows, log.topics[COUNTS].rows
+    np.testing.assert_array_equal(sample["sequence"], counts["sequence"])
+    zero = log.run.zeros_before["proximal_torque_n_m_counts"]
+    np.testing.assert_allclose(
+        sample["proximal_torque_n_m"], (counts["proximal"] - zero) * 0.000039811
+    )
+    names = {attached.name for attached in log.attachments}
+    assert names == {"config.json", "calibrations.json"}
+    assert log.end.drift_verdict == "steady"
+    assert set(log.end.drift) == {"proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"}
+
+
+def test_one_seed_gives_one_campaign(folder, tmp_path):
+    record(tmp_path / "again")
+    for log in sorted(folder.glob("*.mcap")):
+        first = read_log(log).topics[COUNTS].rows
+        second = read_log(tmp_path / "again" / log.name).topics[COUNTS].rows
+        np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.skipif(firmware_library() is None, reason="the firmware library is not built")
+def test_the_firmware_and_the_fake_record_the_same_counts(folder, tmp_path):
+    record(tmp_path / "firmware", simulated(firmware=True))
+    for log in sorted(folder.glob("*.mcap")):
+        fake = read_log(log).topics[COUNTS].rows
+        firmware = read_log(tmp_path / "firmware" / log.name).topics[COUNTS].rows
+        np.testing.assert_array_equal(fake, firmware)
+
+
+def test_an_aborted_campaign_resumes_and_loses_nothing(tmp_path):
+    def abort(name, samples, expected):
+        if name.startswith("001") and samples >= 400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        record(tmp_path, on_progress=abort)
+    first = (tmp_path / "000-sine-1Hz-0.1A.mcap").read_bytes()
+    aborted = [p for p in tmp_path.iterdir() if p.name.startswith("001")]
+    assert len(aborted) == 1
+    kept = read_log(aborted[0], tolerant=True).topics[COUNTS]
+    results = record(tmp_path, resume=True)
+    assert [r.name[:3] for r in results] == ["001", "002"]
+    assert (tmp_path / "000-sine-1Hz-0.1A.mcap").read_bytes() == first
+    assert len(kept) >= 400
+    assert any(
+        read_log(p, tolerant=True).topics[COUNTS].rows.size == kept.rows.size
+        for p in tmp_path.iterdir()
+        if p.name.startswith("001") and "aborted" in p.name
+    )
+    assert len(open_campaign(tmp_path).evidence) == 3
+    assert open_campaign(tmp_path).clock().gap_known.all()
+
+
+def test_nothing_is_overwritten(folder, tmp_path):
+    with pytest.raises(UsageError, match="already holds a campaign"):
+        record(folder)
+    with pytest.raises(UsageError, match="another protocol"):
+        record(folder, protocol=short_protocol(2), resume=True)
+    with pytest.raises(UsageError, match="another protocol or configuration"):
+        record(folder, config=simulated(seed=5), resume=True)
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(UsageError, match="not empty"):
+        record(tmp_path)
+
+
+def test_a_full_disk_is_seen_before_anything_moves(tmp_path, monkeypatch):
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10, 10, 1000))
+    with pytest.raises(UsageError, match="are free"):
+        record(tmp_path / "full")
+
+
+def test_lost_samples_make_a_run_incomplete_and_are_listed(tmp_path):
+    config = simulated()
+    link = transport(config)
+    generator = np.random.default_rng(1)
+
+    def damage(data):
+        bad = bytearray(data)
+        if len(bad) > 1000:
+            bad[int(generator.integers(0, len(bad)))] ^= 0x11
+        return bytes(bad)
+
+    lossy = SimulatedTransport(Wrapped(link.board, damage), step_s=0.2)
+    (result,) = record(tmp_path, config, short_protocol(1), link=lossy)
+    assert 0 < result.expected - result.samples < 40
+    assert "lost" in result.remark
+    report = check_log(result.path)
+    assert report.verdict is not Verdict.COMPLETE
+    topic = next(t for t in report.topics if t.topic == SAMPLE)
+    assert topic.received == result.samples
+    assert sum(gap.samples for gap in topic.gaps) + topic.received <= result.expected
+    assert topic.gaps
+
+
+def test_a_drifting_sensor_is_told(tmp_path):
+    config = simulated().changed(drift={"proximal_torque_n_m": 1e-9})
+    (result,) = record(tmp_path, config, short_protocol(1))
+    assert result.drifted == ("proximal_torque_n_m",)
+    assert "zero of proximal_torque_n_m moved" in result.remark
+    assert "drifted" in read_log(result.path).end.drift_verdict
+
+
+def test_the_command_records_and_says_what_next(tmp_path, capsys):
+    protocol = tmp_path / "p.toml"
+    protocol.write_text(
+        'name = "tiny"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
+        "duration_s = 0.5\n"
+    )
+    out = tmp_path / "out"
+    words = ["record", "-p", str(protocol), "-o", str(out), "--json"]
+    assert main(words) == 0
+    captured = capsys.readouterr()
+    told = json.loads(captured.out)
+    assert told["runs"][0]["samples"] == 500
+    assert told["look_at"] == []
+    assert "rig log check" in captured.err
+    assert main(words) == 2
+    assert "rig record --resume" in capsys.readouterr().err
+    assert main(["record", "--resume", str(out), "--seed", "3"]) == 2
+    assert "goes on as the campaign was begun" in capsys.readouterr().err
+    (out / "000-sine-1Hz-0.2A.mcap").unlink()
+    assert main(["record", "--resume", str(out), "--json"]) == 0
+    assert [run["samples"] for run in json.loads(capsys.readouterr().out)["runs"]] == [500]
+    assert main(["record", "--resume", str(tmp_path)]) == 2
+    assert "holds no campaign" in capsys.readouterr().err

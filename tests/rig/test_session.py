@@ -1,0 +1,183 @@
+"""A session: what it reads, what it refuses, and that it ends safe on every way out."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from drivers.teensy.driver import SampleBatch
+from drivers.teensy.protocol import (
+    STATUS_ARMED,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_QUEUE_DRY,
+    STATUS_SATURATED,
+)
+from drivers.transport.simulated import SimulatedTransport
+from estimation.recording import Flag
+from rig.errors import ExitCode, SafetyTripError, exit_code_of
+from rig.reading import reading_of, with_setpoints
+from rig.session import LoggerStalledError, Session
+from tests.rig.simulated import Wrapped, is_armed, simulated, transport
+
+HOLD = np.full(600, -1.0)
+LOAD = np.full(600, 0.3)
+
+
+def test_rest_reads_a_disarmed_rig_in_si_units():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        reading = next(session.rest(0.2))
+    assert not reading.armed
+    assert set(reading.columns) == set(config.calibration_set().channels)
+    np.testing.assert_allclose(np.diff(reading.time_s), 1e-3)
+    assert (reading.setpoint == -1).all()
+
+
+def test_zeros_are_taken_from_what_is_read_after():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        offset = np.mean([r.columns["proximal_torque_n_m"].mean() for r in session.rest(0.5)])
+        session.take_zeros(0.5)
+        zeroed = np.mean([r.columns["proximal_torque_n_m"].mean() for r in session.rest(0.5)])
+    assert abs(offset) > 5e-3  # the simulated sensor has an offset
+    assert abs(zeroed) < 5e-4
+
+
+def test_every_setpoint_is_played_once_and_in_order():
+    config = simulated()
+    angle = np.linspace(-1.0, -0.6, 1000)
+    with Session(config, transport(config)) as session:
+        readings = list(session.play(angle, np.zeros(1000)))
+    setpoint = np.concatenate([r.setpoint for r in readings])
+    target = np.concatenate([r.columns["target_angle_rad"] for r in readings])
+    played = setpoint[setpoint >= 0]
+    np.testing.assert_array_equal(played, np.arange(1000))
+    np.testing.assert_allclose(target[setpoint >= 0], angle, atol=2 * np.pi / 8192)
+    assert all(r.armed for r in readings)
+
+
+@pytest.mark.parametrize("error", [ValueError("a bug"), KeyboardInterrupt()])
+def test_the_rig_is_disarmed_whatever_ends_the_session(error):
+    config = simulated()
+    link = transport(config)
+    with pytest.raises(type(error)), Session(config, link) as session:  # noqa: PT012
+        assert next(session.play(HOLD, LOAD)).armed
+        raise error
+    assert not is_armed(link.board)
+
+
+def test_sigterm_takes_the_way_out_of_ctrl_c():
+    config = simulated()
+    link = transport(config)
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), Session(config, link) as session:  # noqa: PT012
+        next(session.play(HOLD, LOAD))
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in session.watch():
+            pass
+    assert not is_armed(link.board)
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_crossed_limit_disarms_and_says_which():
+    config = simulated().changed(limits={"proximal_torque_n_m": 0.05})
+    link = transport(config)
+    with Session(config, link) as session:
+        with pytest.raises(SafetyTripError, match=r"limit|proximal_torque_n_m") as trip:
+            list(session.play(np.linspace(-1.0, 0.0, 1500), np.full(1500, 0.9)))
+        assert not next(session.watch()).armed
+    assert exit_code_of(trip.value) == ExitCode.SAFETY
+
+
+@pytest.mark.parametrize(
+    ("angle", "load", "name"),
+    [(9.0, 0.0, "spindle_angle_rad"), (-1.0, 5.0, "load_command_a"), (np.nan, 0.0, "spindle")],
+)
+def test_a_trajectory_beyond_the_limits_is_refused_before_anything_moves(angle, load, name):
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        with pytest.raises(SafetyTripError, match=name):
+            next(session.play(np.full(10, angle), np.full(10, load)))
+        assert not next(session.watch()).armed
+
+
+def test_a_silent_logger_is_named_within_a_second():
+    config = simulated()
+    link = transport(config)
+    silent = False
+    board = Wrapped(link.board, lambda data: b"" if silent else data)
+    paced = SimulatedTransport(board)
+    unsafe = pytest.raises(SafetyTripError, match="did not confirm")
+    with unsafe as left, Session(config, paced) as session:
+        next(session.rest(0.1))
+        silent = True
+        began_s = paced.now_s
+        with pytest.raises(LoggerStalledError, match="sent nothing"):
+            next(session.watch())
+        assert paced.now_s - began_s < 2.0
+    assert "Cut the motor supply" in left.value.fix
+
+
+def test_lost_and_damaged_bytes_are_counted_and_nothing_is_made_up():
+    config = simulated()
+    link = transport(config)
+    generator = np.random.default_rng(0)
+
+    def damage(data: bytes) -> bytes:
+        bad = bytearray(data)
+        if len(bad) > 1000:  # a stretch of samples, not an answer alone
+            for place in generator.integers(0, len(bad), 3):
+                bad[place] ^= 0x55
+        return bytes(bad)
+
+    with Session(config, SimulatedTransport(Wrapped(link.board, damage), step_s=0.2)) as session:
+        readings = list(session.rest(3.0))
+        counters = session.counters
+    ticks = np.concatenate([r.tick_us for r in readings])
+    assert counters["lost"] > 0
+    assert counters["crc_errors"] > 0
+    assert (np.diff(ticks) % 1000 == 0).all()
+    missing = (ticks[-1] - ticks[0]) // 1000 + 1 - ticks.size
+    assert missing == readings[-1].lost
+
+
+def test_a_host_that_is_late_leaves_flagged_samples_not_wrong_ones(monkeypatch):
+    """The queue runs dry when the host is late; the target is held and the samples say so."""
+    monkeypatch.setattr("rig.session.LEAD_S", 0.05)
+    config = simulated()
+    link = SimulatedTransport(transport(config).board, step_s=0.08)
+    with Session(config, link) as session:
+        readings = list(session.play(np.linspace(-1.0, -0.8, 500), np.zeros(500)))
+    setpoint = np.concatenate([r.setpoint for r in readings])
+    flags = np.concatenate([r.flags for r in readings])
+    np.testing.assert_array_equal(setpoint[setpoint >= 0], np.arange(500))
+    held = flags == Flag.STALE
+    assert held.any()
+    assert (setpoint[held] == -1).all()
+
+
+def test_what_the_board_complains_of_becomes_a_flag():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        counts = next(session.rest(0.1)).counts
+    counts["status"][:3] |= STATUS_SATURATED
+    counts["status"][3] |= STATUS_LIMIT_TRIPPED
+    batch = SampleBatch(counts, np.arange(len(counts)) * 1000, 0)
+    reading = reading_of(batch, config.calibration_set(), {}, 0)
+    assert reading.flags[:5].tolist() == [Flag.SATURATED] * 3 + [Flag.SUSPECT, 0]
+
+
+def test_setpoints_are_numbered_past_samples_lost_between_two_readings():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        counts = next(session.rest(0.1)).counts[:6]
+    counts["status"] = [0, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_QUEUE_DRY]
+    counts["sequence"] = [10, 11, 12, 15, 16, 17]
+    batch = SampleBatch(counts, np.arange(6) * 1000, 0)
+    reading = reading_of(batch, config.calibration_set(), {}, 0)
+    first = with_setpoints(reading, 0, 100, None)
+    assert first.setpoint.tolist() == [-1, 0, 1, 4, 5, -1]
+    assert first.flags.tolist() == [0, 0, 0, 0, 0, Flag.STALE]
+    later = with_setpoints(reading, 6, 100, before=7)
+    assert later.setpoint.tolist() == [-1, 6, 7, 10, 11, -1]
