@@ -21,7 +21,7 @@ class BadDataError(CalibrationError):
 
     Attributes:
         rule: `points`, `levels`, `no_change`, `saturated`, `clipped`, `drift`, `hysteresis`,
-            `not_monotone` or `not_steady`.
+            `not_monotone`, `not_linear` or `not_steady`.
     """
 
     def __init__(self, rule: str, what: str, why: str = "", fix: str = "") -> None:
@@ -76,14 +76,17 @@ def check_change(values: FloatArray, least: float, name: str) -> None:
         )
 
 
-def check_rails(values: FloatArray, low: float | None, high: float | None, name: str) -> None:
-    """Refuse values at a rail, or that pile up at their greatest value as if cut off.
+def check_rails(
+    values: FloatArray, low: float | None, high: float | None, name: str, *, pile_up: bool = True
+) -> None:
+    """Refuse values at a rail, or, in a sweep, that pile up at their greatest value as if cut off.
 
     Args:
         values: Readings, shape (n,).
         low: Lower rail; None if rest is there anyway.
         high: Upper rail; None if unknown.
         name: What they are.
+        pile_up: Whether to look for the pile-up; off for readings at rest, which are all alike.
     """
     for rail, at_rail in (
         (low, values <= (-np.inf if low is None else low)),
@@ -97,7 +100,7 @@ def check_rails(values: FloatArray, low: float | None, high: float | None, name:
                 "Load less, or reduce the amplifier's gain.",
             )
     share = float(np.mean(values == values.max()))
-    if values.size >= 2 * LEVEL_BINS and share > CLIPPED_SHARE:
+    if pile_up and values.size >= 2 * LEVEL_BINS and share > CLIPPED_SHARE:
         raise BadDataError(
             "clipped",
             f"{share:.0%} of {name} have exactly the greatest value, {values.max():g}.",
