@@ -76,10 +76,18 @@ def test_the_papers_cubic_is_refused_outside_0_to_1_v(volts):
 
 
 def test_a_curve_is_good_for_the_voltages_it_was_fitted_on():
-    curve = fit_fsr(presses(top_v=0.6)).curve
-    assert curve.high_v <= 0.6
-    with pytest.raises(FsrRangeError):
-        curve.force_n(0.7)
+    pressed = [
+        FsrRun(r.name, r.time_s[keep], r.fsr_v[keep], r.force_n[keep])
+        for r in presses(top_v=0.6)
+        for keep in [r.fsr_v > 0.2]
+    ]
+    curve = fit_fsr(pressed).curve
+    volts = np.concatenate([run.fsr_v for run in pressed])
+    assert (curve.low_v, curve.high_v) == (volts.min(), volts.max())
+    curve.force_n(volts)
+    for outside in (0.19, 0.61):
+        with pytest.raises(FsrRangeError):
+            curve.force_n(outside)
 
 
 @settings(max_examples=10)
@@ -159,7 +167,7 @@ def test_a_curve_fits_in_a_record():
     curve = fit_fsr(presses()).curve
     record = CalibrationRecord(
         kind="fsr",
-        channel="fsr_v",
+        channel="grip_force_n",
         input="fsr_v",
         made_at="2026-03-01T12:00:00+00:00",
         operator="Ada",
