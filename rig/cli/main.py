@@ -8,6 +8,7 @@ from typer.exceptions import TyperException
 
 from rig import __version__
 from rig.cli.demo import demo
+from rig.cli.diagnose import diagnose
 from rig.cli.fit import fit
 from rig.cli.live import live
 from rig.cli.log import log_app
@@ -32,6 +33,7 @@ app.command()(record)
 app.command()(live)
 app.command()(replay)
 app.command()(fit)
+app.command()(diagnose)
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
 

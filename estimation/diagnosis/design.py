@@ -1,0 +1,142 @@
+"""Columns of a run on a common footing: one filter, one decimation, the mean removed.
+
+Every raw channel goes through the model's zero-phase filter; derivatives and the effects' columns
+are made from the filtered channels at the full rate, from the run's first sample, so that states
+have their history. Then target and columns go through one more common filter while they are
+decimated: a non-linear function of a filtered signal is not the filtered function, and unequal
+smoothing looks like a delay.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from estimation.derived import zero_phase_channels
+from estimation.diagnosis.candidate import Candidate
+from estimation.errors import EstimationError
+from estimation.filters import LowPass
+from estimation.model import Model
+from estimation.recording import FloatArray, Recording
+
+TAPS = 8
+"""Length of the decimating filter, in decimated samples."""
+
+Mapper = Callable[..., Iterable[Any]]
+"""`map`, or the `map` of a `concurrent.futures.Executor`."""
+
+
+class DesignError(EstimationError):
+    """A run has no samples to diagnose on."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """The filtered channels of one run, plain data that travels to other processes.
+
+    Attributes:
+        name: Name of the run.
+        channels: Channel name to values at the full rate, shape (n,).
+        valid: Samples without a flag and away from the ends, shape (n,).
+        down: Samples that become one.
+    """
+
+    name: str
+    channels: Mapping[str, FloatArray]
+    valid: NDArray[np.bool_]
+    down: int
+
+    @property
+    def kept(self) -> NDArray[np.intp]:
+        """Decimated samples that no flagged sample reaches."""
+        reach = TAPS // 2 * self.down
+        bad = ndimage.maximum_filter1d((~self.valid).astype(np.uint8), 2 * reach + 1)
+        return np.flatnonzero(bad[:: self.down] == 0)
+
+    def thin(self, columns: FloatArray) -> FloatArray:
+        """Filter and decimate columns of shape (n, k), drop flagged samples."""
+        return np.asarray(decimate(columns, self.down)[self.kept])
+
+    def centred(self, columns: FloatArray) -> FloatArray:
+        """Filter, decimate and remove the mean of columns of shape (n, k)."""
+        thin = self.thin(columns)
+        return np.asarray(thin - thin.mean(axis=0))
+
+
+def prepare(recording: Recording, names: Iterable[str], low_pass: LowPass) -> Run:
+    """Filter one run's channels and mark what may be used of it.
+
+    Raises:
+        DesignError: No usable sample is left.
+        MissingChannelError: The recording lacks a channel.
+        FilterError: The run cannot be filtered.
+    """
+    wanted = list(dict.fromkeys(names))
+    filtered = zero_phase_channels(recording, wanted, low_pass)
+    rate_hz = recording.sample_rate_hz
+    edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
+    valid = filtered.valid.copy()
+    valid[:edge] = False
+    valid[max(len(valid) - edge, 0) :] = False
+    down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
+    channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
+    channels["time_s"] = channels["time_s"] - channels["time_s"][0]
+    run = Run(recording.name, channels, valid, down)
+    if len(run.kept) < 20:
+        raise DesignError(
+            f"Run {recording.name!r} leaves {len(run.kept)} usable samples.",
+            "The others are flagged, or too near to the ends or to a flag for the filter.",
+            "Record it anew, or exclude it.",
+        )
+    return run
+
+
+def decimate(columns: FloatArray, down: int) -> FloatArray:
+    """Filter columns of shape (n, k) without lag and keep every `down`-th sample."""
+    if down == 1:
+        return columns
+    taps = signal.firwin(TAPS * down + 1, 0.8 / down)
+    half = TAPS // 2
+    thin: FloatArray = signal.upfirdn(taps, columns, 1, down, axis=0)
+    return thin[half : half + -(-len(columns) // down)]
+
+
+def _run_columns(run: Run, wanted: Sequence[Candidate], means: bool) -> FloatArray:
+    """Return the thinned columns of candidates on one run, side by side."""
+    blocks = []
+    for chunk in _chunks(wanted, 32):  # bounds the memory at the full rate
+        columns = np.column_stack([c.columns(run.channels) for c in chunk])
+        blocks.append(run.centred(columns) if means else run.thin(columns))
+    return np.hstack(blocks)
+
+
+def tables(
+    runs: Sequence[Run], wanted: Sequence[Candidate], demean: bool, mapper: Mapper = map
+) -> list[FloatArray]:
+    """Return the candidates' columns of every run, one array of shape (n, columns) a run.
+
+    Args:
+        runs: The runs.
+        wanted: The candidates.
+        demean: Remove each run's mean.
+        mapper: Maps over runs; an executor's makes it parallel.
+    """
+    if not wanted:
+        return [np.empty((len(run.kept), 0)) for run in runs]
+    count = len(runs)
+    return list(mapper(_run_columns, runs, [list(wanted)] * count, [demean] * count))
+
+
+def targets(runs: Sequence[Run], model: Model) -> list[FloatArray]:
+    """Return the thinned target of every run, shape (n,), its mean removed where that is due."""
+    columns = [run.channels[model.target][:, None] for run in runs]
+    if model.run_offsets:
+        return [run.centred(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
+    return [run.thin(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
+
+
+def _chunks(items: Sequence[Candidate], size: int) -> Iterator[Sequence[Candidate]]:
+    return (items[k : k + size] for k in range(0, len(items), size))
