@@ -193,7 +193,7 @@ def as_model(
         for run in balance.runs:
             columns = np.column_stack([t.columns(run.channels) for t in terms])
             error = run.channels[balance.model.target] - columns @ weights
-            levels.append(float(error[run.valid].mean()))
+            levels.append(float(error[run.used].mean()))
         offset = next(t for t in balance.model.terms if t.effect.id == OFFSET)
         level = Estimate(float(np.mean(levels)) * offset.sign)
         made.append(Term(offset.effect, offset.sign, dict(offset.channels), {"offset": level}))

@@ -18,9 +18,19 @@ from scipy import ndimage, signal
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
-from estimation.filters import LowPass
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
+
+SPEED = "motor_velocity_rad_s"
+
+WITH_FRICTION = ("motor", "cable", "grasp")
+"""Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
+at rest tell nothing of a model of motion: they are left out of search, fit and error."""
+
+REST_SHARE, REST_RAD_S, REST_REACH_S = 0.05, 0.7, 0.02
+"""At rest is: slower than this share of the run's 95th percentile of speed or than this speed of
+the motor, and what is this near to it. The share grows with what the filter smears at a reversal.
+"""
 
 TAPS = 8
 """Length of the decimating filter, in decimated samples."""
@@ -41,20 +51,27 @@ class Run:
         name: Name of the run.
         channels: Channel name to values at the full rate, shape (n,).
         valid: Samples without a flag and away from the ends, shape (n,).
+        moving: Samples that are not at rest, where friction is in the balance, shape (n,).
         down: Samples that become one.
     """
 
     name: str
     channels: Mapping[str, FloatArray]
     valid: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
     down: int
 
     @property
+    def used(self) -> NDArray[np.bool_]:
+        """Samples at the full rate that errors are told over: valid and in motion, shape (n,)."""
+        return self.valid & self.moving
+
+    @property
     def kept(self) -> NDArray[np.intp]:
-        """Decimated samples that no flagged sample reaches."""
+        """Decimated samples in motion that no flagged sample reaches."""
         reach = TAPS // 2 * self.down
         bad = ndimage.maximum_filter1d((~self.valid).astype(np.uint8), 2 * reach + 1)
-        return np.flatnonzero(bad[:: self.down] == 0)
+        return np.flatnonzero((bad[:: self.down] == 0) & self.moving[:: self.down])
 
     def thin(self, columns: FloatArray) -> FloatArray:
         """Filter and decimate columns of shape (n, k), drop flagged samples."""
@@ -66,15 +83,17 @@ class Run:
         return np.asarray(thin - thin.mean(axis=0))
 
 
-def prepare(recording: Recording, names: Iterable[str], low_pass: LowPass) -> Run:
-    """Filter one run's channels and mark what may be used of it.
+def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
+    """Filter one run's channels as a model says and mark what may be used of it.
 
     Raises:
         DesignError: No usable sample is left.
         MissingChannelError: The recording lacks a channel.
         FilterError: The run cannot be filtered.
     """
-    wanted = list(dict.fromkeys(names))
+    low_pass = model.low_pass
+    resting = model.balance in WITH_FRICTION and "motor_angle_rad" in recording
+    wanted = list(dict.fromkeys([*names, *([SPEED] if resting else [])]))
     filtered = zero_phase_channels(recording, wanted, low_pass)
     rate_hz = recording.sample_rate_hz
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -84,14 +103,22 @@ def prepare(recording: Recording, names: Iterable[str], low_pass: LowPass) -> Ru
     down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
     channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
-    run = Run(recording.name, channels, valid, down)
+    moving = _moving(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
+    run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
             f"Run {recording.name!r} leaves {len(run.kept)} usable samples.",
-            "The others are flagged, or too near to the ends or to a flag for the filter.",
+            "The others are flagged or at rest, or too near to the ends or a flag for the filter.",
             "Record it anew, or exclude it.",
         )
     return run
+
+
+def _moving(speed: FloatArray, valid: NDArray[np.bool_], rate_hz: float) -> NDArray[np.bool_]:
+    size = np.abs(speed)
+    usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
+    rest = (size < max(REST_RAD_S, REST_SHARE * usual)).astype(np.uint8)
+    return np.asarray(ndimage.maximum_filter1d(rest, 2 * round(REST_REACH_S * rate_hz) + 1) == 0)
 
 
 def decimate(columns: FloatArray, down: int) -> FloatArray:

@@ -10,9 +10,9 @@ import numpy as np
 from estimation.campaign import Campaign
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
-from estimation.diagnosis.design import Run, prepare
+from estimation.diagnosis.design import DesignError, Run, prepare
 from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, squares
-from estimation.diagnosis.maps import CHANNELS, Map, needed_channels
+from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
 from estimation.diagnosis.search import Discovery, Gates, Named, Search
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
@@ -28,9 +28,6 @@ Stage = Callable[[str], None]
 
 SAME_CAUSE = 0.9
 """Two balances show one cause when what it adds to them correlates at least this well."""
-
-REMAINDER = 5.0
-"""Beside a named effect a map must be worth this many times the floor to be a finding."""
 
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
@@ -61,6 +58,7 @@ class Story:
         confirm: The confirm runs.
         candidates: Grid points tried.
         families: Families tried.
+        unused: Runs without a usable sample in this balance.
     """
 
     balance: Balance
@@ -73,6 +71,7 @@ class Story:
     confirm: tuple[Run, ...]
     candidates: int
     families: tuple[str, ...]
+    unused: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -161,15 +160,18 @@ def _balance(
     wanted += [channel for c in tried for _, channel in c.channels]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map
-    runs = [prepare(r, wanted, model.low_pass) for r in discover]
+    runs, rested = _usable(discover, wanted, model)
+    held, also = _usable(confirm, wanted, model)
     balance = lay_out(fitted, runs, mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))
+    whole = projection(balance)
+    balance = replace(balance, runs=[whole(run) for run in runs])
     twin = None
     if maker is not None:
         source = maker(fitted, discover)
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
     discovery = Search(balance, tried, gates, sealed.seed, twin).run()
-    claims = _claims(discovery, balance, gates, sealed.may_name)
+    claims = _claims(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
     before = freeze(balance, [])
     return Story(
         balance=balance,
@@ -179,10 +181,31 @@ def _balance(
         before=before,
         after=before,
         values=(),
-        confirm=tuple(prepare(r, wanted, model.low_pass) for r in confirm),
+        confirm=tuple(whole(run) for run in held),
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
+        unused=(*rested, *also),
     )
+
+
+def _usable(
+    recordings: Sequence[Recording], wanted: Sequence[str], model: Model
+) -> tuple[list[Run], list[str]]:
+    """Prepare runs; name those that have no usable sample, as one that only rests.
+
+    Raises:
+        DesignError: No run is usable.
+    """
+    runs: list[Run] = []
+    unused: list[str] = []
+    for recording in recordings:
+        try:
+            runs.append(prepare(recording, wanted, model))
+        except DesignError:
+            if not runs and recording is recordings[-1]:
+                raise
+            unused.append(recording.name)
+    return runs, unused
 
 
 def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
@@ -200,11 +223,10 @@ def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool
     left = discovery.left_map
     if left is not None and left.p <= gates.chance:
         worth = left.gain * _share_left(claims, balance)
-        # what a named effect's form leaves of its own cause is no second cause
-        needed = gates.floor * (REMAINDER if claims else 1.0)
-        if worth >= needed and left.agree <= gates.agree:
+        # also what a named effect's form leaves of its own cause is no second cause
+        if worth >= gates.map_floor and left.agree <= gates.agree:
             claims.append(_map_claim(left, may_name))
-        elif worth >= needed and not claims:
+        elif worth >= gates.map_floor and not claims:
             claims.append(Claim(Part(map=left), "something_missing", None, ()))
     last = discovery.steps[-1] if discovery.steps else None
     if not claims and last is not None and last.stands_out(gates):
@@ -230,6 +252,7 @@ def _variables(named: Named) -> tuple[str, ...]:
     for variable, channel in CHANNELS.items():
         by_channel[channel] = variable  # of two on one channel the last but history
     by_channel["spindle_angle_rad"] = "spindle_angle"
+    by_channel[LOAD] = "load"
     by_channel["distal_torque_n_m"] = "load"
     family = named.candidate.family
     found = [by_channel[c] for _, c in named.candidate.channels if c in by_channel]
@@ -247,7 +270,8 @@ def _confirmed(story: Story, gates: Gates) -> Story:
     last = story.before
     for claim in story.claims:
         trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
-        old, new = squares(last, story.confirm).sum(), squares(trial, story.confirm).sum()
+        old = squares(last, story.confirm).sum()
+        new = squares(trial, story.confirm).sum()
         if new <= (1 - gates.floor / 2) * old:
             kept.append(claim)
             last = trial
@@ -272,7 +296,7 @@ def _findings(story: Story) -> list[tuple[Finding, Part]]:
         runs = [*story.balance.runs, *story.confirm]
         old, new = squares(last, runs), squares(now, runs)
         held = slice(len(story.balance.runs), None)
-        samples = sum(float(r.valid.sum()) for r in story.confirm)
+        samples = sum(float(r.used.sum()) for r in story.confirm)
         named = claim.named if claim.verdict in ("identified", "one_of") else None
         found.append(
             (
@@ -383,6 +407,16 @@ def _notes(
             "The search was held against shuffled residuals only, not against simulated twins of"
             " the declared model: artefacts of filters and feedback are not ruled out that way."
         )
+    for name, story in stories.items():
+        used = sum(int(run.used.sum()) for run in story.confirm)
+        valid = sum(int(run.valid.sum()) for run in story.confirm)
+        if story.unused:
+            notes.append(f"{name}: without a usable sample: {', '.join(story.unused)}.")
+        if used < valid:
+            notes.append(
+                f"{name}: errors are over samples in motion; at rest ({1 - used / valid:.0%} of the"
+                " confirm samples) friction holds any torque, and no model of motion is tested."
+            )
     notes += [
         f"{name}: not borne out by the confirm runs: {what}."
         for name, story in stories.items()

@@ -9,7 +9,7 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.evidence import resampled
-from estimation.diagnosis.maps import RIDGE, Map, estimated
+from estimation.diagnosis.maps import RIDGE, Map
 from estimation.diagnosis.result import Error
 from estimation.recording import FloatArray
 
@@ -41,28 +41,28 @@ class Frozen:
     level: float
 
     def error(self, run: Run) -> FloatArray:
-        """Return target less estimate at the run's valid samples, shape (n,)."""
+        """Return target less estimate at the run's used samples, shape (n,)."""
         parts = [term.columns(run.channels) for term in self.terms]
-        parts += [m.columns(run, estimated(self.balance, run)) for m in self.maps]
+        parts += [m.columns(run) for m in self.maps]
         target = run.channels[self.balance.model.target]
         values = target - np.column_stack(parts) @ self.weights - self.level
-        return np.asarray(values[run.valid])
+        return np.asarray(values[run.used])
 
     def contribution(self, run: Run, part: Part) -> FloatArray:
-        """Return what one part adds to the estimate at the valid samples, shape (n,)."""
+        """Return what one part adds to the estimate at the used samples, shape (n,)."""
         at = 0
         for term in self.terms:
             width = len(term.effect.amplitudes)
             if term == part.candidate:
                 columns = term.columns(run.channels)
-                return np.asarray((columns @ self.weights[at : at + width])[run.valid])
+                return np.asarray((columns @ self.weights[at : at + width])[run.used])
             at += width
         for m in self.maps:
-            columns = m.columns(run, estimated(self.balance, run))
+            columns = m.columns(run)
             if m is part.map:
-                return np.asarray((columns @ self.weights[at : at + columns.shape[1]])[run.valid])
+                return np.asarray((columns @ self.weights[at : at + columns.shape[1]])[run.used])
             at += columns.shape[1]
-        return np.zeros(int(run.valid.sum()))
+        return np.zeros(int(run.used.sum()))
 
 
 def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
@@ -80,8 +80,7 @@ def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
 def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]) -> FloatArray:
     rows = []
     for run, columns in zip(balance.runs, balance.columns(terms), strict=True):
-        guess = estimated(balance, run)
-        thin = [run.thin(m.columns(run, guess)) for m in maps]
+        thin = [run.thin(m.columns(run)) for m in maps]
         flat = [t - t.mean(axis=0) if balance.demean else t for t in thin]
         rows.append(np.hstack([columns, *flat]))
     whole, aim = np.vstack(rows), np.concatenate(balance.target)
@@ -101,7 +100,7 @@ def squares(frozen: Frozen, runs: Sequence[Run]) -> FloatArray:
 
 def errors(before: Frozen, after: Frozen, runs: Sequence[Run], seed: int) -> Error:
     """Open the confirm runs: errors of the declared model and of the one with the findings."""
-    samples = np.array([float(run.valid.sum()) for run in runs])
+    samples = np.array([float(run.used.sum()) for run in runs])
     first, last = squares(before, runs), squares(after, runs)
     weights = resampled(len(runs), 1000, seed)
     ratio = np.sqrt((weights @ last) / np.maximum(weights @ first, np.finfo(float).tiny))

@@ -6,8 +6,8 @@ variables are what may be said.
 """
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ CHANNELS = {
     "velocity": "motor_velocity_rad_s",
     "spindle_angle": "spindle_angle_rad",
     "jaw_angle": "jaw_angle_rad",
-    "load": "proximal_torque_n_m",
+    "load": "projected_load_n_m",
     "current": "motor_current_a",
     "acceleration": "motor_acceleration_rad_s2",
     "time": "time_s",
@@ -34,6 +34,11 @@ CHANNELS = {
     "wrist_roll": "wrist_roll_rad",
 }
 """Variables of a map, simplest first, and the channel each is taken from."""
+
+LOAD, PROJECTED_LOAD = "proximal_torque_n_m", "projected_load_n_m"
+
+BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",)}
+"""Variables that reach a balance only through its load, and would stand for that load."""
 
 KNOTS = 7
 ORDERS = 8
@@ -54,7 +59,7 @@ class Basis:
 
     Attributes:
         variable: Name from `CHANNELS`.
-        channel: Where it is taken from; empty for the declared model's own estimate.
+        channel: Where it is taken from.
         low: First percentile over the runs that discover.
         high: 99th percentile.
     """
@@ -64,9 +69,9 @@ class Basis:
     low: float
     high: float
 
-    def columns(self, run: Run, estimated: FloatArray) -> FloatArray:
+    def columns(self, run: Run) -> FloatArray:
         """Return the columns of one whole run, shape (n, k); their span holds the constant."""
-        x = run.channels[self.channel] if self.channel else estimated
+        x = run.channels[self.channel]
         span = self.high - self.low
         if self.variable == "velocity_sign":
             sign = np.tanh(x / (0.02 * span))
@@ -108,9 +113,9 @@ class Map:
         """Names of the variables."""
         return tuple(basis.variable for basis in self.bases)
 
-    def columns(self, run: Run, estimated: FloatArray) -> FloatArray:
+    def columns(self, run: Run) -> FloatArray:
         """Return the map's columns on one whole run, shape (n, k)."""
-        parts = [basis.columns(run, estimated) for basis in self.bases]
+        parts = [basis.columns(run) for basis in self.bases]
         return parts[0] if len(parts) == 1 else _products(*parts)
 
 
@@ -175,42 +180,49 @@ def play(x: FloatArray, width: float) -> FloatArray:
     return offset
 
 
-def estimated(balance: Balance, run: Run) -> FloatArray:
-    """Return the declared model's estimate of one whole run, without its offset, shape (n,)."""
+def projection(balance: Balance) -> Callable[[Run], Run]:
+    """Return what adds the load of maps to a run's channels.
+
+    Where the load is the balance's own target, the declared model's estimate stands in: a sensor
+    held against its own residual finds its own noise.
+    """
     weights = balance.solve(balance.terms)
-    columns = np.column_stack([term.columns(run.channels) for term in balance.terms])
-    total: FloatArray = columns @ weights
-    return total
+
+    def added(run: Run) -> Run:
+        if balance.model.target == LOAD:
+            columns = np.column_stack([term.columns(run.channels) for term in balance.terms])
+            load = columns @ weights
+        elif LOAD in run.channels:
+            load = run.channels[LOAD]
+        else:
+            return run
+        return replace(run, channels={**run.channels, PROJECTED_LOAD: load})
+
+    return added
 
 
 def needed_channels(measured: Sequence[str]) -> list[str]:
     """Return the channels of the variables that runs with these measured channels have."""
-    return [c for c in CHANNELS.values() if set(measured_channels([c])) <= set(measured)]
+    wanted = [LOAD, *(c for c in CHANNELS.values() if c != PROJECTED_LOAD)]
+    return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
 
 
 def _bases(balance: Balance) -> list[Basis]:
     bases = []
     for variable, channel in CHANNELS.items():
-        own = channel == balance.model.target
-        if own and not balance.terms:
+        if variable in BEHIND.get(balance.model.balance, ()):
             continue
         if any(channel not in run.channels for run in balance.runs):
             continue
-        values = np.concatenate(
-            [estimated(balance, r) if own else r.channels[channel] for r in balance.runs]
-        )
+        values = np.concatenate([run.channels[channel] for run in balance.runs])
         low, high = (float(v) for v in np.percentile(values, [1, 99]))
         if high - low > 1e-12 * max(abs(high), abs(low), 1e-12):
-            bases.append(Basis(variable, "" if own else channel, low, high))
+            bases.append(Basis(variable, channel, low, high))
     return bases
 
 
 def _thinned(balance: Balance, basis: Basis) -> list[FloatArray]:
-    nothing = np.empty(0)
-    return [
-        run.thin(basis.columns(run, nothing if basis.channel else estimated(balance, run)))[::THIN]
-        for run in balance.runs
-    ]
+    return [run.thin(basis.columns(run))[::THIN] for run in balance.runs]
 
 
 def _products(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -231,5 +243,6 @@ def _simplest(found: Sequence[Map]) -> Map:
     ]
     fewest = min((len(m.bases) for m in near), default=len(best.bases))
     chosen = max((m for m in near if len(m.bases) == fewest), key=lambda m: m.gain, default=best)
-    plain = {"velocity_sign" if v == "velocity" else v for v in chosen.variables}
+    # the direction of motion is the simplest of the variables that hold it
+    plain = {"velocity_sign" if v in ("velocity", "history") else v for v in chosen.variables}
     return next((m for m in near if set(m.variables) == plain), chosen)

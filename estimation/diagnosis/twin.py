@@ -91,7 +91,7 @@ def largest_fall(
         channels: Channels to prepare.
         seed: Seed of the twin.
     """
-    runs = [prepare(recording, channels, model.low_pass) for recording in twin(seed)]
+    runs = [prepare(recording, channels, model) for recording in twin(seed)]
     balance: Balance = lay_out(model, runs)
     table = tables(runs, pool, balance.demean)
     aims = [r[:, None] for r in balance.left(balance.terms)]

@@ -9,7 +9,7 @@ from estimation.channels import unit_of
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.frozen import Frozen
-from estimation.diagnosis.maps import CHANNELS, estimated
+from estimation.diagnosis.maps import CHANNELS
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
@@ -120,7 +120,8 @@ def _errors(diagnosis: Diagnosis) -> TextTable:
         "Error on the confirm runs",
         columns,
         rows,
-        "Root mean square over all samples; each run's mean removed, then with the means left in."
+        "Root mean square over the samples in motion; each run's mean removed, then with the means"
+        " left in."
         " Ratio: 95 % interval of a bootstrap over runs.",
     )
 
@@ -174,12 +175,7 @@ def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
     channel = CHANNELS[variable]
     if any(channel not in run.channels for run in story.confirm):
         return []
-    own = channel == story.balance.model.target
-    values = [
-        (estimated(story.balance, run) if own else run.channels[channel])[run.valid]
-        for run in story.confirm
-    ]
-    x = np.concatenate(values)
+    x = np.concatenate([run.channels[channel][run.used] for run in story.confirm])
     if channel == "motor_angle_rad":
         x = np.mod(x, 2 * np.pi)
     scale, unit = _display(story.balance.model.unit)
