@@ -33,6 +33,10 @@ class LinkTimeoutError(LinkError):
     """The device did not answer, or did not take bytes, in time."""
 
 
+class BusOffError(LinkLostError):
+    """A CAN controller has taken itself off the bus after too many errors."""
+
+
 class PortNotFoundError(LinkError):
     """No such port, or no device with that USB identity."""
 

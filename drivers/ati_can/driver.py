@@ -1,0 +1,272 @@
+"""The driver of a NETCANOEM: it is asked for every sample, at a steady rate."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.ati_can import protocol
+from drivers.ati_can.wrench import wrench_of
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
+from drivers.counters import DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.polling import PollSchedule
+from drivers.registry import Driver
+from drivers.transport.can_bus import CanBus
+from drivers.transport.python_can import open_can
+
+TRIES = 3
+REPLY_TIMEOUT_S = 0.02
+"""Time for a whole answer: ten times the wire time of the longest at 250 kbit/s."""
+
+
+class AtiCan:
+    """One force/torque sensor on a CAN bus.
+
+    Args:
+        bus: The bus; the device closes it.
+        base: The sensor's base identifier, 0 to 127.
+        calibration: Which of its 16 calibrations to use.
+        rate_hz: How often it is asked. A question without an answer leaves a gap in `sequence`.
+    """
+
+    name = "ati-can"
+
+    def __init__(
+        self,
+        bus: CanBus,
+        base: int = protocol.DEFAULT_BASE,
+        calibration: int = 0,
+        rate_hz: float = 200.0,
+    ) -> None:
+        if not 0 <= base <= protocol.HIGHEST_BASE:
+            raise ValueError(f"a base identifier lies in 0..127, not {base}")
+        if not 0 <= calibration <= 15:
+            raise ValueError(f"a calibration has a number 0..15, not {calibration}")
+        if not rate_hz > 0:
+            raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
+        self._bus = bus
+        self._base = base
+        self._calibration = calibration
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._schedule = PollSchedule(rate_hz, self._counters)
+        self._matrix: NDArray[np.float64] | None = None
+        self._unit_per_count = np.ones(6)
+        self.bias = np.zeros(protocol.GAUGES)
+        """Readings taken for no load, counts, shape (6,)."""
+        self.status = 0
+        """Status word of the newest reading; `protocol.status_words` puts it in words."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Three forces and three torques; their range is known once the calibration is."""
+        tops = np.full(6, np.inf)
+        if self._matrix is not None:
+            reach = np.abs(self._matrix) @ (2.0**15 + np.abs(self.bias))
+            tops = reach * self._unit_per_count
+        units = [("N", "force")] * 3 + [("N m", "torque")] * 3
+        return tuple(
+            Channel(name, unit, self._rate_hz, -top, top, text)
+            for name, (unit, text), top in zip(protocol.AXES, units, tops.tolist(), strict=True)
+        )
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the bus, as far as this sensor is concerned, and to the bus itself."""
+        bus = self._bus.counters
+        trouble = {"error_frames": bus.error_frames, "overruns": bus.overruns}
+        return self._counters.as_dict() | trouble
+
+    def identify(self) -> DeviceIdentity:
+        """Ask for serial number and firmware, and read the calibration.
+
+        Raises:
+            LinkTimeoutError: Nobody answers with this base identifier.
+            FrameError: What answers is no NETCANOEM, or its calibration is empty.
+        """
+        version = protocol.decode_firmware(self._ask(protocol.FIRMWARE)[0])
+        serial = protocol.decode_serial(self._ask(protocol.SERIAL)[0])
+        chosen = bytes([self._calibration])
+        if self._ask(protocol.CALIBRATION, chosen)[0] != chosen:
+            raise FrameError(f"The sensor does not use its calibration {self._calibration}.")
+        self._unit_per_count = self._read_units(version[:2])
+        rows = [
+            protocol.decode_matrix_row(self._ask(protocol.MATRIX_ROW, bytes([axis]), 3))
+            for axis in range(6)
+        ]
+        self._matrix = np.array(rows)
+        major, minor, build = version
+        return DeviceIdentity("ATI NETCANOEM", serial, f"{major}.{minor}.{build}")
+
+    def start(self) -> None:
+        """Number the samples from 0, the first being due now."""
+        if self._matrix is None:
+            self.identify()
+        self._schedule.restart(self._bus.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Ask when the next sample is due and return it, or nothing when it is not due in time.
+
+        A saturated gauge makes the whole wrench wrong: it is flagged `SATURATED` and `SUSPECT`.
+
+        Raises:
+            DriverError: Neither `identify` nor `start` has been called.
+        """
+        if self._matrix is None:
+            raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
+        self._idle(min(self._schedule.wait_s(self._bus.now_s), timeout_s))
+        now_s = self._bus.now_s
+        if self._schedule.wait_s(now_s) > 0:
+            return self._batch(np.empty((0, 6)), 0)
+        self._schedule.skip_missed(now_s)
+        try:
+            gauges = self._read_gauges()
+        except LinkTimeoutError:
+            self._schedule.lose()
+            return self._batch(np.empty((0, 6)), 0)
+        self._schedule.asked += 1
+        self._counters.frames += 1
+        wrench = wrench_of(gauges, self.bias, self._matrix, self._unit_per_count)
+        return self._batch(wrench[np.newaxis], self._flag(gauges))
+
+    def set_bias(self, readings: int = 16) -> None:
+        """Take the present load for zero: the mean of some readings, kept in this program.
+
+        Raises:
+            DriverError: A gauge is saturated, or the sensor says that its readings are unusable.
+            LinkTimeoutError: The sensor does not answer.
+        """
+        taken = []
+        for _ in range(readings):
+            gauges = self._read_gauges()
+            if self._flag(gauges):
+                said = ", ".join(protocol.status_words(self.status)) or "a gauge is saturated"
+                raise DriverError(
+                    "The sensor cannot be zeroed.", f"It says: {said}.", "Take the load off it."
+                )
+            taken.append(gauges)
+        self.bias = np.mean(taken, axis=0, dtype=np.float64)
+
+    def stop(self) -> None:
+        """Do nothing: a sensor that is not asked is silent."""
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._bus.close()
+
+    def _read_gauges(self) -> NDArray[np.int16]:
+        self.status, gauges = protocol.decode_reading(*self._ask(protocol.READ, b"", 2))
+        return gauges
+
+    def _read_units(self, version: tuple[int, int]) -> NDArray[np.float64]:
+        """Return N a count three times, then N m a count three times, shape (6,)."""
+        if version < protocol.TELLS_UNITS:
+            return np.full(6, 1.0 / protocol.ASSUMED_COUNTS_PER_UNIT)
+        force, torque = protocol.decode_counts_per_unit(self._ask(protocol.COUNTS_PER_UNIT)[0])
+        codes = self._ask(protocol.UNIT_CODES)[0]
+        if len(codes) != 2 or codes[0] not in N_PER_UNIT or codes[1] not in N_M_PER_UNIT:
+            raise FrameError(f"The sensor's units have the unknown codes {codes.hex(' ')}.")
+        slopes = [N_PER_UNIT[codes[0]] / force, N_M_PER_UNIT[codes[1]] / torque]
+        return np.repeat(slopes, 3)
+
+    def _flag(self, gauges: NDArray[np.int16]) -> int:
+        if protocol.is_saturated(gauges):
+            self._counters.device_errors += 1
+            return int(SampleFlag.SATURATED | SampleFlag.SUSPECT)
+        if self.status & protocol.UNUSABLE:
+            self._counters.device_errors += 1
+            return int(SampleFlag.SUSPECT)
+        return 0
+
+    def _batch(self, wrenches: NDArray[np.float64], flag: int) -> Batch:
+        count = len(wrenches)
+        return Batch(
+            {name: wrenches[:, axis] for axis, name in enumerate(protocol.AXES)},
+            np.full(count, self._bus.now_s),
+            "host",
+            np.full(count, self._schedule.asked - 1, np.int64),
+            np.full(count, flag, np.uint8),
+            self._schedule.lost,
+        )
+
+    def _idle(self, wait_s: float) -> None:
+        """Let time pass; a frame of this sensor that comes unasked is late, and dropped."""
+        end_s = self._bus.now_s + wait_s
+        while True:
+            frame = self._bus.read(max(0.0, end_s - self._bus.now_s))
+            if frame is None:
+                return
+            if not frame.extended and frame.can_id >> 4 == self._base:
+                self._counters.late += 1
+
+    def _ask(self, operation: int, data: bytes = b"", frames: int = 1) -> list[bytes]:
+        """Return the data of an answer's frames.
+
+        Raises:
+            LinkTimeoutError: No whole answer to `TRIES` requests.
+        """
+        question = protocol.request(self._base, operation, data)
+        for attempt in range(TRIES):
+            if attempt:
+                self._counters.retries += 1
+            self._idle(0.0)
+            self._bus.send(question)
+            answer = self._receive(operation, frames)
+            if answer is not None:
+                return answer
+        self._counters.timeouts += 1
+        raise LinkTimeoutError(
+            f"No NETCANOEM answers at {self._bus.url}, base {self._base:#x}.",
+            f"{TRIES} requests of operation {operation:#x} had {REPLY_TIMEOUT_S:g} s each.",
+            "Check its supply, the bit rate (250 kbit/s unless changed), terminators and base.",
+        )
+
+    def _receive(self, operation: int, frames: int) -> list[bytes] | None:
+        """Return an answer's frames, None when they do not all come in time and in order."""
+        first = protocol.identifier(self._base, operation)
+        give_up_s = self._bus.now_s + REPLY_TIMEOUT_S
+        answer: list[bytes] = []
+        while len(answer) < frames:
+            remaining_s = give_up_s - self._bus.now_s
+            frame = self._bus.read(remaining_s) if remaining_s > 0 else None
+            if frame is None:
+                return None
+            if frame.extended or frame.can_id >> 4 != self._base:
+                continue  # of another device
+            if frame.can_id == first:
+                if answer:
+                    self._counters.late += 1  # that was another request's: begin anew
+                answer = [frame.data]
+            elif answer and frame.can_id == first + len(answer):
+                answer.append(frame.data)
+            else:
+                self._counters.late += 1
+        return answer
+
+
+def open_ati_can(
+    url: str,
+    base: int = protocol.DEFAULT_BASE,
+    calibration: int = 0,
+    rate_hz: float = 200.0,
+) -> AtiCan:
+    """Open the sensor on a CAN bus.
+
+    Args:
+        url: The bus, e.g. `can:socketcan:can0`.
+        base: The sensor's base identifier; 0x20 from the factory.
+        calibration: Which of its 16 calibrations to use.
+        rate_hz: How often it is asked; at 250 kbit/s a question takes above 1 ms of the bus.
+
+    Raises:
+        LinkError: The bus cannot be opened, or the options are no sensor's.
+    """
+    bus = open_can(url)
+    try:
+        return AtiCan(bus, base, calibration, rate_hz)
+    except ValueError as error:
+        bus.close()
+        raise LinkError(f"No NETCANOEM can be asked so: {error}.") from error
+
+
+DRIVER = Driver("ati-can", "ATI force/torque sensor on CAN (NETCANOEM)", open_ati_can)

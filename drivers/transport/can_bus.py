@@ -1,0 +1,109 @@
+"""CAN frames to and from a bus: what every way to a bus offers, real or simulated."""
+
+import struct
+from dataclasses import asdict, dataclass
+from typing import Protocol
+
+MAX_STANDARD_ID = 0x7FF
+MAX_EXTENDED_ID = 0x1FFFFFFF
+MAX_DATA = 8
+_HEAD = struct.Struct(">I?")
+
+
+@dataclass(frozen=True, slots=True)
+class CanFrame:
+    """One classic CAN data frame.
+
+    Attributes:
+        can_id: Identifier, 11 bits, or 29 where `extended`.
+        data: 0 to 8 bytes.
+        extended: Whether the identifier has 29 bits.
+    """
+
+    can_id: int
+    data: bytes = b""
+    extended: bool = False
+
+    def __post_init__(self) -> None:
+        top = MAX_EXTENDED_ID if self.extended else MAX_STANDARD_ID
+        if not 0 <= self.can_id <= top:
+            raise ValueError(f"a CAN identifier lies in 0..{top:#x}, not {self.can_id:#x}")
+        if len(self.data) > MAX_DATA:
+            raise ValueError(f"a CAN frame carries {MAX_DATA} bytes, not {len(self.data)}")
+
+    def to_bytes(self) -> bytes:
+        """Return the frame as a packet of bytes, for what handles packets."""
+        return _HEAD.pack(self.can_id, self.extended) + self.data
+
+    @classmethod
+    def from_bytes(cls, packet: bytes) -> "CanFrame":
+        """Return the frame that `to_bytes` packed."""
+        can_id, extended = _HEAD.unpack_from(packet)
+        return cls(can_id, packet[_HEAD.size :], extended)
+
+
+@dataclass(slots=True)
+class CanCounters:
+    """What happened on a bus since it was opened.
+
+    Attributes:
+        received: Data frames received.
+        sent: Data frames sent.
+        error_frames: Error frames the controller reported.
+        bus_off: Times the controller took itself off the bus.
+        overruns: Times the controller reported that it had to drop received frames.
+        echoes: Own frames that the interface gave back; they are not passed on.
+        ignored: Remote frames and frames of more than 8 bytes; they are not passed on.
+    """
+
+    received: int = 0
+    sent: int = 0
+    error_frames: int = 0
+    bus_off: int = 0
+    overruns: int = 0
+    echoes: int = 0
+    ignored: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """Return the counters by name."""
+        return asdict(self)
+
+
+class CanBus(Protocol):
+    """Frames to and from one bus, read where they are wanted. Not for two threads at once."""
+
+    @property
+    def url(self) -> str:
+        """The URL the bus was opened by."""
+        ...
+
+    @property
+    def now_s(self) -> float:
+        """The bus's clock, seconds from an arbitrary zero; virtual where time is."""
+        ...
+
+    @property
+    def counters(self) -> CanCounters:
+        """What happened on the bus."""
+        ...
+
+    def send(self, frame: CanFrame) -> None:
+        """Send one frame.
+
+        Raises:
+            LinkLostError: The bus is gone.
+            LinkTimeoutError: The interface does not take the frame.
+        """
+        ...
+
+    def read(self, timeout_s: float) -> CanFrame | None:
+        """Return the next frame, or None when none came in `timeout_s`.
+
+        Raises:
+            LinkLostError: The bus is gone; every later call says so again.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the bus. Closing twice does nothing."""
+        ...

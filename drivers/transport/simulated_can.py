@@ -1,0 +1,107 @@
+"""A CAN bus inside this process, in virtual time, with the fakes that sit on it.
+
+Time passes only while someone reads. Every node hears every other node's frames, and its own not.
+
+Not modelled: arbitration, the time of a frame on the wire, and a bus that is full.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Protocol
+
+from drivers.errors import LinkLostError
+from drivers.transport.can_bus import CanCounters, CanFrame
+
+TICK_S = 1e-3
+
+
+class CanNode(Protocol):
+    """What speaks frames and lives by ticks of 1 ms: a fake, or the firmware itself."""
+
+    def receive(self, frame: CanFrame) -> None:
+        """Take a frame from the bus."""
+        ...
+
+    def advance(self, ticks: int) -> None:
+        """Let `ticks` milliseconds pass."""
+        ...
+
+    def transmit(self) -> list[CanFrame]:
+        """Give the frames to be sent."""
+        ...
+
+
+class SimulatedCanBus:
+    """The host's place on a bus of nodes in this process.
+
+    Args:
+        nodes: Who else is on the bus.
+        url: Name for messages.
+    """
+
+    def __init__(self, nodes: Sequence[CanNode], url: str = "sim://can") -> None:
+        self._nodes = list(nodes)
+        self._url = url
+        self._ticks = 0
+        self._waiting: deque[CanFrame] = deque()
+        self._closed = False
+        self._counters = CanCounters()
+
+    @property
+    def url(self) -> str:
+        """The URL the bus was opened by."""
+        return self._url
+
+    @property
+    def now_s(self) -> float:
+        """Virtual seconds since the bus was made."""
+        return self._ticks * TICK_S
+
+    @property
+    def counters(self) -> CanCounters:
+        """What happened on the bus."""
+        return self._counters
+
+    def send(self, frame: CanFrame) -> None:
+        """Hand a frame to every node."""
+        self._require_link()
+        self._counters.sent += 1
+        for node in self._nodes:
+            node.receive(frame)
+        self._exchange()
+
+    def read(self, timeout_s: float) -> CanFrame | None:
+        """Return the next frame, letting time pass until there is one or `timeout_s` is over."""
+        self._require_link()
+        self._exchange()
+        # a wait, however short, lets time pass: a caller that waits for a moment must get there
+        remaining = max(1, round(timeout_s / TICK_S)) if timeout_s > 0 else 0
+        while not self._waiting and remaining > 0:
+            for node in self._nodes:
+                node.advance(1)
+            self._ticks += 1
+            remaining -= 1
+            self._exchange()
+        if not self._waiting:
+            return None
+        self._counters.received += 1
+        return self._waiting.popleft()
+
+    def close(self) -> None:
+        """Let go of the bus; its time stands still."""
+        self._closed = True
+
+    def _exchange(self) -> None:
+        """Carry frames until no node has any more."""
+        sent = [(node, frame) for node in self._nodes for frame in node.transmit()]
+        while sent:
+            for sender, frame in sent:
+                self._waiting.append(frame)
+                for node in self._nodes:
+                    if node is not sender:
+                        node.receive(frame)
+            sent = [(node, frame) for node in self._nodes for frame in node.transmit()]
+
+    def _require_link(self) -> None:
+        if self._closed:
+            raise LinkLostError(f"{self._url} is closed.")

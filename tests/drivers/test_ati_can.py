@@ -1,0 +1,226 @@
+"""NETCANOEM: the manual's operations frame by frame, readings, faults of the sensor."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.ati_can import protocol
+from drivers.ati_can.driver import AtiCan, open_ati_can
+from drivers.ati_can.fake import MATRIX, AtiCanFake
+from drivers.ati_can.wrench import moved_wrench
+from drivers.device import SampleFlag
+from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.transport.can_bus import CanFrame
+from drivers.transport.simulated_can import SimulatedCanBus
+from tests.drivers.scripted_can import Exchange, ScriptedCanBus
+
+counts = st.integers(-(2**15), 2**15 - 1)
+
+
+def frame(can_id: int, data: str = "") -> CanFrame:
+    return CanFrame(can_id, bytes.fromhex(data))
+
+
+def set_up(base: int = 0x200) -> list[Exchange]:
+    """What `identify` says and hears: firmware 3.8.17, unit matrix, 1000 and 2000 counts a unit."""
+    rows: list[Exchange] = []
+    for axis in range(6):
+        pairs = [["00000000"] * 2 for _ in range(3)]
+        pairs[axis // 2][axis % 2] = "3f800000"
+        answer = [frame(base + 2 + pair, "".join(pairs[pair])) for pair in range(3)]
+        rows.append((frame(base + 2, f"{axis:02x}"), answer))
+    return [
+        (frame(base + 0xF), [frame(base + 0xF, "03080011")]),
+        (frame(base + 5), [frame(base + 5, "4654313233343536")]),
+        (frame(base + 6, "00"), [frame(base + 6, "00")]),
+        (frame(base + 7), [frame(base + 7, "000003e8000007d0")]),
+        (frame(base + 8), [frame(base + 8, "0203")]),
+        *rows,
+    ]
+
+
+def test_the_conversation_of_the_manual() -> None:
+    reading = [frame(0x200, "0000 0001 0003 0005"), frame(0x201, "0002 ffff 8001")]
+    with ScriptedCanBus([*set_up(), (frame(0x200), reading)]) as bus:
+        device = AtiCan(bus)
+        identity = device.identify()
+        assert (identity.serial, identity.firmware) == ("FT123456", "3.8.17")
+        device.start()
+        batch = device.read(0.1)
+    assert [batch.columns[name][0] for name in protocol.AXES] == pytest.approx(
+        [0.001, 0.002, 0.003, -0.0005, 0.0025, -16.3835]
+    )
+    assert batch.flags[0] == 0
+    assert batch.sequence[0] == 0
+
+
+def test_a_script_that_is_not_followed_fails() -> None:
+    with pytest.raises(AssertionError), ScriptedCanBus([(frame(0x205), [])]) as bus:
+        bus.send(frame(0x206))
+    unread = ScriptedCanBus([(frame(0x205), [frame(0x205)])])
+    with pytest.raises(AssertionError, match="never read"), unread:
+        unread.send(frame(0x205))
+    with pytest.raises(AssertionError, match="never sent"), ScriptedCanBus(set_up()):
+        pass
+
+
+def test_old_firmware_is_not_asked_for_units() -> None:
+    node = AtiCanFake(firmware=(3, 6, 0), load=lambda _: np.array([100, 0, 0, 0, 0, 0]))
+    device = AtiCan(SimulatedCanBus([node]))
+    assert device.identify().firmware == "3.6.0"
+    device.start()
+    batch = device.read(0.1)
+    assert batch.columns["force_z_n"][0] == pytest.approx(1510 * 100 / 1e6)
+    device.close()
+
+
+def test_replies_are_paired_among_other_frames_and_stragglers() -> None:
+    first, second = "0000 0001 0003 0005", "0002 0004 0006"
+    answer = [
+        frame(0x201, "0009 0009 0009"),  # a straggler's second half
+        CanFrame(0x200, bytes(8), extended=True),
+        frame(0x181, "37 06"),
+        frame(0x200, "0000 0009 0009 0009"),  # a straggler's first half
+        frame(0x200, first),
+        frame(0x281, "00"),
+        frame(0x201, second),
+    ]
+    with ScriptedCanBus([*set_up(), (frame(0x200), answer)]) as bus:
+        device = AtiCan(bus)
+        device.start()
+        batch = device.read(0.1)
+    assert batch.columns["force_x_n"][0] == pytest.approx(0.001)
+    assert batch.columns["torque_z_n_m"][0] == pytest.approx(0.003)
+    assert device.counters["late"] == 2
+
+
+def test_half_an_answer_is_asked_for_again_and_none_is_a_gap() -> None:
+    half = [frame(0x200, "0000 0001 0003 0005")]
+    whole = [frame(0x200, "0000 0007 0003 0005"), frame(0x201, "0002 0004 0006")]
+    polls: list[Exchange] = [(frame(0x200), half), (frame(0x200), whole)]
+    silence: list[Exchange] = [(frame(0x200), [])] * 3
+    with ScriptedCanBus([*set_up(), *polls, *silence, (frame(0x200), whole)]) as bus:
+        device = AtiCan(bus, rate_hz=10.0)
+        device.start()
+        batch = device.read(0.1)
+        assert batch.columns["force_x_n"][0] == pytest.approx(0.007)
+        assert device.counters["retries"] == 1
+        assert len(device.read(0.1)) == 0
+        last = device.read(0.1)
+    assert (last.sequence[0], last.lost) == (2, 1)
+    assert device.counters["timeouts"] == 1
+
+
+def test_a_saturated_gauge_makes_the_whole_wrench_invalid() -> None:
+    for gauge in range(6):
+        for end in (-40_000, 32_767):
+            load = np.zeros(6, np.int64)
+            load[gauge] = end
+            device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _, load=load: load)]))
+            device.start()
+            assert device.read(0.1).flags[0] == SampleFlag.SATURATED | SampleFlag.SUSPECT
+            with pytest.raises(DriverError, match="saturated"):
+                device.set_bias()
+            assert not device.bias.any()
+            device.close()
+
+
+def test_the_status_is_said_in_words_and_flags_what_cannot_be_used() -> None:
+    node = AtiCanFake()
+    device = AtiCan(SimulatedCanBus([node]))
+    device.start()
+    node.status = protocol.ANY_ERROR | 1 << 5 | 1 << 6
+    assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
+    assert protocol.status_words(device.status) == ["supply too low", "active calibration is bad"]
+    node.status = protocol.ANY_ERROR | 1
+    assert device.read(0.1).flags[0] == 0
+    assert protocol.status_words(1 << 9) == ["bit 9 is set"]
+    assert protocol.status_words(0) == []
+    device.close()
+
+
+def test_the_bias_is_taken_off() -> None:
+    load = np.array([5, -4, 3, -2, 1, 700])
+    device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]))
+    device.start()
+    before = device.read(0.1)
+    expected = MATRIX @ load / 1e6
+    assert [before.columns[name][0] for name in protocol.AXES] == pytest.approx(expected.tolist())
+    device.set_bias()
+    after = device.read(0.1)
+    assert [after.columns[name][0] for name in protocol.AXES] == pytest.approx([0.0] * 6)
+    device.close()
+
+
+def test_another_calibration_is_used_or_its_absence_said() -> None:
+    load = np.array([1000, 0, 0, 0, 0, 0])
+    device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]), calibration=1)
+    device.start()
+    assert device.read(0.1).columns["force_z_n"][0] == pytest.approx(2 * 1.51)
+    missing = AtiCan(SimulatedCanBus([AtiCanFake()]), calibration=7)
+    with pytest.raises(FrameError, match="calibration 7"):
+        missing.identify()
+
+
+def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
+    device = AtiCan(SimulatedCanBus([AtiCanFake(base=0x68)]))
+    with pytest.raises(LinkTimeoutError, match=r"base 0x20.*250 kbit/s"):
+        device.identify()
+    there = AtiCan(SimulatedCanBus([AtiCanFake(base=0x68)]), base=0x68)
+    assert there.identify().serial == "FT012345"
+
+
+def test_options_that_are_no_sensors() -> None:
+    for options in ({"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}):
+        with pytest.raises(LinkError, match="not"):
+            open_ati_can("can:virtual:options", **options)  # type: ignore[arg-type]
+
+
+def test_the_torque_about_another_point() -> None:
+    # 1 N along y at the sensor's origin, seen from 1 m behind it on x, turns about +z
+    wrench = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    moved = moved_wrench(wrench, np.array([-1.0, 0.0, 0.0]))
+    assert moved.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    # a force whose line passes through the point has no torque about it
+    pull = np.array([0.0, 0.0, -5.0, 0.0, 0.0, 0.0])
+    assert not moved_wrench(pull, np.array([0.0, 0.0, 0.3]))[3:].any()
+
+
+@given(
+    st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6),
+    st.lists(st.floats(-1, 1), min_size=3, max_size=3),
+)
+def test_moving_there_and_back_changes_nothing(wrench: list[float], point: list[float]) -> None:
+    there = moved_wrench(np.array(wrench), np.array(point))
+    back = moved_wrench(there, -np.array(point))
+    assert back == pytest.approx(np.array(wrench), abs=1e-9)
+
+
+@given(st.integers(0, 2**16 - 1), st.lists(counts, min_size=6, max_size=6), st.integers(0, 127))
+def test_a_reading_survives_its_frames(status: int, gauges: list[int], base: int) -> None:
+    first, second = protocol.encode_reading(base, status, gauges)
+    assert (first.can_id, second.can_id) == (base << 4, base << 4 | 1)
+    decoded_status, decoded = protocol.decode_reading(first.data, second.data)
+    assert (decoded_status, decoded.tolist()) == (status, gauges)
+
+
+@given(st.lists(st.floats(width=32, allow_nan=False, allow_infinity=False), min_size=6, max_size=6))
+def test_a_matrix_row_survives_its_frames(row: list[float]) -> None:
+    frames = protocol.encode_matrix_row(0x20, np.array(row))
+    assert protocol.decode_matrix_row([frame.data for frame in frames]).tolist() == row
+
+
+@given(st.binary(max_size=8), st.binary(max_size=8), st.binary(max_size=8))
+def test_any_bytes_are_decoded_or_refused(one: bytes, two: bytes, three: bytes) -> None:
+    for decode in (
+        lambda: protocol.decode_reading(one, two),
+        lambda: protocol.decode_matrix_row([one, two, three]),
+        lambda: protocol.decode_counts_per_unit(one),
+        lambda: protocol.decode_firmware(one),
+        lambda: protocol.decode_serial(one),
+    ):
+        with contextlib.suppress(FrameError):  # nothing else may be raised
+            decode()

@@ -1,0 +1,231 @@
+"""CAN buses: URLs, frames both ways, error frames, refusals, virtual time, faults."""
+
+import errno
+from collections.abc import Iterator
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import (
+    BusOffError,
+    LinkError,
+    LinkLostError,
+    LinkTimeoutError,
+    PortBusyError,
+    PortNotFoundError,
+    PortPermissionError,
+    UnknownSchemeError,
+)
+from drivers.transport.can_bus import CanFrame
+from drivers.transport.faulty import Fault, Faults
+from drivers.transport.faulty_can import FaultyCanBus
+from drivers.transport.python_can import PythonCanBus, open_can
+from drivers.transport.simulated_can import SimulatedCanBus
+
+
+@pytest.fixture
+def other() -> Iterator[can.BusABC]:
+    """Another node on the bus can:virtual:test."""
+    bus = can.Bus(interface="virtual", channel="test")
+    yield bus
+    bus.shutdown()
+
+
+def test_frames_go_both_ways(other: can.BusABC) -> None:
+    bus = open_can("can:virtual:test")
+    frame = CanFrame(0x123, b"\x01\x02\x03")
+    bus.send(frame)
+    seen = other.recv(1.0)
+    assert seen is not None
+    assert (seen.arbitration_id, bytes(seen.data), seen.is_extended_id) == (
+        0x123,
+        b"\x01\x02\x03",
+        False,
+    )
+    other.send(can.Message(arbitration_id=0x1ABCDEF, data=b"", is_extended_id=True))
+    assert bus.read(1.0) == CanFrame(0x1ABCDEF, b"", extended=True)
+    assert bus.read(0.0) is None
+    assert (bus.counters.sent, bus.counters.received) == (1, 1)
+    bus.close()
+    bus.close()
+    with pytest.raises(LinkLostError, match="closed"):
+        bus.read(0.0)
+    with pytest.raises(LinkLostError, match="closed"):
+        bus.send(frame)
+
+
+def test_remote_and_error_frames_are_counted_and_not_passed_on(other: can.BusABC) -> None:
+    bus = open_can("can:virtual:test")
+    other.send(can.Message(arbitration_id=1, is_remote_frame=True, is_extended_id=False))
+    other.send(can.Message(arbitration_id=0x04, data=b"\0\x01", is_error_frame=True))
+    other.send(can.Message(arbitration_id=0x08, data=bytes(8), is_error_frame=True))
+    other.send(can.Message(arbitration_id=7, data=b"x", is_extended_id=False))
+    assert bus.read(1.0) == CanFrame(7, b"x")
+    counters = bus.counters
+    assert (counters.ignored, counters.error_frames, counters.overruns) == (1, 2, 1)
+    bus.close()
+
+
+def test_bus_off_is_an_error_from_then_on(other: can.BusABC) -> None:
+    bus = open_can("can:virtual:test")
+    other.send(can.Message(arbitration_id=0x40, data=bytes(8), is_error_frame=True))
+    for _ in range(2):
+        with pytest.raises(BusOffError, match="terminator"):
+            bus.read(1.0)
+    with pytest.raises(BusOffError):
+        bus.send(CanFrame(1))
+    assert bus.counters.bus_off == 1
+    bus.close()
+
+
+def test_an_interface_that_echoes_is_freed_of_it(other: can.BusABC) -> None:
+    inner = can.Bus(interface="virtual", channel="test", receive_own_messages=True)
+    bus = PythonCanBus("can:udp_multicast:x", inner, echoes=True)
+    bus.send(CanFrame(5, b"a"))
+    other.send(can.Message(arbitration_id=5, data=b"a", is_extended_id=False))
+    assert bus.read(1.0) == CanFrame(5, b"a")
+    assert bus.read(0.0) is None
+    assert bus.counters.echoes == 1
+    bus.close()
+
+
+class BrokenBus(can.BusABC):
+    """An interface that raises what it is told to."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(channel=None)
+        self.error = error
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise self.error
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        raise self.error
+
+
+def test_what_an_interface_raises_becomes_ours_and_stays_the_cause() -> None:
+    gone = can.CanOperationError("device vanished")
+    bus = PythonCanBus("can:x:y", BrokenBus(gone))
+    with pytest.raises(LinkLostError, match="vanished") as lost:
+        bus.read(0.1)
+    assert lost.value.__cause__ is gone
+    with pytest.raises(LinkLostError, match="vanished"):
+        bus.send(CanFrame(1))
+    bus.close()
+    for error in (can.CanTimeoutError("full"), can.CanOperationError("full", errno.ENOBUFS)):
+        bus = PythonCanBus("can:x:y", BrokenBus(error))
+        with pytest.raises(LinkTimeoutError, match="acknowledges"):
+            bus.send(CanFrame(1))
+        bus.close()
+
+
+@pytest.mark.parametrize(
+    ("url", "error", "words"),
+    [
+        ("can:pigeon:1", UnknownSchemeError, "socketcan, slcan"),
+        ("can:socketcan:", UnknownSchemeError, "can0"),
+        ("can:socketcan:can0?bitrate=5", LinkError, "ip link set"),
+        ("can:slcan:/dev/ttyX?baud=5", LinkError, "no option baud"),
+        ("can:slcan:/dev/ttyX", LinkError, "bitrate=1000000"),
+        ("can:gs_usb:left?bitrate=5", LinkError, "left"),
+        ("can:slcan:/dev/nothing_here?bitrate=1000000", LinkError, "nothing_here"),
+    ],
+)
+def test_a_url_that_opens_nothing_says_why(url: str, error: type[LinkError], words: str) -> None:
+    with pytest.raises(error, match=words):
+        open_can(url)
+
+
+@pytest.mark.parametrize(
+    ("raised", "error", "words"),
+    [
+        (OSError(errno.ENODEV, "No such device"), PortNotFoundError, "up type can"),
+        (OSError(errno.EAFNOSUPPORT, "Address family"), LinkError, "knows no CAN"),
+        (OSError(errno.EPERM, "Not permitted"), PortPermissionError, "udev"),
+        (can.CanInitializationError("held", errno.EBUSY), PortBusyError, "in use"),
+        (can.CanInterfaceNotImplementedError("no module"), LinkError, "pip install"),
+        (ValueError("odd"), LinkError, "odd"),
+    ],
+)
+def test_a_refusal_is_explained(
+    monkeypatch: pytest.MonkeyPatch, raised: Exception, error: type[LinkError], words: str
+) -> None:
+    def refuse(**_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    with pytest.raises(error, match=words) as caught:
+        open_can("can:socketcan:can0")
+    assert caught.value.__cause__ is raised
+
+
+@given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans())
+def test_a_frame_survives_packing(can_id: int, data: bytes, extended: bool) -> None:
+    frame = CanFrame(can_id if extended else can_id & 0x7FF, data, extended)
+    assert CanFrame.from_bytes(frame.to_bytes()) == frame
+
+
+def test_a_frame_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="0x7ff"):
+        CanFrame(0x800)
+    with pytest.raises(ValueError, match="9"):
+        CanFrame(1, bytes(9))
+
+
+class Parrot:
+    """Repeats what it hears 3 ms later, one identifier up."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[int, CanFrame]] = []
+        self.now = 0
+
+    def receive(self, frame: CanFrame) -> None:
+        self.heard.append((self.now + 3, CanFrame(frame.can_id + 1, frame.data)))
+
+    def advance(self, ticks: int) -> None:
+        self.now += ticks
+
+    def transmit(self) -> list[CanFrame]:
+        due = [frame for at, frame in self.heard if at <= self.now]
+        self.heard = [entry for entry in self.heard if entry[0] > self.now]
+        return due
+
+
+def test_virtual_time_passes_by_reading_alone() -> None:
+    bus = SimulatedCanBus([Parrot()])
+    bus.send(CanFrame(1, b"hi"))
+    assert bus.read(0.0) is None
+    assert bus.now_s == 0.0
+    assert bus.read(1.0) == CanFrame(2, b"hi")
+    assert bus.now_s == pytest.approx(0.003)
+    assert bus.read(0.05) is None
+    assert bus.now_s == pytest.approx(0.053)
+    bus.close()
+    with pytest.raises(LinkLostError):
+        bus.read(1.0)
+
+
+def test_faults_strike_frames() -> None:
+    bus = FaultyCanBus(SimulatedCanBus([Parrot()]), Faults())
+
+    def came(count: int) -> list[bytes]:
+        for number in range(count):
+            bus.send(CanFrame(1, bytes([number])))
+        frames = []
+        while (frame := bus.read(0.1)) is not None:
+            frames.append(frame.data)
+        return frames
+
+    bus.faults.inject(Fault.DROP)
+    assert came(2) == [b"\x01"]
+    bus.faults.inject(Fault.DUPLICATE)
+    assert came(2) == [b"\x00", b"\x00", b"\x01"]
+    bus.faults.inject(Fault.DELAY, duration_s=0.05)
+    assert came(2) == [b"\x01", b"\x00"]
+    bus.faults.inject(Fault.STALL, duration_s=0.05)
+    assert came(2) == [b"\x00", b"\x01"]
+    bus.faults.inject(Fault.DISCONNECT)
+    with pytest.raises(LinkLostError):
+        bus.read(0.1)
