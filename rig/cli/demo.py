@@ -43,6 +43,8 @@ def demo(
     )
     screen.print(result.structures[0].sentence(), markup=False)
     screen.print(f"Report: {result.report}", markup=False)
-    screen.print(f"Next: rig replay {folder / 'logs'} --model {result.model}", markup=False)
+    logs = folder / "logs"
+    screen.print(f"Next: rig diagnose {logs} --report {folder}", markup=False)
+    screen.print(f"      rig replay {logs} --model {result.model}", markup=False)
     if json:
         emit_json(result)
