@@ -10,7 +10,7 @@ PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) -e '.[learn]'
+	$(PIP) -e '.[learn,arm]'
 	touch $@
 
 # what developers add: linters, tests, and the oracles they compare with

@@ -114,6 +114,7 @@ class CalibrationRecord:
         firmware_hash: Firmware the raw log was made with; empty if none was.
         raw: Files it was made from.
         code_version: Version of the code that fitted it.
+        tared: Whether the zero is measured anew before each run.
         figure_svg: Residual figure as SVG text; empty if there is none.
         notes: Operator's notes.
     """
@@ -130,6 +131,7 @@ class CalibrationRecord:
     firmware_hash: str = ""
     raw: tuple[RawFile, ...] = ()
     code_version: str = ""
+    tared: bool = False
     figure_svg: str = ""
     notes: str = ""
 
@@ -198,7 +200,7 @@ class CalibrationRecord:
             slope=self.fit.parameters["slope"],
             zero_counts=self.fit.parameters["zero"],
             source=f"record {self.content_hash}, {self.kind} of {self.made_at} by {self.operator}",
-            tared=bool(self.fit.parameters.get("tared", 0.0)),
+            tared=self.tared,
         )
 
 
@@ -219,7 +221,7 @@ def record_of_line(
         operator: Who vouches for it.
         rest: Other fields of the record.
     """
-    parameters = {"slope": line.slope, "zero": line.zero_counts, "tared": float(line.tared)}
+    parameters = {"slope": line.slope, "zero": line.zero_counts}
     return CalibrationRecord(
         kind=kind,
         channel=line.channel,
@@ -227,7 +229,7 @@ def record_of_line(
         made_at=made_at,
         operator=operator,
         fit=Fit(LINE, parameters),
-        **{"notes": line.source, **rest},
+        **{"notes": line.source, "tared": line.tared, **rest},
     )
 
 

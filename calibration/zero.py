@@ -71,6 +71,12 @@ def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dic
         if not line.tared:
             continue
         readings = counts[line.counts].astype(np.float64)
+        if np.ptp(readings) == 0:
+            raise CalibrationError(
+                f"{name} read {counts.size} times the same: {readings[0]:g} counts.",
+                "A real sensor has noise; this one is not connected, or its input is stuck.",
+                "Check its plug and its supply.",
+            )
         zeros[name] = SensorZero(
             name, float(readings.mean()), float(readings.std(ddof=1)), int(counts.size)
         )

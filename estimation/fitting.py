@@ -14,6 +14,7 @@ from scipy import linalg, optimize
 
 from estimation.campaign import Campaign
 from estimation.derived import settled
+from estimation.effects import Parameter
 from estimation.errors import EstimationError
 from estimation.model import (
     Estimate,
@@ -26,8 +27,6 @@ from estimation.model import (
 from estimation.recording import FloatArray, Recording
 
 OFFSET = "sensor.offset"
-GRID = 13
-"""Points a shape parameter is tried at before it is refined, spaced evenly in its logarithm."""
 
 
 class FitError(EstimationError):
@@ -46,6 +45,11 @@ class _Problem:
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
+
+    @property
+    def shape_parameters(self) -> list[Parameter]:
+        """Shape parameters of all terms, in order."""
+        return [p for term in self.model.terms for p in term.effect.shape]
 
     def columns(self, run: Recording, shape: Sequence[float]) -> FloatArray:
         """Return all signed columns of a run, shape (n, columns)."""
@@ -170,41 +174,52 @@ def _check_independent(problem: _Problem, normal: FloatArray, power: FloatArray)
     )
 
 
-def _error_share(problem: _Problem, log_shape: Sequence[float] | FloatArray) -> float:
+def _scaled(parameter: Parameter, value: float) -> float:
+    """Return a shape parameter's value on the scale it is searched on."""
+    return value if parameter.linear else float(np.log(value))
+
+
+def _unscaled(parameter: Parameter, value: float) -> float:
+    return float(value) if parameter.linear else float(np.exp(value))
+
+
+def _error_share(problem: _Problem, shape: Sequence[float]) -> float:
     """Return the share of the target's power that the best amplitudes leave."""
-    gram = np.sum(
-        [problem.gram(run, [float(x) for x in np.exp(log_shape)]) for run in problem.runs], axis=0
-    )
+    gram = np.sum([problem.gram(run, shape) for run in problem.runs], axis=0)
     vector = np.append(_solve(problem, gram), -1.0)
     return float(vector @ gram @ vector / max(gram[-1, -1], np.finfo(float).tiny))
 
 
 def _search_shape(problem: _Problem) -> list[float]:
     """Return the shape parameters: a grid along each, twice round, then a bounded descent."""
-    parameters = [p for term in problem.model.terms for p in term.effect.shape]
+    parameters = problem.shape_parameters
     if not parameters:
         return []
-    bounds = [(np.log(p.lower), np.log(p.upper)) for p in parameters]
+    bounds = [(_scaled(p, p.lower), _scaled(p, p.upper)) for p in parameters]
     known = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
     point = [
-        float(np.clip(np.log(start.value), *bound)) if start else float(np.mean(bound))
-        for start, bound in zip(known, bounds, strict=True)
+        float(np.clip(_scaled(p, start.value), *bound)) if start else float(np.mean(bound))
+        for start, bound, p in zip(known, bounds, parameters, strict=True)
     ]
+
+    def values(candidate: Sequence[float] | FloatArray) -> list[float]:
+        return [_unscaled(p, x) for p, x in zip(parameters, candidate, strict=True)]
 
     def error(candidate: Sequence[float] | FloatArray) -> float:
         try:
-            return _error_share(problem, candidate)
+            return _error_share(problem, values(candidate))
         except FitError:  # a shape at which columns fall together, such as a width far too wide
             return 1.0
 
     for _ in range(2 if len(parameters) > 1 else 1):
-        for k, bound in enumerate(bounds):
-            tried = [[*point[:k], float(x), *point[k + 1 :]] for x in np.linspace(*bound, GRID)]
+        for k, parameter in enumerate(parameters):
+            grid = [_scaled(parameter, float(x)) for x in parameter.grid()]
+            tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
     best = optimize.minimize(
         error, point, method="Powell", bounds=bounds, options={"xtol": 1e-4, "ftol": 1e-10}
     )
-    return [float(x) for x in np.exp(best.x)]
+    return values(best.x if best.fun <= error(point) else point)
 
 
 def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:
@@ -227,7 +242,8 @@ def _bootstrap(
     """Return values over a bootstrap of runs: (replicate, free columns + shapes + offset).
 
     Each replicate takes one Gauss-Newton step from the fit, with the derivative of the estimate by
-    the logarithm of each shape as a further column. Parameters at a bound stay there: NaN.
+    each shape, on the scale it is searched on, as a further column.
+    Parameters at a bound stay there: NaN.
     """
     runs = problem.runs
     if count == 0 or len(runs) < 2:
@@ -251,7 +267,8 @@ def _bootstrap(
     weights = np.random.default_rng(seed).multinomial(
         len(runs), np.full(len(runs), 1 / len(runs)), size=count
     )
-    start = np.concatenate([free, np.log(shape)])
+    shapes = problem.shape_parameters
+    start = np.concatenate([free, [_scaled(p, x) for p, x in zip(shapes, shape, strict=True)]])
     values = np.full((count, len(start) + 1), np.nan)
     for replicate, weight in enumerate(weights):
         total = np.tensordot(weight, products, axes=1)
@@ -263,20 +280,24 @@ def _bootstrap(
         if problem.offset is not None:
             mean = np.average(means, axis=0, weights=weight)
             values[replicate, -1] = (mean[-1] - mean[:-1] @ step) * problem.signs[problem.offset]
-    values[:, names:-1] = np.exp(values[:, names:-1])
+    for k, parameter in enumerate(shapes, start=names):
+        if not parameter.linear:
+            values[:, k] = np.exp(values[:, k])
     return values
 
 
 def _slopes(
     problem: _Problem, run: Recording, shape: list[float], free: FloatArray, step: float = 1e-3
 ) -> FloatArray:
-    """Return the derivative of the estimate by the logarithm of each shape, shape (n, shapes)."""
+    """Return the derivative of the estimate by each shape on its scale, shape (n, shapes)."""
     slopes = np.empty((len(run), len(shape)))
-    for k in range(len(shape)):
+    for k, parameter in enumerate(problem.shape_parameters):
         ends = []
         for sign in (1, -1):
-            moved = [x * np.exp(sign * step) if i == k else x for i, x in enumerate(shape)]
-            ends.append(problem.columns(run, moved)[:, problem.free] @ free)
+            moved = _unscaled(parameter, _scaled(parameter, shape[k]) + sign * step)
+            ends.append(
+                problem.columns(run, [*shape[:k], moved, *shape[k + 1 :]])[:, problem.free] @ free
+            )
         slopes[:, k] = (ends[0] - ends[1]) / (2 * step)
     return slopes
 

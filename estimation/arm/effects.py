@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from estimation.arm.motion import Motion
-from estimation.arm.tables import Arm
+from estimation.arm.tables import Arm, Joint
 from estimation.recording import FloatArray
 
 DRIVE_SLIP_RAD = (0.003, 0.01, 0.03, 0.1, 0.3)
@@ -56,6 +56,11 @@ def _of_joint(arm: Arm, k: int) -> list[ArmEffect]:
             _on(arm, k, lambda m: [m.position[:, k] ** p for p in (2, 3)]),
         ),
         ArmEffect(
+            f"uneven spring J{k + 1}",
+            f"elastic torque of the {name} that swings four times a turn (prismatic: range)",
+            _on(arm, k, lambda m: _four_a_turn(m.position[:, k], arm.joints[k])),
+        ),
+        ArmEffect(
             f"curved friction J{k + 1}",
             f"friction of the {name} in the signed square of speed",
             _on(arm, k, lambda m: [m.velocity[:, k] * np.abs(m.velocity[:, k])]),
@@ -90,6 +95,11 @@ def _wrist(arm: Arm) -> list[ArmEffect]:
             "wrist drive damping",
             "viscous friction of the wrist's motors, through the coupling",
             lambda m: _of_drives(arm, m, lambda q, v: [v]),
+        ),
+        ArmEffect(
+            "wrist drive curved friction",
+            "friction of the wrist's motors in the signed root of speed, through the coupling",
+            lambda m: _of_drives(arm, m, lambda q, v: [np.sign(v) * np.sqrt(np.abs(v))]),
         ),
         ArmEffect(
             "wrist drive hysteresis",
@@ -156,6 +166,12 @@ def _presliding(arm: Arm, k: int) -> Callable[[Motion], FloatArray]:
     return _on(
         arm, k, lambda m: [slip(m.position[:, [k]], s * half)[:, 0] for s in JOINT_SLIP_SHARE]
     )
+
+
+def _four_a_turn(position: FloatArray, joint: Joint) -> list[FloatArray]:
+    turn = 2 * np.pi if joint.kind == "revolute" else joint.upper - joint.lower
+    phase = 4 * (2 * np.pi / turn) * position
+    return [np.sin(phase), np.cos(phase)]
 
 
 def _by_position(motion: Motion, k: int, speed: float) -> list[FloatArray]:

@@ -8,10 +8,18 @@ from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
 
-from estimation.effects.effect import Effect, Parameter, Proportional
+from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional
 from estimation.errors import EstimationError
 
-__all__ = ["Effect", "Parameter", "Proportional", "UnknownEffectError", "catalogue", "effect"]
+__all__ = [
+    "Effect",
+    "Parameter",
+    "Pointwise",
+    "Proportional",
+    "UnknownEffectError",
+    "catalogue",
+    "effect",
+]
 
 
 class UnknownEffectError(EstimationError):

@@ -9,7 +9,7 @@ a model says which channel plays which role and on which side of the balance the
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,10 @@ class Parameter:
         description: What it means.
         lower: Smallest value that makes physical sense, in SI units.
         upper: Largest value that makes physical sense.
+        linear: Of a shape parameter: it is searched on a linear scale and may be zero or negative,
+            such as a position; else on a logarithmic one.
+        points: Of a shape parameter: how many values between its bounds a search tries before it
+            refines the best. An order needs many: between two of them lies a narrow peak.
     """
 
     name: str
@@ -33,6 +37,14 @@ class Parameter:
     description: str
     lower: float = -np.inf
     upper: float = np.inf
+    linear: bool = False
+    points: int = 13
+
+    def grid(self) -> FloatArray:
+        """Return the values a search tries first, shape (points,), from `lower` to `upper`."""
+        if self.linear:
+            return np.linspace(self.lower, self.upper, self.points)
+        return np.geomspace(self.lower, self.upper, self.points)
 
 
 class Effect(ABC):
@@ -41,21 +53,35 @@ class Effect(ABC):
     Its docstring states the equation and the source. Class attributes:
 
     Attributes:
-        id: Name of the effect, and what a diagnosis calls it, such as `friction.coulomb`.
+        id: Name of the effect, unique in the catalogue, such as `friction.coulomb`.
+        family: What a diagnosis calls it; the id unless stated. Several forms of one cause share a
+            family, and the id of a form is its family with one more word
+            (`hysteresis.presliding.lugre`).
+        balances: Balances a search may add it to, and the side it stands on there: 1 adds to the
+            target, -1 takes from it, so that a bound on an amplitude means the same everywhere.
+            `joint` stands for every `joint.N`. Empty for what is only ever declared, such as the
+            torque constant. Which channel plays a role in which balance is told by
+            `estimation.effects.roles`.
         roles: Role of each input, and the channel that plays it unless a model says otherwise.
         amplitudes: Linear parameters, one a column.
-        shape: Non-linear parameters; all of them positive, searched on a logarithmic scale between
-            their bounds.
+        shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
     """
 
     id: ClassVar[str]
+    family: ClassVar[str]
+    balances: ClassVar[Mapping[str, int]] = {}
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        """Let the family be the id where none is stated."""
+        if "id" in vars(cls) and "family" not in vars(cls):
+            cls.family = cls.id
 
     @abstractmethod
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
@@ -84,6 +110,27 @@ class Effect(ABC):
             shape: Values of the shape parameters, in order.
             state: From `start`, changed in place.
         """
+
+
+class Pointwise(Effect):
+    """An effect without memory: each row of its columns depends on that sample only.
+
+    A subclass writes `row` once, for arrays and for single numbers.
+    """
+
+    @abstractmethod
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return one value or one array of shape (n,) for each amplitude."""
+
+    def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
+        """Return the columns, shape (n, number of amplitudes)."""
+        return np.column_stack(self.row(inputs, shape))
+
+    def step(
+        self, inputs: Mapping[str, float], shape: Sequence[float], state: list[float]
+    ) -> Sequence[float]:
+        """Return one row of the columns."""
+        return [float(value) for value in self.row(inputs, shape)]
 
 
 class Proportional(Effect):

@@ -20,6 +20,14 @@ class CoulombFriction(Effect):
     """
 
     id = "friction.coulomb"
+    balances: ClassVar = {
+        "motor": -1,
+        "gearbox": -1,
+        "cable": 1,
+        "stretch": -1,
+        "grasp": -1,
+        "joint": 1,
+    }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
     shape = (Parameter("width", "speed", "speed at which 76 % of the loss is there", 1e-3, 1e2),)

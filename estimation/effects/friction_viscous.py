@@ -14,6 +14,14 @@ class ViscousFriction(Proportional):
     """
 
     id = "friction.viscous"
+    balances: ClassVar = {
+        "motor": -1,
+        "gearbox": -1,
+        "cable": 1,
+        "stretch": -1,
+        "grasp": -1,
+        "joint": 1,
+    }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("damping", "target / speed", "loss for one rad/s", lower=0.0),)
     confused_with = ("friction.drag", "sensor.delay")

@@ -90,25 +90,17 @@ def add(
 @cal_app.command("list")
 def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     """List every record, oldest first; the active ones are marked."""
-    from rig.reports.table import TextTable, to_rich
-
     kept = _store(store)
     active = {record.content_hash for record in kept.active().values()}
     records = kept.records()
-    rows = [
-        [
-            ("* " if r.content_hash in active else "  ") + r.content_hash,
-            r.kind,
-            r.channel,
-            r.instrument or "any",
-            f"{r.made:%Y-%m-%d}",
-            r.operator,
-        ]
-        for r in records
-    ]
-    columns = ["record", "kind", "channel", "instrument", "made", "operator"]
-    note = "* active" if records else "No records yet: rig cal add."
-    console().print(to_rich(TextTable(f"Store {kept.folder}", columns, rows, note)))
+    screen = console()
+    screen.print(f"Store {kept.folder}", markup=False)
+    for r in records:  # lines, not a table: a terminal would cut the hashes off
+        mark = "*" if r.content_hash in active else " "
+        whom = f", instrument {r.instrument}" if r.instrument else ""
+        made = f"{r.kind}, {r.made:%Y-%m-%d} by {r.operator}{whom}"
+        screen.print(f"{mark} {r.content_hash}  {r.channel}  {made}", markup=False)
+    screen.print("* active" if records else "No records yet: rig cal add.")
     if json:
         emit_json(
             {

@@ -121,6 +121,10 @@ def pique(
     paths: Annotated[
         tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
     ] = ("one18", "two18"),
+    also: Annotated[
+        list[str] | None,
+        typer.Option(help="A further run to test on, with models fitted on the second path."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
@@ -132,8 +136,9 @@ def pique(
 
     with progress() as bar:
         task = bar.add_task("paths", total=None)
+        first, second, *others = open_paths(data, [*paths, *(also or [])])
         study = run_study(
-            *open_paths(data, paths), on_step=lambda step: bar.update(task, description=step)
+            first, second, also=others, on_step=lambda step: bar.update(task, description=step)
         )
     screen = console()
     for line in [shown.lead(study), *shown.notes(study)]:

@@ -5,7 +5,7 @@ effects that a forward search keeps: each round adds the effect that helps most 
 not fitted, in one direction only. The other direction is reported and never chosen on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,7 +106,7 @@ class Study:
         schema: Name of this layout.
         arm: The arm's table.
         paths: The two paths; the search fits the first and tests on the second.
-        rows: The models, each in both directions.
+        rows: The models, each in both directions, then on further runs.
         thesis: The thesis' own errors, %.
         trials: What the search tried.
         parameters: Identified parameters of the thesis' model on the first path, SI units.
@@ -148,8 +148,8 @@ class Prepared:
         return np.concatenate([self.filtered, *(self.effects[name] for name in kept)], axis=2)
 
 
-def open_paths(data: Path, names: tuple[str, str]) -> tuple[Recording, Recording]:
-    """Read two runs of a folder by name.
+def open_paths(data: Path, names: Sequence[str]) -> list[Recording]:
+    """Read runs of a folder by name.
 
     Raises:
         UsageError: There is nothing at the path.
@@ -161,10 +161,9 @@ def open_paths(data: Path, names: tuple[str, str]) -> tuple[Recording, Recording
         raise DataError(
             f"{data} holds no run {' and no run '.join(missing)}.",
             f"It holds: {', '.join(campaign.names) or 'nothing'}.",
-            "Name two of them: --paths FIRST SECOND",
+            "Name those you mean: --paths FIRST SECOND",
         )
-    first, second = (campaign.select([name]).runs[0].recording() for name in names)
-    return first, second
+    return [campaign.select([name]).runs[0].recording() for name in names]
 
 
 def prepare(recording: Recording) -> Prepared:
@@ -202,13 +201,18 @@ def prepare(recording: Recording) -> Prepared:
 
 
 def run_study(
-    first: Recording, second: Recording, *, on_step: Callable[[str], None] = lambda step: None
+    first: Recording,
+    second: Recording,
+    *,
+    also: Sequence[Recording] = (),
+    on_step: Callable[[str], None] = lambda step: None,
 ) -> Study:
     """Do the study on two paths of the same arm.
 
     Args:
         first: The path the search fits.
         second: The path it tests on.
+        also: Further runs to test models on that were fitted on the second path.
         on_step: Called with what is being done.
 
     Raises:
@@ -222,7 +226,7 @@ def run_study(
     trials, kept = search(there, back, candidates(PSM))
     on_step("fits")
     rows = []
-    for one, other in (there, back):
+    for one, other in (there, back, *((there[1], prepare(run)) for run in also)):
         rows += [
             _row(THESIS, one, other, one.thesis, other.thesis, 0.0),
             _row(FILTERED, one, other, one.filtered, other.filtered, 0.0),

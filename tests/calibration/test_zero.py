@@ -49,3 +49,11 @@ def test_a_limit_on_a_channel_without_a_zero_is_refused():
     zeros = measure_zeros(rest(0.0), SET)
     with pytest.raises(CalibrationError, match="has a drift limit but no zero"):
         drift_verdicts(zeros, zeros, SET, {"motor_angle_rad": 1.0})
+
+
+def test_a_sensor_that_never_changes_is_no_sensor_at_rest():
+    """A dead input reads one number for ever; its mean would pass for a zero."""
+    counts = rest(0.0)
+    counts["distal"] = 40
+    with pytest.raises(CalibrationError, match="500 times the same"):
+        measure_zeros(counts, SET)

@@ -14,6 +14,14 @@ from estimation.model import Term
 EVERY = pytest.mark.parametrize("kind", catalogue().values(), ids=catalogue())
 
 
+def at(parameter, place: float) -> float:
+    """Return a value between the bounds of a shape parameter, on its scale."""
+    low, high = parameter.lower, parameter.upper
+    if parameter.linear:
+        return low + place * (high - low)
+    return low ** (1 - place) * high**place
+
+
 def motion(roles, seed: int, n: int = 60) -> dict[str, np.ndarray]:
     random = np.random.default_rng(seed)
     return {
@@ -38,7 +46,7 @@ def test_the_declared_models_find_their_effects():
 @settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 1000), place=st.floats(0, 1))
 def test_offline_columns_and_live_steps_agree_to_rounding(kind, seed, place):
-    shape = [p.lower ** (1 - place) * p.upper**place for p in kind.shape]
+    shape = [at(p, place) for p in kind.shape]
     inputs = motion(kind.roles, seed)
     columns = kind.columns(inputs, shape)
     state = kind.start()
@@ -61,7 +69,10 @@ def test_an_effect_is_documented_and_its_parameters_have_units_and_bounds(kind):
         assert parameter.lower < parameter.upper
         assert Term(kind).unit(parameter, "proximal_torque_n_m")
         assert parameter.description
-    assert all(0 < p.lower < p.upper < np.inf for p in kind.shape)  # searched by logarithm
+    for parameter in kind.shape:
+        assert np.isfinite([parameter.lower, parameter.upper]).all()
+        assert parameter.linear or parameter.lower > 0  # searched by logarithm
+        assert len(parameter.grid()) == parameter.points
     if len(kind.amplitudes) and kind.id != "sensor.offset":
         assert kind.told_apart_by
 

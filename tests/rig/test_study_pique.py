@@ -99,14 +99,14 @@ def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
 
 def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_path):
     monkeypatch.setattr(pique, "open_campaign", lambda path: Campaign.of(paths))
-    monkeypatch.setattr(pique, "candidates", lambda arm: candidates(arm)[:5])
+    monkeypatch.setattr(pique, "candidates", lambda arm: candidates(arm)[:6])
     out = tmp_path / "pique.md"
-    words = ["pique", "--data", "x", "--paths", "a", "b", "--out", str(out), "--json"]
-    ran = CliRunner().invoke(study_app, words)
+    words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "a", "--out", str(out)]
+    ran = CliRunner().invoke(study_app, [*words, "--json"])
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
     assert found["schema"] == "rig.study.pique/1"
-    assert len(found["rows"]) == 6
+    assert len(found["rows"]) == 9
     text = out.read_text()
     assert "thesis, table 3.2 (another robot)" in text
     assert "| 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in text

@@ -14,6 +14,7 @@ class PositionSpring(Proportional):
     """
 
     id = "spring.position"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
     amplitudes = (Parameter("stiffness", "target / position", "torque for one radian"),)
     confused_with = ("transmission.stiffening", "gravity.payload", "friction.position")

@@ -1,0 +1,165 @@
+"""Candidates: each effect of the catalogue at each point of its shape's grid, set in a balance."""
+
+import itertools
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.candidates import candidates
+from estimation.effects import Effect, Parameter, effect
+from estimation.model import Model, Term
+from estimation.recording import FloatArray
+
+FAMILIES = [
+    "friction.coulomb",
+    "friction.coulomb_asymmetry",
+    "friction.viscous",
+    "friction.viscous_asymmetry",
+    "friction.drag",
+    "friction.stribeck",
+    "friction.dwell",
+    "friction.load",
+    "friction.load_viscous",
+    "friction.capstan",
+    "friction.position",
+    "friction.warmup",
+    "hysteresis.presliding",
+    "hysteresis.bouc_wen",
+    "spring.position",
+    "spring.end_stop",
+    "gravity.payload",
+    "ripple.motor",
+    "ripple.output",
+    "ripple.current",
+    "eccentric.load",
+    "motor.saturation",
+    "motor.thermal",
+    "motor.electrical",
+    "transmission.backlash",
+    "transmission.stiffening",
+    "transmission.relaxation",
+    "compliance.link",
+    "coupling.kinematic",
+    "coupling.torque",
+    "sensor.gain_nonlinear",
+    "sensor.drift",
+    "sensor.creep",
+    "sensor.crosstalk",
+    "sensor.delay",
+    "sensor.lag",
+    "sensor.encoder_inl",
+    "inertia.missing",
+    "change.step",
+    "unknown",
+]
+"""Family ids a diagnosis may report; fixed, since other tools read them."""
+
+UNKNOWN = "unknown"
+
+MOST_TOGETHER = 48
+"""Grid points of an effect with several shape parameters at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An effect at one shape, set in a balance. Plain data, so that it travels to other processes.
+
+    Attributes:
+        id: Id of the effect.
+        sign: Side of the balance.
+        channels: Role and channel, in pairs.
+        shape: Values of its shape parameters.
+    """
+
+    id: str
+    sign: int
+    channels: tuple[tuple[str, str], ...]
+    shape: tuple[float, ...]
+
+    @classmethod
+    def of(cls, term: Term, shape: Sequence[float]) -> "Candidate":
+        """Return a model's term at a shape."""
+        return cls(term.effect.id, term.sign, tuple(term.channels.items()), tuple(shape))
+
+    @property
+    def effect(self) -> Effect:
+        """The effect."""
+        return effect(self.id)
+
+    @property
+    def family(self) -> str:
+        """What a diagnosis calls it."""
+        return self.effect.family
+
+    @property
+    def term(self) -> Term:
+        """The term of a model, without values."""
+        return Term(self.effect, self.sign, dict(self.channels))
+
+    def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the signed columns of one whole run, shape (n, amplitudes)."""
+        inputs = {role: channels[name] for role, name in self.channels}
+        return self.sign * self.effect.columns(inputs, self.shape)
+
+    def moved(self, k: int, steps: float) -> "Candidate":
+        """Return the same effect with its k-th shape moved by steps of its grid, in its bounds."""
+        bound = self.effect.shape[k]
+        values = list(self.shape)
+        values[k] = step(bound, values[k], steps)
+        return replace(self, shape=tuple(values))
+
+
+def step(bound: Parameter, value: float, steps: float) -> float:
+    """Return a shape parameter moved by steps of its grid, kept in its bounds."""
+    if bound.linear:
+        moved = value + steps * (bound.upper - bound.lower) / (bound.points - 1)
+    else:
+        moved = value * float(
+            np.exp(steps * np.log(bound.upper / bound.lower) / (bound.points - 1))
+        )
+    return float(min(max(moved, bound.lower), bound.upper))
+
+
+def pool(model: Model, measured: Collection[str]) -> list[Candidate]:
+    """Return every effect the declared model lacks, at every point of its grid.
+
+    Args:
+        model: The declared model.
+        measured: Channels that every run has.
+    """
+    declared = {(t.effect.id, *sorted(t.channels.items())) for t in model.terms}
+    return [
+        Candidate.of(term, shape)
+        for term in candidates(model.balance, measured)
+        if term.effect.family in FAMILIES and term.effect.family != UNKNOWN
+        if (term.effect.id, *sorted(term.channels.items())) not in declared
+        for shape in grid(term.effect)
+    ]
+
+
+def grid(kind: Effect) -> Iterator[tuple[float, ...]]:
+    """Walk the grid of an effect's shape; one empty point for an effect without shape."""
+    points = [[float(x) for x in p.grid()] for p in kind.shape]
+    if len(points) > 1:
+        most = max(3, int(MOST_TOGETHER ** (1 / len(points))))
+        points = [_spread(values, most) for values in points]
+    return itertools.product(*points)
+
+
+def related(first: Candidate, second: Candidate) -> bool:
+    """Say whether two effects look alike when the excitation is poor, by their own word."""
+    one, other = first.effect, second.effect
+    return (
+        one.family == other.family
+        or bool({other.id, other.family} & set(one.confused_with))
+        or bool({one.id, one.family} & set(other.confused_with))
+    )
+
+
+def _spread(values: list[float], most: int) -> list[float]:
+    """Return at most so many of the values, evenly spread, not the outermost ones."""
+    if len(values) <= most:
+        return values
+    places = np.linspace(0, len(values) - 1, most + 2)[1:-1]
+    return [values[round(p)] for p in places]

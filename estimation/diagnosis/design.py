@@ -1,0 +1,169 @@
+"""Columns of a run on a common footing: one filter, one decimation, the mean removed.
+
+Every raw channel goes through the model's zero-phase filter; derivatives and the effects' columns
+are made from the filtered channels at the full rate, from the run's first sample, so that states
+have their history. Then target and columns go through one more common filter while they are
+decimated: a non-linear function of a filtered signal is not the filtered function, and unequal
+smoothing looks like a delay.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from estimation.derived import zero_phase_channels
+from estimation.diagnosis.candidate import Candidate
+from estimation.errors import EstimationError
+from estimation.model import Model
+from estimation.recording import FloatArray, Recording
+
+SPEED = "motor_velocity_rad_s"
+
+WITH_FRICTION = ("motor", "cable", "grasp")
+"""Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
+at rest tell nothing of a model of motion: they are left out of search, fit and error."""
+
+REST_SHARE, REST_RAD_S, REST_REACH_S = 0.05, 0.7, 0.02
+"""At rest is: slower than this share of the run's 95th percentile of speed or than this speed of
+the motor, and what is this near to it. The share grows with what the filter smears at a reversal.
+"""
+
+TAPS = 8
+"""Length of the decimating filter, in decimated samples."""
+
+Mapper = Callable[..., Iterable[Any]]
+"""`map`, or the `map` of a `concurrent.futures.Executor`."""
+
+
+class DesignError(EstimationError):
+    """A run has no samples to diagnose on."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """The filtered channels of one run, plain data that travels to other processes.
+
+    Attributes:
+        name: Name of the run.
+        channels: Channel name to values at the full rate, shape (n,).
+        valid: Samples without a flag and away from the ends, shape (n,).
+        moving: Samples that are not at rest, where friction is in the balance, shape (n,).
+        down: Samples that become one.
+    """
+
+    name: str
+    channels: Mapping[str, FloatArray]
+    valid: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
+    down: int
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Samples at the full rate that errors are told over: valid and in motion, shape (n,)."""
+        return self.valid & self.moving
+
+    @property
+    def kept(self) -> NDArray[np.intp]:
+        """Decimated samples in motion that no flagged sample reaches."""
+        reach = TAPS // 2 * self.down
+        bad = ndimage.maximum_filter1d((~self.valid).astype(np.uint8), 2 * reach + 1)
+        return np.flatnonzero((bad[:: self.down] == 0) & self.moving[:: self.down])
+
+    def thin(self, columns: FloatArray) -> FloatArray:
+        """Filter and decimate columns of shape (n, k), drop flagged samples."""
+        return np.asarray(decimate(columns, self.down)[self.kept])
+
+    def centred(self, columns: FloatArray) -> FloatArray:
+        """Filter, decimate and remove the mean of columns of shape (n, k)."""
+        thin = self.thin(columns)
+        return np.asarray(thin - thin.mean(axis=0))
+
+
+def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
+    """Filter one run's channels as a model says and mark what may be used of it.
+
+    Raises:
+        DesignError: No usable sample is left.
+        MissingChannelError: The recording lacks a channel.
+        FilterError: The run cannot be filtered.
+    """
+    low_pass = model.low_pass
+    resting = model.balance in WITH_FRICTION and "motor_angle_rad" in recording
+    wanted = list(dict.fromkeys([*names, *([SPEED] if resting else [])]))
+    filtered = zero_phase_channels(recording, wanted, low_pass)
+    rate_hz = recording.sample_rate_hz
+    edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
+    valid = filtered.valid.copy()
+    valid[:edge] = False
+    valid[max(len(valid) - edge, 0) :] = False
+    down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
+    channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
+    channels["time_s"] = channels["time_s"] - channels["time_s"][0]
+    moving = _moving(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
+    run = Run(recording.name, channels, valid, moving, down)
+    if len(run.kept) < 20:
+        raise DesignError(
+            f"Run {recording.name!r} leaves {len(run.kept)} usable samples.",
+            "The others are flagged or at rest, or too near to the ends or a flag for the filter.",
+            "Record it anew, or exclude it.",
+        )
+    return run
+
+
+def _moving(speed: FloatArray, valid: NDArray[np.bool_], rate_hz: float) -> NDArray[np.bool_]:
+    size = np.abs(speed)
+    usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
+    rest = (size < max(REST_RAD_S, REST_SHARE * usual)).astype(np.uint8)
+    return np.asarray(ndimage.maximum_filter1d(rest, 2 * round(REST_REACH_S * rate_hz) + 1) == 0)
+
+
+def decimate(columns: FloatArray, down: int) -> FloatArray:
+    """Filter columns of shape (n, k) without lag and keep every `down`-th sample."""
+    if down == 1:
+        return columns
+    taps = signal.firwin(TAPS * down + 1, 0.8 / down)
+    half = TAPS // 2
+    thin: FloatArray = signal.upfirdn(taps, columns, 1, down, axis=0)
+    return thin[half : half + -(-len(columns) // down)]
+
+
+def _run_columns(run: Run, wanted: Sequence[Candidate], means: bool) -> FloatArray:
+    """Return the thinned columns of candidates on one run, side by side."""
+    blocks = []
+    for chunk in _chunks(wanted, 32):  # bounds the memory at the full rate
+        columns = np.column_stack([c.columns(run.channels) for c in chunk])
+        blocks.append(run.centred(columns) if means else run.thin(columns))
+    return np.hstack(blocks)
+
+
+def tables(
+    runs: Sequence[Run], wanted: Sequence[Candidate], demean: bool, mapper: Mapper = map
+) -> list[FloatArray]:
+    """Return the candidates' columns of every run, one array of shape (n, columns) a run.
+
+    Args:
+        runs: The runs.
+        wanted: The candidates.
+        demean: Remove each run's mean.
+        mapper: Maps over runs; an executor's makes it parallel.
+    """
+    if not wanted:
+        return [np.empty((len(run.kept), 0)) for run in runs]
+    count = len(runs)
+    return list(mapper(_run_columns, runs, [list(wanted)] * count, [demean] * count))
+
+
+def targets(runs: Sequence[Run], model: Model) -> list[FloatArray]:
+    """Return the thinned target of every run, shape (n,), its mean removed where that is due."""
+    columns = [run.channels[model.target][:, None] for run in runs]
+    if model.run_offsets:
+        return [run.centred(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
+    return [run.thin(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
+
+
+def _chunks(items: Sequence[Candidate], size: int) -> Iterator[Sequence[Candidate]]:
+    return (items[k : k + size] for k in range(0, len(items), size))

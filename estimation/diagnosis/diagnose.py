@@ -1,0 +1,426 @@
+"""The whole way: declared models, discovery, naming, freezing, and the confirm runs opened once."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
+from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
+from estimation.diagnosis.design import DesignError, Run, prepare
+from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, squares
+from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
+from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
+from estimation.diagnosis.search import Discovery, Gates, Named, Search
+from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.diagnosis.twin import Bootstrap, Twin
+from estimation.effects import Parameter
+from estimation.errors import EstimationError
+from estimation.fitting import fit
+from estimation.model import Estimate, Model
+from estimation.recording import FloatArray, Recording
+
+Stage = Callable[[str], None]
+"""Told what begins, in words."""
+
+SAME_CAUSE = 0.9
+"""Two balances show one cause when what it adds to them correlates at least this well."""
+
+TWICE = 2.0
+"""And when the sizes differ by less than this factor."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One finding before it is confirmed."""
+
+    part: Part
+    verdict: str
+    named: Named | None
+    depends_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Story:
+    """All that a report needs about one balance.
+
+    Attributes:
+        balance: The balance on the runs that discover.
+        discovery: What the search did.
+        claims: Claims that the confirm runs bore out.
+        refused: Claims they did not, in words.
+        before: Declared model, frozen.
+        after: Model with the claims, frozen.
+        values: Parameters of `after`'s effects, in their order.
+        confirm: The confirm runs.
+        candidates: Grid points tried.
+        families: Families tried.
+        unused: Runs without a usable sample in this balance.
+    """
+
+    balance: Balance
+    discovery: Discovery
+    claims: tuple[Claim, ...]
+    refused: tuple[str, ...]
+    before: Frozen
+    after: Frozen
+    values: tuple[Mapping[str, Estimate], ...]
+    confirm: tuple[Run, ...]
+    candidates: int
+    families: tuple[str, ...]
+    unused: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The fitted model with the named effects; maps are not part of a model file."""
+        return as_model(self.balance, self.after.terms, self.values)
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    models: Sequence[Model],
+    sealed: Sealed,
+    *,
+    gates: Gates | None = None,
+    executor: Executor | None = None,
+    twins: Mapping[str, Callable[[Model, Sequence[Recording]], Twin]] | None = None,
+    on_stage: Stage = lambda _: None,
+    on_open: Callable[[], None] = lambda: None,
+) -> tuple[Diagnosis, dict[str, Story]]:
+    """Diagnose declared models on a campaign.
+
+    Args:
+        recordings: Runs that count as evidence.
+        models: Declared models, one a balance.
+        sealed: The split of these runs, from `estimation.diagnosis.split.split`.
+        gates: What an effect must pass.
+        executor: Runs work over runs and over twins in parallel; None works here.
+        twins: Balance to a maker of simulated twins from the fitted model and the discovery runs.
+        on_stage: Told what begins.
+        on_open: Called once, just before the confirm runs are opened.
+
+    Returns:
+        The diagnosis, and the story behind each balance that could be decided.
+
+    Raises:
+        EstimationError: No balance could be decided; the first one's reason.
+    """
+    began = time.monotonic()
+    gates = gates or Gates()
+    stories: dict[str, Story] = {}
+    failed: dict[str, EstimationError] = {}
+    for model in models:
+        on_stage(f"searching what the {model.balance} balance lacks")
+        try:
+            maker = (twins or {}).get(model.balance)
+            stories[model.balance] = _balance(recordings, model, sealed, gates, executor, maker)
+        except EstimationError as error:
+            failed[model.balance] = error
+    if failed and not stories:
+        raise next(iter(failed.values()))
+    on_stage("opening the confirm runs")
+    on_open()
+    stories = {name: _confirmed(story, gates) for name, story in stories.items()}
+    findings = _one_cause_one_finding(stories, sealed.seed)
+    found: dict[str, Error] = {
+        name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
+    }
+    diagnosis = Diagnosis(
+        findings=tuple(findings),
+        errors=found,
+        unit={name: s.balance.model.unit for name, s in stories.items()},
+        noise_floor=dict.fromkeys(stories),
+        moved={name: _moved(s) for name, s in stories.items()},
+        sealed=sealed,
+        undecided={name: str(error) for name, error in failed.items()},
+        notes=tuple(_notes(sealed, twins, stories)),
+        seconds=time.monotonic() - began,
+    )
+    return diagnosis, stories
+
+
+def _balance(
+    recordings: Sequence[Recording],
+    model: Model,
+    sealed: Sealed,
+    gates: Gates,
+    executor: Executor | None,
+    maker: Callable[[Model, Sequence[Recording]], Twin] | None,
+) -> Story:
+    """Fit the declared model and search, on the runs that discover; prepare those that confirm."""
+    discover = [r for r in recordings if r.name in sealed.discover]
+    confirm = [r for r in recordings if r.name in sealed.confirm]
+    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    fitted = fit(model, Campaign.of(discover), bootstrap=0)
+    tried = pool(model, measured)
+    wanted = [model.target, *model.channels, *needed_channels(measured)]
+    wanted += [channel for c in tried for _, channel in c.channels]
+    wanted = list(dict.fromkeys(wanted))
+    mapper = map if executor is None else executor.map
+    runs, rested = _usable(discover, wanted, model)
+    held, also = _usable(confirm, wanted, model)
+    balance = lay_out(fitted, runs, mapper)
+    balance = replace(balance, terms=balance.refined(balance.terms))
+    whole = projection(balance)
+    balance = replace(balance, runs=[whole(run) for run in runs])
+    twin = None
+    if maker is not None:
+        source = maker(fitted, discover)
+        twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
+    discovery = Search(balance, tried, gates, sealed.seed, twin).run()
+    claims = _claims(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
+    before = freeze(balance, [])
+    return Story(
+        balance=balance,
+        discovery=discovery,
+        claims=tuple(claims),
+        refused=(),
+        before=before,
+        after=before,
+        values=(),
+        confirm=tuple(whole(run) for run in held),
+        candidates=len(tried),
+        families=tuple(dict.fromkeys(c.family for c in tried)),
+        unused=(*rested, *also),
+    )
+
+
+def _usable(
+    recordings: Sequence[Recording], wanted: Sequence[str], model: Model
+) -> tuple[list[Run], list[str]]:
+    """Prepare runs; name those that have no usable sample, as one that only rests.
+
+    Raises:
+        DesignError: No run is usable.
+    """
+    runs: list[Run] = []
+    unused: list[str] = []
+    for recording in recordings:
+        try:
+            runs.append(prepare(recording, wanted, model))
+        except DesignError:
+            if not runs and recording is recordings[-1]:
+                raise
+            unused.append(recording.name)
+    return runs, unused
+
+
+def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
+    """Return what is claimed, and no more than that."""
+    claims: list[Claim] = []
+    for named in discovery.named:
+        if named.veto is not None:
+            continue  # the map of what is left then speaks for it
+        if may_name:
+            sure = not named.rivals and named.confidence >= gates.sure
+            verdict = "identified" if sure else "one_of"
+            claims.append(Claim(Part(named.candidate), verdict, named, _variables(named)))
+        else:
+            claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
+    left = discovery.left_map
+    if left is not None and left.p <= gates.chance:
+        worth = left.gain * _share_left(claims, balance)
+        # also what a named effect's form leaves of its own cause is no second cause
+        if worth >= gates.map_floor and left.agree <= gates.agree:
+            claims.append(_map_claim(left, may_name))
+        elif worth >= gates.map_floor and not claims:
+            claims.append(Claim(Part(map=left), "something_missing", None, ()))
+    last = discovery.steps[-1] if discovery.steps else None
+    if not claims and last is not None and last.stands_out(gates):
+        claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
+    return claims
+
+
+def _map_claim(found: Map, may_name: bool) -> Claim:
+    if not may_name:
+        return Claim(Part(map=found), "something_missing", None, ())
+    return Claim(Part(map=found), "depends_on", None, found.variables)
+
+
+def _share_left(claims: Sequence[Claim], balance: Balance) -> float:
+    """Return the share of the declared model's squared error that the claims leave."""
+    found = [c.part.candidate for c in claims if c.part.candidate is not None]
+    return balance.loss([*balance.terms, *found]) / max(balance.loss(balance.terms), 1e-300)
+
+
+def _variables(named: Named) -> tuple[str, ...]:
+    """Return the variables of an effect, from the channels it reads."""
+    by_channel: dict[str, str] = {}
+    for variable, channel in CHANNELS.items():
+        by_channel[channel] = variable  # of two on one channel the last but history
+    by_channel["spindle_angle_rad"] = "spindle_angle"
+    by_channel[LOAD] = "load"
+    by_channel["distal_torque_n_m"] = "load"
+    family = named.candidate.family
+    found = [by_channel[c] for _, c in named.candidate.channels if c in by_channel]
+    signs = family.startswith("friction.") and family.split(".")[1] not in ("viscous", "drag")
+    found = ["velocity_sign" if signs and v == "velocity" else v for v in found]
+    if family.startswith("hysteresis."):
+        found.append("history")
+    return tuple(dict.fromkeys(found))
+
+
+def _confirmed(story: Story, gates: Gates) -> Story:
+    """Freeze, open the confirm runs, and keep the claims they bear out."""
+    kept: list[Claim] = []
+    refused: list[str] = []
+    last = story.before
+    for claim in story.claims:
+        trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
+        old = squares(last, story.confirm).sum()
+        new = squares(trial, story.confirm).sum()
+        if new <= (1 - gates.floor / 2) * old:
+            kept.append(claim)
+            last = trial
+        else:
+            what = claim.named.candidate.family if claim.named else UNKNOWN
+            refused.append(
+                f"{what}: on the confirm runs the squared error changed by"
+                f" {100 * (new / old - 1):+.1f} %"
+            )
+    values = intervals(story.balance, last.terms, seed=0)
+    return replace(
+        story, claims=tuple(kept), refused=tuple(refused), after=last, values=tuple(values)
+    )
+
+
+def _findings(story: Story) -> list[tuple[Finding, Part]]:
+    """Return the findings of one balance, each with what it adds."""
+    found = []
+    last = story.before
+    for k, claim in enumerate(story.claims):
+        now = freeze(story.balance, [c.part for c in story.claims[: k + 1]])
+        runs = [*story.balance.runs, *story.confirm]
+        old, new = squares(last, runs), squares(now, runs)
+        held = slice(len(story.balance.runs), None)
+        samples = sum(float(r.used.sum()) for r in story.confirm)
+        named = claim.named if claim.verdict in ("identified", "one_of") else None
+        found.append(
+            (
+                Finding(
+                    balance=story.balance.model.balance,
+                    family=named.candidate.family if named else UNKNOWN,
+                    verdict=claim.verdict,
+                    rmse_before=float(np.sqrt(old[held].sum() / samples)),
+                    rmse_after=float(np.sqrt(new[held].sum() / samples)),
+                    runs_improved=int(np.count_nonzero(new[held] < old[held])),
+                    runs_total=len(story.confirm),
+                    runs_affected=tuple(
+                        r.name for r, a, b in zip(runs, old, new, strict=True) if b < 0.98 * a
+                    ),
+                    alternatives=named.rivals if named else (),
+                    depends_on=claim.depends_on,
+                    confidence=named.confidence if named else None,
+                    parameters=_parameters(story, named.candidate) if named else {},
+                ),
+                claim.part,
+            )
+        )
+        last = now
+    return found
+
+
+def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
+    own = story.values[story.after.terms.index(candidate)]
+    units = {p.name: candidate.term.unit(p, story.balance.model.target) for p in _all(candidate)}
+    return {name: Value(e.value, units[name], e.ci95) for name, e in own.items()}
+
+
+def _all(candidate: Candidate) -> tuple[Parameter, ...]:
+    return candidate.term.parameters
+
+
+def _one_cause_one_finding(stories: Mapping[str, Story], seed: int) -> list[Finding]:
+    """Report a cause seen in several balances once, where it explains the largest share."""
+    found = [
+        (finding, _added(stories[name], part))
+        for name, story in stories.items()
+        for finding, part in _findings(story)
+    ]
+    found.sort(key=lambda pair: pair[0].rmse_after / max(pair[0].rmse_before, 1e-300))
+    kept: list[tuple[Finding, FloatArray]] = []
+    for finding, added in found:
+        for k, (first, other) in enumerate(kept):
+            same_unit = stories[first.balance].balance.model.unit
+            if first.balance == finding.balance or added.shape != other.shape:
+                continue
+            if _same_cause(added, other, same_unit == stories[finding.balance].balance.model.unit):
+                kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
+                break
+        else:
+            kept.append((finding, added))
+    order = list(stories)
+    ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
+    return [finding for finding, _ in ranked]
+
+
+def _added(story: Story, part: Part) -> FloatArray:
+    """Return what a part adds to its balance over all discovery runs, run means removed."""
+    parts = [story.after.contribution(run, part) for run in story.balance.runs]
+    return np.concatenate([p - p.mean() for p in parts])
+
+
+def _same_cause(first: FloatArray, second: FloatArray, same_unit: bool) -> bool:
+    """Say whether two contributions are the same torque: alike in course, sign and size.
+
+    Balances of different units are compared by their course alone.
+    """
+    size = float(np.linalg.norm(first)), float(np.linalg.norm(second))
+    if min(size) == 0:
+        return False
+    alike = float(first @ second) / (size[0] * size[1])
+    if not same_unit:
+        return abs(alike) >= SAME_CAUSE
+    return alike >= SAME_CAUSE and 1 / TWICE <= size[0] / size[1] <= TWICE
+
+
+def _moved(story: Story) -> dict[str, dict[str, float]]:
+    """Return each declared amplitude before and after the findings."""
+    moved: dict[str, dict[str, float]] = {}
+    at = 0
+    for term in story.before.terms:
+        for parameter in term.effect.amplitudes:
+            key = f"{term.id}.{parameter.name}"
+            moved[key] = {
+                "before": float(story.before.weights[at]),
+                "after": float(story.after.weights[at]),
+            }
+            at += 1
+    return moved
+
+
+def _notes(
+    sealed: Sealed, twins: Mapping[str, object] | None, stories: Mapping[str, Story]
+) -> list[str]:
+    """Return what the diagnosis cannot tell, in words."""
+    notes = []
+    if not sealed.may_name:
+        notes.append(
+            f"{len(sealed.discover)} runs discover; with fewer than {LEAST_TO_NAME} no effect is"
+            " named."
+        )
+    if not twins:
+        notes.append(
+            "The search was held against shuffled residuals only, not against simulated twins of"
+            " the declared model: artefacts of filters and feedback are not ruled out that way."
+        )
+    for name, story in stories.items():
+        used = sum(int(run.used.sum()) for run in story.confirm)
+        valid = sum(int(run.valid.sum()) for run in story.confirm)
+        if story.unused:
+            notes.append(f"{name}: without a usable sample: {', '.join(story.unused)}.")
+        if used < valid:
+            notes.append(
+                f"{name}: errors are over samples in motion; at rest ({1 - used / valid:.0%} of the"
+                " confirm samples) friction holds any torque, and no model of motion is tested."
+            )
+    notes += [
+        f"{name}: not borne out by the confirm runs: {what}."
+        for name, story in stories.items()
+        for what in story.refused
+    ]
+    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
+    return notes

@@ -1,0 +1,121 @@
+"""A model frozen after discovery, and its errors on runs that it has not seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.diagnosis.balance import Balance
+from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.design import Run
+from estimation.diagnosis.evidence import resampled
+from estimation.diagnosis.maps import RIDGE, Map
+from estimation.diagnosis.result import Error
+from estimation.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one finding adds: an effect, or a map."""
+
+    candidate: Candidate | None = None
+    map: Map | None = None
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Effects and maps with their weights; nothing of it changes any more.
+
+    Attributes:
+        balance: The balance it was fitted on.
+        terms: Declared effects, then found ones.
+        maps: Maps beside them.
+        weights: Amplitudes of the effects, then of the maps' columns.
+        level: Mean over the discovery runs of what they leave.
+    """
+
+    balance: Balance
+    terms: tuple[Candidate, ...]
+    maps: tuple[Map, ...]
+    weights: FloatArray
+    level: float
+
+    def error(self, run: Run) -> FloatArray:
+        """Return target less estimate at the run's used samples, shape (n,)."""
+        parts = [term.columns(run.channels) for term in self.terms]
+        parts += [m.columns(run) for m in self.maps]
+        target = run.channels[self.balance.model.target]
+        values = target - np.column_stack(parts) @ self.weights - self.level
+        return np.asarray(values[run.used])
+
+    def contribution(self, run: Run, part: Part) -> FloatArray:
+        """Return what one part adds to the estimate at the used samples, shape (n,)."""
+        at = 0
+        for term in self.terms:
+            width = len(term.effect.amplitudes)
+            if term == part.candidate:
+                columns = term.columns(run.channels)
+                return np.asarray((columns @ self.weights[at : at + width])[run.used])
+            at += width
+        for m in self.maps:
+            columns = m.columns(run)
+            if m is part.map:
+                return np.asarray((columns @ self.weights[at : at + columns.shape[1]])[run.used])
+            at += columns.shape[1]
+        return np.zeros(int(run.used.sum()))
+
+
+def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
+    """Fit declared effects and parts together on the discovery runs."""
+    terms = [*balance.terms, *(p.candidate for p in parts if p.candidate is not None)]
+    maps = [p.map for p in parts if p.map is not None]
+    weights = balance.solve(terms) if not maps else _with_maps(balance, terms, maps)
+    level = 0.0
+    frozen = Frozen(balance, tuple(terms), tuple(maps), weights, level)
+    if balance.demean:
+        level = float(np.mean([frozen.error(run).mean() for run in balance.runs]))
+    return replace(frozen, level=level)
+
+
+def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]) -> FloatArray:
+    rows = []
+    for run, columns in zip(balance.runs, balance.columns(terms), strict=True):
+        thin = [run.thin(m.columns(run)) for m in maps]
+        flat = [t - t.mean(axis=0) if balance.demean else t for t in thin]
+        rows.append(np.hstack([columns, *flat]))
+    whole, aim = np.vstack(rows), np.concatenate(balance.target)
+    scale = np.sqrt(np.maximum(np.einsum("nk,nk->k", whole, whole), np.finfo(float).tiny))
+    own = balance.columns(terms)[0].shape[1]
+    pull = np.diag(np.concatenate([np.full(own, 1e-9), np.full(len(scale) - own, RIDGE)]))
+    normal = (whole.T @ whole) / np.outer(scale, scale) + pull
+    weights: FloatArray = np.linalg.solve(normal, (whole.T @ aim) / scale) / scale
+    return weights
+
+
+def squares(frozen: Frozen, runs: Sequence[Run]) -> FloatArray:
+    """Return each run's sum of squared errors, its mean removed, shape (runs,)."""
+    errors = [frozen.error(run) for run in runs]
+    return np.array([float(np.sum((e - e.mean()) ** 2)) for e in errors])
+
+
+def errors(before: Frozen, after: Frozen, runs: Sequence[Run], seed: int) -> Error:
+    """Open the confirm runs: errors of the declared model and of the one with the findings."""
+    samples = np.array([float(run.used.sum()) for run in runs])
+    first, last = squares(before, runs), squares(after, runs)
+    weights = resampled(len(runs), 1000, seed)
+    ratio = np.sqrt((weights @ last) / np.maximum(weights @ first, np.finfo(float).tiny))
+    low, high = np.percentile(ratio, [2.5, 97.5])
+    raw = [
+        float(np.sqrt(sum(float(e @ e) for e in map(f.error, runs)) / samples.sum()))
+        for f in (before, after)
+    ]
+    names = [run.name for run in runs]
+    return Error(
+        before=float(np.sqrt(first.sum() / samples.sum())),
+        after=float(np.sqrt(last.sum() / samples.sum())),
+        with_means_before=raw[0],
+        with_means_after=raw[1],
+        ratio_ci95=(float(low), float(high)),
+        by_run_before=dict(zip(names, np.sqrt(first / samples).tolist(), strict=True)),
+        by_run_after=dict(zip(names, np.sqrt(last / samples).tolist(), strict=True)),
+    )

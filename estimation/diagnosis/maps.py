@@ -1,0 +1,248 @@
+"""Maps without a formula: the residual as a smooth function of one or two variables.
+
+They compete with the catalogue. A map that predicts runs left out clearly better than a named
+effect withdraws the name; where nothing in the catalogue fits, the map is the effect, and its
+variables are what may be said.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.derived import measured_channels
+from estimation.diagnosis.balance import Balance
+from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.design import Run
+from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.recording import FloatArray
+
+CHANNELS = {
+    "velocity_sign": "motor_velocity_rad_s",
+    "velocity": "motor_velocity_rad_s",
+    "spindle_angle": "spindle_angle_rad",
+    "jaw_angle": "jaw_angle_rad",
+    "load": "projected_load_n_m",
+    "current": "motor_current_a",
+    "acceleration": "motor_acceleration_rad_s2",
+    "time": "time_s",
+    "motor_angle": "motor_angle_rad",
+    "history": "spindle_angle_rad",
+    "temperature": "motor_temperature_k",
+    "wrist_pitch": "wrist_pitch_rad",
+    "wrist_roll": "wrist_roll_rad",
+}
+"""Variables of a map, simplest first, and the channel each is taken from."""
+
+LOAD, PROJECTED_LOAD = "proximal_torque_n_m", "projected_load_n_m"
+
+BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",)}
+"""Variables that reach a balance only through its load, and would stand for that load."""
+
+KNOTS = 7
+ORDERS = 8
+PLAYS = (0.05, 0.2, 0.6)
+"""Widths of the play operators that stand for history, shares of the middle 98 % of the range."""
+
+RIDGE = 1e-3
+THIN = 2
+"""A map is slow in its variables: every second sample tells the same."""
+
+SIMPLER = 0.07
+"""A smaller subset is taken when its gain is this near to the best, pooled and in the median."""
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Columns that stand for one variable.
+
+    Attributes:
+        variable: Name from `CHANNELS`.
+        channel: Where it is taken from.
+        low: First percentile over the runs that discover.
+        high: 99th percentile.
+    """
+
+    variable: str
+    channel: str
+    low: float
+    high: float
+
+    def columns(self, run: Run) -> FloatArray:
+        """Return the columns of one whole run, shape (n, k); their span holds the constant."""
+        x = run.channels[self.channel]
+        span = self.high - self.low
+        if self.variable == "velocity_sign":
+            sign = np.tanh(x / (0.02 * span))
+            return np.column_stack([np.ones(len(x)), sign])
+        if self.variable == "motor_angle":
+            waves = [f(k * x) for k in range(1, ORDERS + 1) for f in (np.sin, np.cos)]
+            return np.column_stack([np.ones(len(x)), *waves])
+        if self.variable == "history":
+            plays = [play(x, share * span) for share in PLAYS]
+            return np.column_stack([np.ones(len(x)), *plays])
+        knots = np.linspace(self.low, self.high, KNOTS)
+        return np.column_stack([np.interp(x, knots, row) for row in np.eye(KNOTS)])
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map of one or two variables and the evidence for it.
+
+    Attributes:
+        bases: The variables.
+        gain: Share of squared error removed on runs left out.
+        median_gain: The same share in the median run.
+        losses: Squared error of each run left out, shape (runs,).
+        base_losses: The same without the map.
+        p: Chance of such a gain from the best of all maps on surrogates.
+        agree: Signed-rank p-value over the runs.
+    """
+
+    bases: tuple[Basis, ...]
+    gain: float
+    median_gain: float
+    losses: FloatArray
+    base_losses: FloatArray
+    p: float = 1.0
+    agree: float = 1.0
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the variables."""
+        return tuple(basis.variable for basis in self.bases)
+
+    def columns(self, run: Run) -> FloatArray:
+        """Return the map's columns on one whole run, shape (n, k)."""
+        parts = [basis.columns(run) for basis in self.bases]
+        return parts[0] if len(parts) == 1 else _products(*parts)
+
+
+def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int) -> Map | None:
+    """Return the smallest map that is about as good as the best one.
+
+    Args:
+        balance: The balance.
+        terms: Effects that are refitted beside the map.
+        count: Number of surrogates.
+        seed: Their seed.
+    """
+    bases = _bases(balance)
+    base = [b[::THIN] for b in balance.base(terms)]
+    left = [r[::THIN] for r in balance.left(terms)]
+    drawn = surrogates(left, count, seed)
+    aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
+    singles = {basis: _thinned(balance, basis) for basis in bases}
+    found: list[Map] = []
+    null = np.full(count, -np.inf)
+    for subset in [*((b,) for b in bases), *itertools.combinations(bases, 2)]:
+        columns = [
+            _centred(p[0] if len(p) == 1 else _products(*p), balance.demean)
+            for p in zip(*(singles[basis] for basis in subset), strict=True)
+        ]
+        losses = leave_one_run_out(base, columns, [columns[0].shape[1]], aims, RIDGE)
+        null = np.maximum(null, losses.gain[0, 1:])
+        ratio = losses.joint[:, 0, 0] / np.maximum(losses.base[:, 0], np.finfo(float).tiny)
+        found.append(
+            Map(
+                subset,
+                float(losses.gain[0, 0]),
+                float(1 - np.median(ratio)),
+                losses.joint[:, 0, 0],
+                losses.base[:, 0],
+                agree=runs_agree(losses.base[:, 0], losses.joint[:, 0, 0]),
+            )
+        )
+    if not found or max(m.gain for m in found) <= 0:
+        return None
+    chosen = _simplest(found)
+    return Map(
+        chosen.bases,
+        chosen.gain,
+        chosen.median_gain,
+        chosen.losses,
+        chosen.base_losses,
+        chance(chosen.gain, null),
+        chosen.agree,
+    )
+
+
+def play(x: FloatArray, width: float) -> FloatArray:
+    """Return the play operator of a signal: it follows when pulled by more than half its width."""
+    half = 0.5 * width
+    out = np.empty(len(x))
+    value = float(x[0])
+    for k, now in enumerate(x.tolist()):
+        value = min(max(value, now - half), now + half)
+        out[k] = value
+    offset: FloatArray = (x - out) / max(half, np.finfo(float).tiny)
+    return offset
+
+
+def projection(balance: Balance) -> Callable[[Run], Run]:
+    """Return what adds the load of maps to a run's channels.
+
+    Where the load is the balance's own target, the declared model's estimate stands in: a sensor
+    held against its own residual finds its own noise.
+    """
+    weights = balance.solve(balance.terms)
+
+    def added(run: Run) -> Run:
+        if balance.model.target == LOAD:
+            columns = np.column_stack([term.columns(run.channels) for term in balance.terms])
+            load = columns @ weights
+        elif LOAD in run.channels:
+            load = run.channels[LOAD]
+        else:
+            return run
+        return replace(run, channels={**run.channels, PROJECTED_LOAD: load})
+
+    return added
+
+
+def needed_channels(measured: Sequence[str]) -> list[str]:
+    """Return the channels of the variables that runs with these measured channels have."""
+    wanted = [LOAD, *(c for c in CHANNELS.values() if c != PROJECTED_LOAD)]
+    return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
+
+
+def _bases(balance: Balance) -> list[Basis]:
+    bases = []
+    for variable, channel in CHANNELS.items():
+        if variable in BEHIND.get(balance.model.balance, ()):
+            continue
+        if any(channel not in run.channels for run in balance.runs):
+            continue
+        values = np.concatenate([run.channels[channel] for run in balance.runs])
+        low, high = (float(v) for v in np.percentile(values, [1, 99]))
+        if high - low > 1e-12 * max(abs(high), abs(low), 1e-12):
+            bases.append(Basis(variable, channel, low, high))
+    return bases
+
+
+def _thinned(balance: Balance, basis: Basis) -> list[FloatArray]:
+    return [run.thin(basis.columns(run))[::THIN] for run in balance.runs]
+
+
+def _products(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.asarray((first[:, :, None] * second[:, None, :]).reshape(len(first), -1))
+
+
+def _centred(columns: FloatArray, demean: bool) -> FloatArray:
+    return columns - columns.mean(axis=0) if demean else columns
+
+
+def _simplest(found: Sequence[Map]) -> Map:
+    """Return the first single variable, else pair, near enough to the best."""
+    best = max(found, key=lambda m: m.gain)
+    near = [
+        m
+        for m in found
+        if m.gain >= (1 - SIMPLER) * best.gain and m.median_gain >= (1 - SIMPLER) * best.median_gain
+    ]
+    fewest = min((len(m.bases) for m in near), default=len(best.bases))
+    chosen = max((m for m in near if len(m.bases) == fewest), key=lambda m: m.gain, default=best)
+    # the direction of motion is the simplest of the variables that hold it
+    plain = {"velocity_sign" if v in ("velocity", "history") else v for v in chosen.variables}
+    return next((m for m in near if set(m.variables) == plain), chosen)

@@ -1,0 +1,196 @@
+"""What a diagnosis says: verdict, findings, errors before and after. Contract `rig.diagnosis/1`."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from estimation.diagnosis.split import Sealed
+
+SCHEMA = "rig.diagnosis/1"
+
+VERDICTS = ("identified", "one_of", "depends_on", "something_missing", "nothing_missing")
+"""From the strongest claim to none; the verdict of a diagnosis is its weakest finding's."""
+
+VARIABLES = [
+    "velocity",
+    "velocity_sign",
+    "spindle_angle",
+    "motor_angle",
+    "jaw_angle",
+    "load",
+    "current",
+    "acceleration",
+    "time",
+    "history",
+    "dwell",
+    "run",
+    "temperature",
+    "wrist_pitch",
+    "wrist_roll",
+]
+"""Variables a finding may depend on; besides these, `joint_N` of an arm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A parameter: value, unit symbol, and 95 % interval of a bootstrap over runs, or None."""
+
+    value: float
+    unit: str
+    ci95: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause.
+
+    Attributes:
+        balance: Balance of its origin.
+        also_in: Other balances that the same cause shows in.
+        family: Id of the effect, or `unknown`.
+        verdict: What is claimed of it.
+        alternatives: Families it cannot be told from on these runs.
+        depends_on: Variables it depends on.
+        confidence: Probability that the name is right, or None without a name.
+        parameters: Name to value.
+        rmse_before: Error on the confirm runs before this finding, after those found earlier.
+        rmse_after: The same after it.
+        runs_improved: Confirm runs whose error it lowers.
+        runs_total: Confirm runs.
+        runs_affected: All runs whose error it lowers by a hundredth and more.
+    """
+
+    balance: str
+    family: str
+    verdict: str
+    rmse_before: float
+    rmse_after: float
+    runs_improved: int
+    runs_total: int
+    runs_affected: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
+    depends_on: tuple[str, ...] = ()
+    confidence: float | None = None
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    also_in: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Errors on the confirm runs, pooled over their samples, in the unit of the target.
+
+    Attributes:
+        before: Root mean square, each run's mean removed, declared model.
+        after: The same with the findings.
+        with_means_before: Root mean square with the means left in, declared model.
+        with_means_after: The same with the findings.
+        ratio_ci95: 95 % interval of after / before, a bootstrap over the confirm runs.
+        by_run_before: Confirm run to its error before.
+        by_run_after: Confirm run to its error after.
+    """
+
+    before: float
+    after: float
+    with_means_before: float
+    with_means_after: float
+    ratio_ci95: tuple[float, float]
+    by_run_before: Mapping[str, float]
+    by_run_after: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer.
+
+    Attributes:
+        findings: In the order found; empty when nothing is missing.
+        errors: Balance to its errors on the confirm runs.
+        unit: Balance to the unit symbol of its target.
+        noise_floor: Balance to the error that no model can go below, None where it is not known.
+        moved: Balance to declared parameter to its value before and after the findings.
+        sealed: The split.
+        undecided: Balance to why nothing could be said about it.
+        notes: Limits of this diagnosis, in words.
+        exploratory: Whether the confirm runs had been opened before.
+        seconds: How long it took.
+    """
+
+    findings: tuple[Finding, ...]
+    errors: Mapping[str, Error]
+    unit: Mapping[str, str]
+    noise_floor: Mapping[str, float | None]
+    moved: Mapping[str, Mapping[str, Mapping[str, float]]]
+    sealed: Sealed
+    undecided: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    exploratory: bool = False
+    seconds: float = 0.0
+
+    @property
+    def verdict(self) -> str:
+        """The weakest finding's verdict, or `nothing_missing`."""
+        if not self.findings:
+            return "nothing_missing"
+        return max((f.verdict for f in self.findings), key=VERDICTS.index)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of the published schema; what is not defined is None."""
+        errors = self.errors.items()
+        whole = {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "findings": [_finding(f) for f in self.findings],
+            "rmse_before": {name: e.before for name, e in errors},
+            "rmse_after": {name: e.after for name, e in errors},
+            "rmse_with_means_before": {name: e.with_means_before for name, e in errors},
+            "rmse_with_means_after": {name: e.with_means_after for name, e in errors},
+            "unit": dict(self.unit),
+            "noise_floor": dict(self.noise_floor),
+            "runs": {"discover": self.sealed.discover, "confirm": self.sealed.confirm},
+            "next_experiment": None,
+            "declared_parameters_moved": self.moved,
+            "exploratory": self.exploratory,
+            "seed": self.sealed.seed,
+            "seconds": self.seconds,
+            "seal": self.sealed.seal,
+            "data_hash": self.sealed.data_hash,
+            "undecided": dict(self.undecided),
+            "notes": self.notes,
+        }
+        plain = _plain(whole)
+        assert isinstance(plain, dict)  # noqa: S101 - narrows the type
+        return plain
+
+
+ORDER = [
+    "balance",
+    "also_in",
+    "family",
+    "verdict",
+    "alternatives",
+    "depends_on",
+    "confidence",
+    "parameters",
+    "rmse_before",
+    "rmse_after",
+    "runs_improved",
+    "runs_total",
+    "runs_affected",
+]
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    fields = asdict(finding)
+    return {name: fields[name] for name in ORDER}
+
+
+def _plain(value: Any) -> Any:
+    """Return plain JSON types; a number that is not finite becomes None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

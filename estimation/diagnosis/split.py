@@ -1,0 +1,123 @@
+"""Splitting runs once into those that discover and those that confirm.
+
+The confirm runs are chosen before anything is fitted, by a seed, stratified over the conditions:
+runs are sorted by what was held constant and every stratum of neighbours gives one run away.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.errors import EstimationError
+from estimation.recording import Recording
+
+SHARE = 3
+"""One run in this many confirms."""
+
+LEAST_TO_NAME = 5
+"""Fewer discovery runs name nothing: a signed-rank test over four runs cannot reach 5 %."""
+
+
+class SplitError(EstimationError):
+    """The runs do not make a campaign that can be split."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sealed:
+    """The split, written down before the first fit.
+
+    Attributes:
+        discover: Names of the runs that search and fit.
+        confirm: Names of the runs that are opened once, at the end.
+        seed: Seed of the choice.
+        data_hash: SHA-256 of every run's name and samples; the ledger's key.
+        seal: SHA-256 of the data's hash and both lists.
+    """
+
+    discover: tuple[str, ...]
+    confirm: tuple[str, ...]
+    seed: int
+    data_hash: str
+    seal: str
+
+    @property
+    def may_name(self) -> bool:
+        """Whether there are enough discovery runs to name an effect."""
+        return len(self.discover) >= LEAST_TO_NAME
+
+
+def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
+    """Choose the confirm runs, stratified over the conditions.
+
+    Args:
+        recordings: Runs that count as evidence, three at least.
+        seed: Seed of the choice inside each stratum.
+
+    Raises:
+        SplitError: Fewer than three runs, or runs of different rigs or instruments.
+    """
+    _check_one_rig(recordings)
+    if len(recordings) < SHARE:
+        raise SplitError(
+            f"{len(recordings)} runs are too few to diagnose.",
+            "Some runs must find an effect, and others, never touched, confirm it.",
+            f"Record {SHARE} runs at least; to name an effect, eight.",
+        )
+    ordered = sorted(recordings, key=_place)
+    random = np.random.default_rng(seed)
+    confirm = set()
+    for start in range(0, len(ordered) - SHARE + 1, SHARE):
+        confirm.add(ordered[start + int(random.integers(SHARE))].name)
+    names = [recording.name for recording in recordings]
+    data = data_hash(recordings)
+    kept = tuple(n for n in names if n not in confirm)
+    held = tuple(n for n in names if n in confirm)
+    return Sealed(kept, held, seed, data, _hash(data, *kept, "|", *held))
+
+
+def data_hash(recordings: Sequence[Recording]) -> str:
+    """Return SHA-256 over the runs' names and samples, in the order of their names."""
+    digest = hashlib.sha256()
+    for recording in sorted(recordings, key=lambda r: r.name):
+        digest.update(f"{recording.name}\0{len(recording)}\0".encode())
+        digest.update(recording.time_s.tobytes())
+        digest.update(recording.flags.tobytes())
+        for name in sorted(recording.columns):
+            digest.update(name.encode())
+            digest.update(recording.columns[name].tobytes())
+    return digest.hexdigest()
+
+
+def evidence(campaign: Campaign) -> list[Recording]:
+    """Read the runs that are not excluded into memory."""
+    return list(campaign.evidence)
+
+
+def _hash(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
+    """Return where a run sorts among the others: by its conditions, then by its name."""
+    keys: list[tuple[str, int, float, str]] = []
+    for name, value in sorted(recording.conditions.items()):
+        numeric = isinstance(value, int | float)
+        keys.append((name, int(not numeric), float(value) if numeric else 0.0, str(value)))
+    return (*keys, ("~name", 0, 0.0, recording.name))
+
+
+def _check_one_rig(recordings: Sequence[Recording]) -> None:
+    """Raise when the runs come from different rigs or instruments."""
+    for what, found in (
+        ("rigs", {r.rig for r in recordings}),
+        ("instruments", {f"{r.instrument.model} {r.instrument.serial}" for r in recordings}),
+    ):
+        if len(found) > 1:
+            raise SplitError(
+                f"The runs are of {len(found)} {what}: {', '.join(sorted(found))}.",
+                f"What differs between {what} would be taken for an effect; nothing is decided.",
+                "Diagnose each of them by itself.",
+            )

@@ -1,0 +1,28 @@
+"""Drag: a loss with the square of speed."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Parameter, Pointwise
+
+
+class Drag(Pointwise):
+    """Quadratic drag, of churned grease or air.
+
+    Equation: torque = c speed |speed|.
+
+    Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
+    """
+
+    id = "friction.drag"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s"}
+    amplitudes = (Parameter("drag", "target / speed / speed", "loss at one rad/s", lower=0.0),)
+    confused_with = ("friction.viscous", "sensor.delay")
+    told_apart_by = "a staircase of constant speeds up to the highest"
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return one value or array for each amplitude."""
+        return (inputs["speed"] * np.abs(inputs["speed"]),)

@@ -1,0 +1,30 @@
+"""Load-viscous friction: damping that grows with the load."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Parameter, Pointwise
+
+
+class LoadViscousFriction(Pointwise):
+    """Viscous friction of a film under pressure.
+
+    Equation: torque = c |load| speed.
+
+    Source: Bittencourt and Gunnarsson 2012 (load and speed together).
+    """
+
+    id = "friction.load_viscous"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "motor_load_n_m"}
+    amplitudes = (
+        Parameter("damping", "target / load / speed", "damping for one unit of load", lower=0.0),
+    )
+    confused_with = ("friction.load", "friction.viscous")
+    told_apart_by = "a staircase of speeds at two loads"
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return one value or array for each amplitude."""
+        return (np.abs(inputs["load"]) * inputs["speed"],)

@@ -1,0 +1,33 @@
+"""Current ripple: a torque constant that varies over the motor's turn."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Parameter, Pointwise
+
+
+class CurrentRipple(Pointwise):
+    """Ripple of the magnet's flux through the windings. The order need not be whole.
+
+    Equation: torque = current (a sin(order angle) + b cos(order angle)).
+
+    Source: Piccoli and Yim 2016 (mutual torque ripple).
+    """
+
+    id = "ripple.current"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"motor_angle": "motor_angle_rad", "current": "motor_current_a"}
+    amplitudes = (
+        Parameter("sine", "target / current", "amplitude of the sine"),
+        Parameter("cosine", "target / current", "amplitude of the cosine"),
+    )
+    shape = (Parameter("order", "1", "periods a turn", 0.5, 20.5, linear=True, points=401),)
+    confused_with = ("ripple.motor", "eccentric.load")
+    told_apart_by = "the same slow sweep at two currents"
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return sine and cosine."""
+        phase = shape[0] * inputs["motor_angle"]
+        return inputs["current"] * np.sin(phase), inputs["current"] * np.cos(phase)

@@ -1,0 +1,33 @@
+"""Motor ripple: torque that repeats with the motor's turn."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Parameter, Pointwise
+
+
+class MotorRipple(Pointwise):
+    """Cogging and commutation of the motor. The order need not be whole.
+
+    Equation: torque = a sin(order angle) + b cos(order angle).
+
+    Source: Piccoli and Yim 2016 (cogging maps of motors).
+    """
+
+    id = "ripple.motor"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"motor_angle": "motor_angle_rad"}
+    amplitudes = (
+        Parameter("sine", "target", "amplitude of the sine"),
+        Parameter("cosine", "target", "amplitude of the cosine"),
+    )
+    shape = (Parameter("order", "1", "periods a turn", 0.5, 20.5, linear=True, points=401),)
+    confused_with = ("ripple.output", "ripple.current", "sensor.encoder_inl")
+    told_apart_by = "a sweep at a slow constant speed, and a coast without current"
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return sine and cosine."""
+        phase = shape[0] * inputs["motor_angle"]
+        return np.sin(phase), np.cos(phase)

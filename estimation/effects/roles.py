@@ -1,0 +1,120 @@
+"""Which channel plays which role of an effect in which balance.
+
+The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder, also for
+the cable, since the jaw's coarse encoder makes a delay that is not there. A load is never the
+balance's own target: noise shared by both sides of a balance looks like an effect.
+"""
+
+from collections.abc import Mapping
+from itertools import product
+from typing import NamedTuple
+
+from estimation.derived import MOTOR_LOAD
+from estimation.effects.effect import Effect
+
+JOINTS = range(1, 8)
+"""Joints of the arm that may act on one another."""
+
+_MOTION = {
+    "speed": ("motor_velocity_rad_s",),
+    "acceleration": ("motor_acceleration_rad_s2",),
+    "position": ("spindle_angle_rad",),
+    "travel": ("spindle_angle_rad",),
+    "motor_angle": ("motor_angle_rad",),
+    "output_angle": ("spindle_angle_rad",),
+    "current": ("motor_current_a",),
+    "clock": ("time_s",),
+    "elapsed": ("time_s", "campaign_time_s"),
+    "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
+}
+
+CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "motor": _MOTION
+    | {
+        "travel": ("motor_angle_rad",),
+        "load": (MOTOR_LOAD,),
+        "reading": ("motor_current_a", MOTOR_LOAD),
+        "other_reading": ("jaw_angle_rad",),
+        "encoder": ("motor_angle_rad",),
+        "stop": ("spindle_angle_rad",),
+        "tilt": ("jaw_angle_rad",),
+    },
+    "gearbox": _MOTION
+    | {
+        "load": ("proximal_torque_n_m",),
+        "travel": ("proximal_torque_n_m",),
+        "reading": ("proximal_torque_n_m",),
+        "other_reading": ("motor_current_a", "distal_torque_n_m"),
+        "encoder": ("motor_angle_rad", "spindle_angle_rad"),
+    },
+    "cable": _MOTION
+    | {
+        "load": ("distal_torque_n_m",),
+        "reading": ("distal_torque_n_m",),
+        "other_reading": ("motor_current_a",),
+        "encoder": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
+        "tilt": ("jaw_angle_rad",),
+    },
+    "stretch": _MOTION
+    | {
+        "load": ("distal_torque_n_m",),
+        "travel": ("spindle_angle_rad",),
+        "reading": ("distal_torque_n_m", "spindle_angle_rad"),
+        "other_reading": ("proximal_torque_n_m", "motor_current_a"),
+        "encoder": ("spindle_angle_rad",),
+    },
+    "grasp": _MOTION
+    | {
+        "load": (MOTOR_LOAD,),
+        "reading": ("motor_current_a",),
+        "other_reading": ("spindle_angle_rad",),
+        "encoder": ("motor_angle_rad",),
+        "stop": ("spindle_angle_rad",),
+        "tilt": ("spindle_angle_rad",),
+    },
+}
+"""Balance to role to channels, each a way to play the role of its own."""
+
+
+class Entry(NamedTuple):
+    """One way an effect may enter a balance: its side, and the channel of each role."""
+
+    sign: int
+    channels: Mapping[str, str]
+
+
+def _of_joint(joint: int) -> Mapping[str, tuple[str, ...]]:
+    """Return the roles in the torque balance of one joint of an arm."""
+    own = f"joint_{joint}"
+    others = [f"joint_{other}" for other in JOINTS if other != joint]
+    return {
+        "speed": (f"{own}_velocity_rad_s",),
+        "acceleration": (f"{own}_acceleration_rad_s2",),
+        "position": (f"{own}_angle_rad",),
+        "travel": (f"{own}_angle_rad",),
+        "output_angle": (f"{own}_angle_rad",),
+        "encoder": (f"{own}_angle_rad",),
+        "stop": (f"{own}_angle_rad",),
+        "tilt": (f"{own}_angle_rad",),
+        "reading": (f"{own}_velocity_rad_s", f"{own}_acceleration_rad_s2"),
+        "other_reading": tuple(f"{other}_torque_n_m" for other in others),
+        "other_angle": tuple(f"{other}_angle_rad" for other in others),
+        "clock": ("time_s",),
+        "elapsed": ("time_s", "campaign_time_s"),
+    }
+
+
+def entries(effect: Effect, balance: str) -> list[Entry]:
+    """Return the ways an effect may enter a balance; none when it has no business there.
+
+    Args:
+        effect: An effect of the catalogue.
+        balance: Balance id, such as `motor` or `joint.3`.
+    """
+    kind, _, number = balance.partition(".")
+    if kind not in effect.balances:
+        return []
+    known = _of_joint(int(number)) if kind == "joint" else CHANNELS[kind]
+    ways = product(*(known[role] for role in effect.roles))
+    return [Entry(effect.balances[kind], dict(zip(effect.roles, way, strict=True))) for way in ways]

@@ -1,0 +1,85 @@
+"""`rig diagnose`: what does the declared model lack?"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import console, emit_json, plain
+
+
+def diagnose(
+    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name."),
+    ] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    json_: Annotated[
+        Path | None, typer.Option("--json", help="Where the diagnosis goes; - is stdout.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Folder for the page that a person reads.")
+    ] = None,
+    model_out: Annotated[
+        Path | None, typer.Option(help="Where the model with the named effects goes.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
+    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    ledger: Annotated[
+        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+    ] = None,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+    ] = None,
+) -> None:
+    """Find the effect that the declared model lacks, and prove it on runs that nobody touched."""
+    import json
+    from concurrent.futures import ProcessPoolExecutor
+    from contextlib import nullcontext
+
+    from estimation import model_file
+    from estimation.files import write_text_atomic
+    from rig.diagnosis.ledger import Ledger, default_ledger
+    from rig.diagnosis.run import declared_models, run_diagnosis
+    from rig.errors import UsageError
+    from rig.reports.diagnosis import page, sentences
+    from rig.reports.provenance import Provenance
+    from rig.reports.render import write_report
+
+    screen = console()
+    models = declared_models(model, balance)
+    if model_out is not None and len(models) > 1:
+        raise UsageError(
+            f"--model-out names one file, and there are {len(models)} balances.",
+            fix=f"Choose one with --balance: {', '.join(m.balance for m in models)}.",
+        )
+    if workers < 1:
+        raise UsageError(f"--workers is {workers}; it is 1 or more.")
+    with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as executor:
+        done = run_diagnosis(
+            path,
+            models,
+            Ledger(ledger or default_ledger()),
+            seed=seed,
+            format_name=format_,
+            executor=executor,
+            on_stage=lambda what: screen.print(f"{what} ..."),
+        )
+    for line in sentences(done.diagnosis):
+        screen.print(line, markup=False)
+    for note in done.diagnosis.notes:
+        screen.print(note, markup=False)
+    if model_out is not None:
+        (story,) = done.stories.values()
+        model_file.write(story.model, model_out)
+        screen.print(f"Model: {model_out}", markup=False)
+    if report is not None:
+        where = write_report(report / "diagnosis.html", page(done, Provenance.now(seed)))
+        screen.print(f"Report: {where}", markup=False)
+    if json_ == Path("-"):
+        emit_json(done.diagnosis.to_json())
+    elif json_ is not None:
+        text = json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False)
+        write_text_atomic(json_, text + "\n")
+        screen.print(f"Diagnosis: {json_}", markup=False)

@@ -1,0 +1,1 @@
+"""Diagnosing recordings: what `rig diagnose` reads, writes and remembers."""

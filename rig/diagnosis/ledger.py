@@ -1,0 +1,90 @@
+"""The ledger of looks: which runs a diagnosis has seen, so that a second look says so.
+
+A confirm run proves something once. A run that any earlier diagnosis held, to discover or to
+confirm, has been seen: a finding confirmed on it later is exploratory. Runs are known by the hash
+of their samples, so a copy or another folder does not make them new.
+"""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from estimation.diagnosis.split import Sealed, data_hash
+from estimation.files import write_text_atomic
+from estimation.recording import Recording
+from rig.errors import DataError
+
+
+class LedgerError(DataError):
+    """The ledger cannot be read or written."""
+
+
+def default_ledger() -> Path:
+    """Return the ledger's file: in `RIG_STATE_DIR`, else in the user's state folder."""
+    if own := os.environ.get("RIG_STATE_DIR"):
+        return Path(own) / "looks.jsonl"
+    state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(state) / "rig" / "looks.jsonl"
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The looks so far, one line of JSON each.
+
+    Attributes:
+        path: The file; made at the first look.
+    """
+
+    path: Path
+
+    def seen(self, recordings: Sequence[Recording], sealed: Sealed) -> tuple[str, ...]:
+        """Return the confirm runs that an earlier look held.
+
+        Raises:
+            LedgerError: The ledger cannot be read.
+        """
+        known = {run for look in self._looks() for run in look}
+        return tuple(
+            r.name for r in recordings if r.name in sealed.confirm and data_hash([r]) in known
+        )
+
+    def write(self, recordings: Sequence[Recording], sealed: Sealed) -> None:
+        """Write down a look before the confirm runs are opened.
+
+        Raises:
+            LedgerError: The ledger cannot be read or written.
+        """
+        look = {
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "data_hash": sealed.data_hash,
+            "seal": sealed.seal,
+            "seed": sealed.seed,
+            "discover": sealed.discover,
+            "confirm": sealed.confirm,
+            "runs": {r.name: data_hash([r]) for r in recordings},
+        }
+        try:
+            before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+            write_text_atomic(self.path, before + json.dumps(look) + "\n")
+        except OSError as error:
+            raise LedgerError(
+                f"The ledger of diagnoses {self.path} cannot be written.",
+                f"{error}. Without it a second look at the same runs would pass as a first.",
+                "Name another place with --ledger or RIG_STATE_DIR.",
+            ) from error
+
+    def _looks(self) -> list[list[str]]:
+        if not self.path.exists():
+            return []
+        try:
+            lines = self.path.read_text(encoding="utf-8").splitlines()
+            return [list(json.loads(line)["runs"].values()) for line in lines if line.strip()]
+        except (OSError, ValueError, KeyError, AttributeError) as error:
+            raise LedgerError(
+                f"The ledger of diagnoses {self.path} cannot be read.",
+                str(error),
+                "Move it away; every look it held will then count as a first one.",
+            ) from error

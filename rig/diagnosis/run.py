@@ -1,0 +1,110 @@
+"""A diagnosis from a path: read the runs, seal the split, search, confirm, remember the look."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from estimation import model_file
+from estimation.diagnosis.diagnose import Story, diagnose
+from estimation.diagnosis.result import Diagnosis
+from estimation.diagnosis.split import Sealed, evidence, split
+from estimation.model import Model
+from estimation.recording import Recording
+from rig.diagnosis.ledger import Ledger
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
+
+Stage = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis with what a report needs.
+
+    Attributes:
+        diagnosis: The answer.
+        stories: Balance to the story behind it.
+        recordings: The runs.
+        sealed: The split.
+        seen: Confirm runs that an earlier look held.
+    """
+
+    diagnosis: Diagnosis
+    stories: dict[str, Story]
+    recordings: tuple[Recording, ...]
+    sealed: Sealed
+    seen: tuple[str, ...]
+
+
+def declared_models(path: Path | None, balance: str | None) -> list[Model]:
+    """Return the declared models to diagnose.
+
+    Args:
+        path: A model file or the name of a shipped one; every shipped model that is named after its
+            balance when None.
+        balance: Only this balance.
+
+    Raises:
+        UsageError: No model of that balance.
+        ModelFileError: The file cannot be read.
+    """
+    if path is not None:
+        models = [model_file.read(path)]
+    else:
+        read = [model_file.read(place) for place in model_file.shipped().values()]
+        models = [model for model in read if model.name == model.balance]
+    chosen = [model for model in models if balance in (None, model.balance)]
+    if not chosen:
+        known = ", ".join(dict.fromkeys(model.balance for model in models))
+        raise UsageError(
+            f"There is no declared model of the balance {balance!r}.",
+            f"Declared: {known}.",
+            "Name a model file with --model.",
+        )
+    return chosen
+
+
+def run_diagnosis(
+    path: Path,
+    models: list[Model],
+    ledger: Ledger,
+    *,
+    seed: int = 0,
+    format_name: str | None = None,
+    executor: Executor | None = None,
+    on_stage: Stage = lambda _: None,
+) -> Diagnosed:
+    """Diagnose declared models on the recordings of a path.
+
+    Args:
+        path: File, folder or archive of recordings.
+        models: Declared models, one a balance.
+        ledger: Remembers the look.
+        seed: Seed of the split and of everything random.
+        format_name: Importer to use; guessed when None.
+        executor: Runs work in parallel.
+        on_stage: Told what begins.
+
+    Raises:
+        UsageError: The path does not exist.
+        DataError: It cannot be read.
+        EstimationError: Nothing can be decided; says why.
+    """
+    on_stage("reading the recordings")
+    recordings = evidence(open_campaign(path, format_name))
+    sealed = split(recordings, seed)
+    seen = ledger.seen(recordings, sealed)
+    diagnosis, stories = diagnose(
+        recordings,
+        models,
+        sealed,
+        executor=executor,
+        on_stage=on_stage,
+        on_open=lambda: ledger.write(recordings, sealed),
+    )
+    notes = diagnosis.notes
+    if seen:
+        notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
+    diagnosis = replace(diagnosis, exploratory=bool(seen), notes=notes)
+    return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)

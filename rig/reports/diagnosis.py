@@ -1,0 +1,207 @@
+"""A diagnosis on one page: the sentence, the plots, the numbers, and what it cannot tell."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from markupsafe import Markup
+
+from estimation.channels import unit_of
+from estimation.diagnosis.design import Run
+from estimation.diagnosis.diagnose import Story
+from estimation.diagnosis.frozen import Frozen
+from estimation.diagnosis.maps import CHANNELS
+from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.recording import FloatArray
+from rig.diagnosis.run import Diagnosed
+from rig.reports import figures
+from rig.reports.provenance import Provenance
+from rig.reports.render import render
+from rig.reports.table import TextTable
+
+NO_NEXT = (
+    "None is proposed: choosing the experiment that tells rivals apart needs a simulation of the"
+    " declared model with each rival in it, which this version does not do."
+)
+CONFIDENCE = (
+    "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
+    " gain is real and general; it has not been calibrated on known cases."
+)
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what may be said, one sentence a finding."""
+    if not diagnosis.findings:
+        runs = len(diagnosis.sealed.confirm)
+        lines = [
+            f"Nothing is missing above the floor in {', '.join(diagnosis.errors)}: no effect or map"
+            f" passes every gate and holds on the {runs} confirm runs."
+        ]
+    else:
+        lines = [_sentence(f, diagnosis.unit[f.balance]) for f in diagnosis.findings]
+    return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
+
+
+def _sentence(finding: Finding, unit: str) -> str:
+    scale, shown = _display(unit)
+    fall = (
+        f"error on {finding.runs_total} runs not touched falls from"
+        f" {scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {shown}"
+        f" ({finding.runs_improved} of {finding.runs_total} runs better)"
+    )
+    also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
+
+
+def _claim(finding: Finding) -> str:
+    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    sure = "" if finding.confidence is None else f" (confidence {finding.confidence:.0%})"
+    if finding.verdict == "identified":
+        return f"{finding.family} is missing{sure}"
+    if finding.verdict == "one_of":
+        others = ", ".join(finding.alternatives) or "another effect"
+        return f"{finding.family} is missing{sure}, or {others}: these runs do not tell"
+    if finding.verdict == "depends_on":
+        return f"an effect of unknown form is missing; it depends on {words}"
+    return "something is missing, and these runs do not tell what"
+
+
+def page(done: Diagnosed, provenance: Provenance) -> str:
+    """Return the page of HTML."""
+    diagnosis = done.diagnosis
+    sealed = done.sealed
+    story = (
+        f"{len(sealed.discover)} runs discovered, {len(sealed.confirm)} confirmed"
+        f" ({', '.join(sealed.confirm)}); chosen by seed {sealed.seed} before any fit, seal"
+        f" {sealed.seal[:12]}, data {sealed.data_hash[:12]}. It took {diagnosis.seconds:.0f} s."
+    )
+    drawn: list[tuple[str, Markup]] = []
+    for finding in diagnosis.findings:
+        drawn += _over_variable(done.stories[finding.balance], finding)
+    for name in done.stories:
+        drawn.append(_by_run(diagnosis, name))
+    return render(
+        "diagnosis.html",
+        {
+            "title": f"Diagnosis: {diagnosis.verdict.replace('_', ' ')}",
+            "sentences": sentences(diagnosis),
+            "story": story,
+            "figures": drawn,
+            "tables": tables(done),
+            "limits": [*diagnosis.notes, CONFIDENCE],
+            "next_experiment": NO_NEXT,
+            "provenance": provenance,
+        },
+    )
+
+
+def tables(done: Diagnosed) -> list[TextTable]:
+    """Return the tables of the page."""
+    shown = [_errors(done.diagnosis)]
+    if any(f.parameters for f in done.diagnosis.findings):
+        shown.append(_parameters(done.diagnosis.findings))
+    for name, story in done.stories.items():
+        shown += [_tried(name, story), _moved(done.diagnosis, name)]
+    return shown
+
+
+def _display(unit: str) -> tuple[float, str]:
+    return (1e3, "mN m") if unit == "N m" else (1.0, unit)
+
+
+def _errors(diagnosis: Diagnosis) -> TextTable:
+    rows = []
+    for name, error in diagnosis.errors.items():
+        scale, unit = _display(diagnosis.unit[name])
+        low, high = error.ratio_ci95
+        values = (error.before, error.after, error.with_means_before, error.with_means_after)
+        rows.append([name, *(f"{scale * v:.3g}" for v in values), f"{low:.2f} to {high:.2f}", unit])
+    columns = ["balance", "before", "after", "with means, before", "after", "after/before", "unit"]
+    return TextTable(
+        "Error on the confirm runs",
+        columns,
+        rows,
+        "Root mean square over the samples in motion; each run's mean removed, then with the means"
+        " left in."
+        " Ratio: 95 % interval of a bootstrap over runs.",
+    )
+
+
+def _parameters(findings: Sequence[Finding]) -> TextTable:
+    rows = []
+    for finding in findings:
+        for name, known in finding.parameters.items():
+            interval = "" if known.ci95 is None else f"{known.ci95[0]:.3g} to {known.ci95[1]:.3g}"
+            cells = [f"{known.value:.4g}", interval, known.unit]
+            rows.append([f"{finding.balance}, {finding.family}, {name}", *cells])
+    columns = ["parameter", "value", "95 %", "unit"]
+    return TextTable("Parameters of what was found", columns, rows, "Bootstrap over runs.")
+
+
+def _tried(name: str, story: Story) -> TextTable:
+    rows = []
+    for k, step in enumerate(story.discovery.steps, start=1):
+        twin = "" if step.p_twin is None else f"{step.p_twin:.3f}"
+        cells = [f"{100 * step.gain:.1f} %", f"{step.p:.3f}", twin, f"{step.agree:.3f}"]
+        rows.append([f"step {k}: {step.family}", *cells])
+    for trial in story.discovery.ranking[1:6]:
+        cells = [f"{100 * trial.gain:.1f} %", f"{trial.p:.3f}", "", f"{trial.agree:.3f}"]
+        rows.append([f"at first also: {trial.family}", *cells])
+    left = story.discovery.left_map
+    if left is not None:
+        cells = [f"{100 * left.gain:.1f} %", f"{left.p:.3f}", "", f"{left.agree:.3f}"]
+        rows.append([f"map of {' and '.join(left.variables)}", *cells])
+    return TextTable(
+        f"What was tried: {name}",
+        ["effect", "gain, runs left out", "p, surrogates", "p, twins", "p, runs"],
+        rows,
+        f"{len(story.families)} families at {story.candidates} grid points, then maps of one and"
+        " two variables. Gain: share of the squared error left at that step.",
+    )
+
+
+def _moved(diagnosis: Diagnosis, name: str) -> TextTable:
+    rows = [
+        [key, f"{value['before']:.4g}", f"{value['after']:.4g}"]
+        for key, value in diagnosis.moved[name].items()
+    ]
+    return TextTable(f"Declared parameters: {name}", ["parameter", "before", "after"], rows)
+
+
+def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
+    """Draw the residual of the confirm runs over the finding's own variable."""
+    variable = next((v for v in finding.depends_on if v in CHANNELS), None)
+    if variable is None:
+        return []
+    channel = CHANNELS[variable]
+    if any(channel not in run.channels for run in story.confirm):
+        return []
+    x = np.concatenate([run.channels[channel][run.used] for run in story.confirm])
+    if channel == "motor_angle_rad":
+        x = np.mod(x, 2 * np.pi)
+    scale, unit = _display(story.balance.model.unit)
+    label = f"{variable.replace('_', ' ')}, {unit_of(channel)}"
+    panels = [
+        figures.Panel(f"{label}: {when}", x, scale * _left(model, story.confirm))
+        for when, model in (("before", story.before), ("after", story.after))
+    ]
+    caption = (
+        f"{finding.balance}: the residual of the confirm runs before and after, mean and the middle"
+        " 90 % of the samples."
+    )
+    return [(caption, figures.against(panels, f"residual, {unit}", caption, bins=48))]
+
+
+def _left(model: Frozen, runs: Sequence[Run]) -> FloatArray:
+    errors = [model.error(run) for run in runs]
+    return np.concatenate([e - e.mean() for e in errors])
+
+
+def _by_run(diagnosis: Diagnosis, name: str) -> tuple[str, Markup]:
+    error = diagnosis.errors[name]
+    scale, unit = _display(diagnosis.unit[name])
+    bars = {}
+    for run, before in error.by_run_before.items():
+        bars[f"{run} before"] = scale * before
+        bars[f"{run} after"] = scale * error.by_run_after[run]
+    caption = f"{name}: error of each confirm run before and after."
+    return caption, figures.bars(bars, f"rmse, {unit}", caption)

@@ -1,0 +1,148 @@
+"""Torque sensors: the shunt against the certificate, weights on an arm, bad data refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.quality import BadDataError
+from calibration.record import CalibrationRecord, Validity
+from calibration.torque import Step, check_shunt, fit_torque, shunt_ratio, weight_torque_n_m
+
+MASSES_KG = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0])
+SLOPE, ZERO = 4e-5, 37.0
+
+
+def series(seed=0, *, noise=2.0, bend=0.0, hysteresis_n_m=0.0, drift_counts=0.0):
+    rng = np.random.default_rng(seed)
+    torques = weight_torque_n_m(MASSES_KG, 0.05)
+    felt = torques + bend * torques * (torques.max() - torques)
+    felt = felt + hysteresis_n_m * np.where(np.diff(torques, prepend=0) < 0, 0.5, -0.5) * (
+        torques > 0
+    )
+    counts = felt / SLOPE + ZERO + np.linspace(0, drift_counts, len(torques))
+    return [
+        Step(float(t), np.round(c + rng.normal(0, noise, 400)))
+        for t, c in zip(torques, counts, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kohm", "mv_v"),
+    [(30, 2.900), (43.5, 2.003), (60.4, 1.445), (87.5, 0.998), (100, 0.873), (150, 0.583),
+     (300, 0.292), (432, 0.2025)],
+)  # fmt: skip
+def test_shunts_of_a_350_ohm_bridge(kohm, mv_v):
+    assert shunt_ratio(kohm * 1e3) * 1e3 == pytest.approx(mv_v, abs=5.1e-4)
+
+
+def test_a_shunt_is_a_bridge_with_one_arm_in_parallel():
+    bridge, shunt = 350.0, 60_400.0
+    arm = bridge * shunt / (bridge + shunt)
+    assert shunt_ratio(shunt) == pytest.approx(bridge / (bridge + arm) - 0.5)
+
+
+def shunted(seed=0, gain=1.0):
+    rng = np.random.default_rng(seed)
+    change = gain * shunt_ratio(60_400.0) * 2e6
+    rest = rng.normal(10, 2, 500)
+    return rest, rest[::-1] + change
+
+
+def test_a_healthy_sensor_passes_its_shunt_check():
+    check = check_shunt(*shunted(), shunt_ratio(60_400.0), 2e6)
+    assert check.passes
+    assert check.deviation == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_wrong_gain_does_not_pass():
+    check = check_shunt(*shunted(gain=0.97), shunt_ratio(60_400.0), 2e6)
+    assert not check.passes
+    assert check.deviation == pytest.approx(-0.03, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("unloaded", "loaded", "rule"),
+    [
+        (shunted()[0], shunted()[0], "no_change"),
+        (shunted()[0], np.full(500, 32767.0), "saturated"),
+        (shunted()[0] + np.linspace(0, 50, 500), shunted()[1], "not_steady"),
+        (shunted()[0][:50], shunted()[1], "points"),
+        (shunted()[0], np.full(500, np.nan), "points"),
+    ],
+)
+def test_a_bad_shunt_check_is_refused(unloaded, loaded, rule):
+    with pytest.raises(BadDataError) as refusal:
+        check_shunt(unloaded, loaded, 1.4e-3, 2e6, rails_counts=(-32768, 32767))
+    assert refusal.value.rule == rule
+
+
+def test_weights_on_an_arm():
+    torques = weight_torque_n_m([0.0, 1.0], 0.1)
+    assert torques == pytest.approx([0.0, 0.980665])
+    assert weight_torque_n_m(1.0, 0.1, np.pi / 3) == pytest.approx(0.980665 / 2)
+
+
+def test_the_line_is_recovered_and_its_covariance_is_right():
+    estimates = []
+    for seed in range(200):
+        result = fit_torque(series(seed))
+        estimates.append((result.slope_n_m, result.zero_counts))
+    estimates = np.array(estimates)
+    assert estimates.mean(axis=0) == pytest.approx([SLOPE, ZERO], rel=1e-3)
+    stated = np.mean([np.array(fit_torque(series(s)).covariance) for s in range(40)], axis=0)
+    measured = np.cov(estimates.T)
+    np.testing.assert_allclose(np.diag(stated), np.diag(measured), rtol=0.35)
+    assert np.sign(stated[0, 1]) == np.sign(measured[0, 1])
+
+
+def test_a_sensor_that_falls_on_closing_has_a_negative_slope():
+    falling = [replace(step, counts=-step.counts) for step in series()]
+    result = fit_torque(falling)
+    assert result.slope_n_m == pytest.approx(-SLOPE, rel=1e-3)
+    assert result.zero_counts == pytest.approx(-ZERO, abs=1.0)
+
+
+def test_hysteresis_and_drift_are_measured():
+    span = series()[5].torque_n_m
+    loose = {"hysteresis_limit": 1.0, "drift_limit": 1.0, "linearity_limit": 1.0}
+    result = fit_torque(series(hysteresis_n_m=0.05 * span), **loose)
+    assert result.hysteresis == pytest.approx(0.05, abs=0.002)
+    result = fit_torque(series(drift_counts=100.0), **loose)
+    assert result.drift == pytest.approx(100 * SLOPE / span, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("steps", "rule"),
+    [
+        (series()[:4], "points"),
+        ([replace(s, torque_n_m=float(k % 2)) for k, s in enumerate(series())], "levels"),
+        ([replace(s, counts=series()[0].counts) for s in series()], "no_change"),
+        ([replace(s, counts=np.minimum(8 * s.counts, 32767)) for s in series()], "saturated"),
+        ([replace(s, counts=s.counts + np.linspace(0, 30, 400)) for s in series()], "not_steady"),
+        (series(bend=0.8), "not_linear"),
+        (series(hysteresis_n_m=0.01), "hysteresis"),
+        (series(drift_counts=100.0), "drift"),
+    ],
+)
+def test_bad_data_is_refused_with_the_reason(steps, rule):
+    with pytest.raises(BadDataError) as refusal:
+        fit_torque(steps, rails_counts=(-32768, 32767))
+    assert refusal.value.rule == rule
+
+
+def test_the_result_becomes_a_line_a_session_can_take():
+    result = fit_torque(series())
+    record = CalibrationRecord(
+        kind="torque",
+        channel="proximal_torque_n_m",
+        input="proximal",
+        made_at="2026-03-01T12:00:00+00:00",
+        operator="Ada",
+        fit=result.as_fit(),
+        validity=Validity(result.low_counts, result.high_counts, 365.0),
+        tared=True,
+    )
+    line = CalibrationRecord.from_json(record.to_json()).line()
+    assert (line.slope, line.zero_counts) == (result.slope_n_m, result.zero_counts)
+    assert line.tared

@@ -1,0 +1,238 @@
+"""Diagnosis on an analytic rig whose missing effect is known."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.diagnosis.diagnose import diagnose
+from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.diagnosis.search import Gates
+from estimation.diagnosis.split import SplitError, data_hash, split
+from estimation.errors import EstimationError
+from estimation.recording import Flag, Instrument, Stretch
+from tests.estimation import synthetic
+
+MOTOR = model_file.read(Path("motor"))
+QUICK = Gates(surrogates=99)
+
+
+def runs(extra=None, count=12, seconds=6.0, first_seed=0):
+    random = np.random.default_rng(first_seed)
+    return [
+        synthetic.run(
+            f"run{k:02d}",
+            0.2 + 0.15 * (k % 3),
+            0.05 * (1 + k // 3),
+            seed=first_seed + k,
+            seconds=seconds,
+            offset_n_m=0.02 + 0.005 * random.normal(),
+            extra=extra,
+        )
+        for k in range(count)
+    ]
+
+
+def spring(motor_rad, speed_rad_s, load_n_m):
+    return 0.02 * motor_rad / 35
+
+
+def tight_spot(motor_rad, speed_rad_s, load_n_m):
+    return 0.01 * np.exp(-(((motor_rad / 35 - 0.2) / 0.1) ** 2)) * np.tanh(speed_rad_s / 3)
+
+
+def diagnosed(recordings, **options):
+    sealed = split(recordings, 1)
+    return diagnose(recordings, [MOTOR], sealed, gates=QUICK, **options)
+
+
+def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
+    diagnosis, stories = diagnosed(runs(spring))
+    (finding,) = diagnosis.findings
+    assert (finding.family, finding.verdict) == ("spring.position", "identified")
+    assert finding.rmse_after < 0.2 * finding.rmse_before
+    assert finding.runs_improved == finding.runs_total == 4
+    stiffness = finding.parameters["stiffness"]
+    low, high = stiffness.ci95
+    # a spring takes from the target of this balance, so its stiffness is positive on that side
+    assert stiffness.value == pytest.approx(0.02, rel=0.05)
+    assert low <= stiffness.value <= high
+    assert stiffness.unit == "N m/rad"
+    fitted = stories["motor"].model
+    assert fitted.is_fitted
+    assert "spring.position" in {term.effect.id for term in fitted.terms}
+    assert model_file.parse(model_file.to_toml(fitted)) == fitted
+
+
+def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
+    diagnosis, _ = diagnosed(runs(tight_spot))
+    assert diagnosis.verdict == "depends_on"
+    (finding,) = diagnosis.findings
+    assert finding.family == "unknown"
+    assert set(finding.depends_on) <= {"velocity_sign", "velocity", "spindle_angle"}
+    assert "spindle_angle" in finding.depends_on
+    assert finding.confidence is None
+    assert finding.rmse_after < 0.5 * finding.rmse_before
+
+
+@pytest.mark.parametrize("seed", [100, 200, 300, 400])
+def test_nothing_is_found_where_nothing_is_missing(seed):
+    diagnosis, _ = diagnosed(runs(first_seed=seed))
+    assert diagnosis.verdict == "nothing_missing"
+    assert diagnosis.findings == ()
+    assert diagnosis.errors["motor"].after == diagnosis.errors["motor"].before
+
+
+def test_with_too_few_runs_something_is_missing_but_nothing_is_named():
+    diagnosis, _ = diagnosed(runs(spring, count=5))
+    assert diagnosis.verdict in ("something_missing", "nothing_missing")
+    assert all(f.family == "unknown" and not f.alternatives for f in diagnosis.findings)
+    assert any("no effect is named" in note for note in diagnosis.notes)
+
+
+def test_an_executor_gives_the_same_answer():
+    recordings = runs(spring, count=9, seconds=4.0)
+    alone, _ = diagnosed(recordings)
+    with ThreadPoolExecutor(2) as executor:
+        together, _ = diagnosed(recordings, executor=executor)
+    assert replace(alone, seconds=0.0) == replace(together, seconds=0.0)
+
+
+def test_twins_with_the_same_artefact_take_the_name_away():
+    recordings = runs(spring, count=9, seconds=4.0)
+
+    def maker(model, discover):
+        return lambda seed: [
+            synthetic.run(
+                f"t{k}", 0.2 + 0.1 * k, 0.1, seed=seed * 10 + k, seconds=4.0, extra=spring
+            )
+            for k in range(6)
+        ]
+
+    diagnosis, stories = diagnosed(recordings, twins={"motor": maker})
+    assert stories["motor"].discovery.steps[0].p_twin > QUICK.chance
+    assert all(f.family == "unknown" for f in diagnosis.findings)
+
+
+def test_twins_without_it_leave_the_name():
+    recordings = runs(spring, count=9, seconds=4.0)
+
+    def maker(model, discover):
+        return lambda seed: [
+            synthetic.run(f"t{k}", 0.2 + 0.1 * k, 0.1, seed=seed * 10 + k, seconds=4.0)
+            for k in range(6)
+        ]
+
+    diagnosis, stories = diagnosed(recordings, twins={"motor": maker})
+    assert stories["motor"].discovery.steps[0].p_twin < QUICK.chance
+    assert diagnosis.findings[0].family == "spring.position"
+
+
+def test_the_split_is_stratified_repeatable_and_sealed():
+    recordings = runs(count=12, seconds=1.0)
+    first, again, other = (split(recordings, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert first.seal != other.seal
+    assert set(first.discover) | set(first.confirm) == {r.name for r in recordings}
+    assert len(first.confirm) == 4
+    # every frequency confirms, since the strata are cut along the conditions
+    assert {r.conditions["frequency_hz"] for r in recordings if r.name in first.confirm} == {
+        r.conditions["frequency_hz"] for r in recordings
+    }
+
+
+def test_the_data_hash_follows_the_samples():
+    one = runs(count=3, seconds=1.0)
+    changed = [one[0].with_columns(motor_current_a=one[0]["motor_current_a"] + 1e-12), *one[1:]]
+    assert data_hash(one) == data_hash(list(reversed(one)))
+    assert data_hash(one) != data_hash(changed)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda r: r[:2], "too few to diagnose"),
+        (lambda r: [replace(r[0], rig="another"), *r[1:]], "2 rigs"),
+        (lambda r: [replace(r[0], instrument=Instrument(serial="x")), *r[1:]], "2 instruments"),
+        (
+            lambda r: [
+                replace(x, columns={k: v for k, v in x.columns.items() if k != "motor_current_a"})
+                for x in r
+            ],
+            "motor_current_a",
+        ),
+        (
+            lambda r: [
+                x.with_columns(
+                    motor_current_a=np.where(np.arange(len(x)) == 700, np.nan, x["motor_current_a"])
+                )
+                for x in r
+            ],
+            "not finite",
+        ),
+        (
+            lambda r: [
+                x.with_columns(motor_angle_rad=np.zeros(len(x)), motor_current_a=np.ones(len(x)))
+                for x in r
+            ],
+            "do not tell",
+        ),
+    ],
+    ids=["too few", "two rigs", "two instruments", "no current", "nan", "no excitation"],
+)
+def test_bad_input_is_told_and_never_named(spoil, message):
+    recordings = spoil(runs(spring, count=6, seconds=2.0))
+    with pytest.raises((EstimationError, SplitError), match=message):
+        diagnosed(recordings)
+
+
+def test_flagged_stretches_are_left_out():
+    def broken(recording):
+        wild = recording["proximal_torque_n_m"].copy()
+        wild[1500:1700] = 5.0
+        stretch = Stretch(1.5, 1.7, Flag.SATURATED, "sensor at its limit")
+        return recording.with_columns(proximal_torque_n_m=wild).with_stretch(stretch)
+
+    diagnosis, _ = diagnosed([broken(r) for r in runs(spring)])
+    assert diagnosis.findings[0].family == "spring.position"
+
+
+def test_the_gain_on_runs_left_out_is_that_of_plain_least_squares():
+    random = np.random.default_rng(0)
+    base = [random.normal(size=(50, 2)) for _ in range(4)]
+    block = [random.normal(size=(50, 3)) for _ in range(4)]
+    target = [b @ [1.0, 2.0] + c @ [0.5, 0, 0] for b, c in zip(base, block, strict=True)]
+    target = [y + 0.3 * random.normal(size=50) for y in target]
+    losses = leave_one_run_out(base, block, [1, 2], [y[:, None] for y in target])
+    for k, columns in enumerate([[0], [1, 2]]):
+        for r in range(4):
+            wide = [np.hstack([b, c[:, columns]]) for b, c in zip(base, block, strict=True)]
+            others = [j for j in range(4) if j != r]
+            weights = np.linalg.lstsq(
+                np.vstack([wide[j] for j in others]),
+                np.concatenate([target[j] for j in others]),
+                rcond=None,
+            )[0]
+            left = target[r] - wide[r] @ weights
+            assert losses.joint[r, k, 0] == pytest.approx(left @ left, rel=1e-6)
+    assert losses.gain[0, 0] > 0.5 > losses.gain[1, 0]
+
+
+def test_surrogates_keep_the_power_and_lose_the_place():
+    left = [np.sin(np.arange(400) / (10 + k)) for k in range(5)]
+    drawn = surrogates(left, 50, seed=3)
+    for one, made in zip(left, drawn, strict=True):
+        assert made.shape == (400, 50)
+        assert np.abs(made.mean(axis=0)).max() < 1e-12
+        assert abs(np.mean(made.T @ one) / (one @ one)) < 0.3
+
+
+def test_chance_is_never_zero_and_agreement_needs_five_runs():
+    assert chance(1.0, np.zeros(99)) == 0.01
+    assert chance(0.0, np.zeros(99)) == 1.0
+    assert runs_agree(np.ones(5), np.full(5, 0.5) + 0.01 * np.arange(5)) <= 0.05
+    assert runs_agree(np.ones(4), np.full(4, 0.5) + 0.01 * np.arange(4)) > 0.05
+    assert runs_agree(np.ones(5), np.ones(5)) == 1.0

@@ -1,0 +1,131 @@
+"""`rig diagnose` from a path to JSON, report, model file and ledger."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.diagnosis.result import VERDICTS, Diagnosis, Finding
+from estimation.diagnosis.split import Sealed, split
+from rig.cli.main import main
+from rig.diagnosis import run as diagnosis_run
+from rig.diagnosis.ledger import Ledger, LedgerError
+from rig.diagnosis.schema import FILE, DiagnosisSchema, json_schema
+from tests.estimation.test_diagnosis import runs, spring
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def campaign(monkeypatch):
+    recordings = runs(spring, count=9, seconds=5.0)
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(recordings))
+    return recordings
+
+
+def run(folder: Path, *words: str) -> dict:
+    out = folder / "diagnosis.json"
+    ledger = str(folder / "looks.jsonl")
+    whole = ["diagnose", str(folder), "--json", str(out), "--ledger", ledger, *words]
+    assert main(whole) == 0
+    return json.loads(out.read_text())
+
+
+def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
+    model, report = tmp_path / "model.toml", tmp_path / "report"
+    found = run(tmp_path, "--model-out", str(model), "--report", str(report), "--balance", "motor")
+    DiagnosisSchema.model_validate(found)
+    assert found["verdict"] == "identified"
+    (finding,) = found["findings"]
+    assert finding["family"] == "spring.position"
+    assert finding["alternatives"] == []
+    assert found["next_experiment"] is None
+    assert found["exploratory"] is False
+    assert found["rmse_after"]["motor"] < found["rmse_before"]["motor"]
+    assert "spring.position" in {t.effect.id for t in model_file.read(model).terms}
+    page = (report / "diagnosis.html").read_text()
+    assert "spring.position is missing" in page
+    assert page.count("<svg") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "spring.position is missing" in captured.err
+
+
+def test_a_second_look_at_the_same_runs_is_exploratory(campaign, tmp_path):
+    assert run(tmp_path, "--balance", "motor")["exploratory"] is False
+    again = run(tmp_path, "--balance", "motor")
+    assert again["exploratory"] is True
+    # another seed confirms on runs that were seen all the same
+    assert run(tmp_path, "--balance", "motor", "--seed", "5")["exploratory"] is True
+    assert len((tmp_path / "looks.jsonl").read_text().splitlines()) == 3
+
+
+def test_new_runs_are_a_first_look(tmp_path):
+    ledger = Ledger(tmp_path / "looks.jsonl")
+    first, second = runs(count=6, seconds=1.0), runs(count=6, seconds=1.0, first_seed=50)
+    ledger.write(first, split(first))
+    assert set(ledger.seen(first, split(first))) == set(split(first).confirm)
+    assert ledger.seen(second, split(second)) == ()
+
+
+def test_a_damaged_ledger_is_told(tmp_path):
+    (tmp_path / "looks.jsonl").write_text("nonsense\n")
+    first = runs(count=3, seconds=1.0)
+    with pytest.raises(LedgerError, match="cannot be read"):
+        Ledger(tmp_path / "looks.jsonl").seen(first, split(first))
+
+
+def test_a_missing_channel_exits_5_and_names_nothing(monkeypatch, tmp_path, capsys):
+    recordings = runs(spring, count=6, seconds=2.0)
+    spoilt = [r.with_columns(motor_current_a=np.full(len(r), np.nan)) for r in recordings]
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(spoilt))
+    ledger = tmp_path / "looks.jsonl"
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--ledger", str(ledger)]
+    assert main(words) == 5
+    assert "not finite" in capsys.readouterr().err
+    assert not ledger.exists()  # the confirm runs were not opened
+
+
+def test_an_unknown_balance_is_a_usage_error(tmp_path, capsys):
+    assert main(["diagnose", str(tmp_path), "--balance", "elbow"]) == 2
+    assert "elbow" in capsys.readouterr().err
+
+
+def test_the_published_schema_is_the_one_that_checks():
+    assert (ROOT / FILE).read_text() == json_schema()
+
+
+def finding(verdict: str) -> Finding:
+    return Finding("motor", "unknown", verdict, 1.0, 0.5, 3, 4)
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "whole"),
+    [
+        ([], "nothing_missing"),
+        (["identified"], "identified"),
+        (["identified", "one_of"], "one_of"),
+        (["depends_on", "identified"], "depends_on"),
+        (["something_missing", "one_of"], "something_missing"),
+    ],
+)
+def test_the_verdict_is_the_weakest_findings(verdicts, whole):
+    diagnosis = Diagnosis(
+        tuple(finding(v) for v in verdicts), {}, {}, {}, {}, Sealed((), (), 0, "", "")
+    )
+    assert diagnosis.verdict == whole
+    assert whole in VERDICTS
+    found = diagnosis.to_json()
+    DiagnosisSchema.model_validate(found)
+    assert (found["findings"] == []) == (whole == "nothing_missing")
+
+
+def test_what_is_not_defined_is_null():
+    bad = Finding("motor", "unknown", "something_missing", float("nan"), float("inf"), 0, 0)
+    found = Diagnosis((bad,), {}, {}, {}, {}, Sealed((), (), 0, "", "")).to_json()
+    assert found["findings"][0]["rmse_before"] is None
+    assert found["findings"][0]["rmse_after"] is None
+    json.dumps(found, allow_nan=False)
