@@ -8,6 +8,11 @@ from drivers.transport.can_bus import CanBus, CanCounters, CanFrame
 from drivers.transport.faulty import Faults
 
 
+def _at_least_an_instant(wait_s: float) -> float:
+    """Return a time to wait, 0 where it is but the rounding of a sum."""
+    return wait_s if wait_s > 1e-9 else 0.0
+
+
 class FaultyCanBus:
     """Any bus behind a bad cable.
 
@@ -49,9 +54,10 @@ class FaultyCanBus:
             due = self._due()
             if due is not None:
                 return due
-            remaining_s = max(0.0, give_up_s - self.now_s)
+            remaining_s = _at_least_an_instant(give_up_s - self.now_s)
             next_due_s = min((due_s for due_s, _ in self._held), default=float("inf"))
-            frame = self._inner.read(max(0.0, min(remaining_s, next_due_s - self.now_s)))
+            wait_s = min(remaining_s, _at_least_an_instant(next_due_s - self.now_s))
+            frame = self._inner.read(wait_s)
             if frame is not None:
                 self._held += self.faults.pass_on(frame.to_bytes(), self.now_s, whole=True)
             elif remaining_s <= 0.0:

@@ -1,0 +1,103 @@
+"""An EPOS4's error codes in plain words: what happened, why, what to do.
+
+Source: the error list of maxon's EPOS4 firmware, as found in two public drivers that agree.
+"""
+
+from drivers.errors import DriverError
+
+_MAKER = "Switch the drive off and on; if it comes again, ask the maker."
+_LOAD = "Take the load off, let it cool, then command less torque or for a shorter time."
+_WIRING = "Check the motor's wiring and that the motor data fit the motor."
+_SUPPLY = "Check the power supply's voltage and current, and its wiring."
+_SENSOR = "Check the encoder's cable and supply, and the sensor's configuration."
+_BUS = "Check CAN wiring, terminators, bit rate and the load of the bus."
+_SETTINGS = "Restore the parameters, set up the drive again and store."
+_LIMITS = "Check limits and targets."
+
+ERRORS: dict[int, tuple[str, str, str]] = {
+    0x0000: ("No error.", "", ""),
+    0x1000: ("The drive has an error without a name.", "", _MAKER),
+    0x1090: ("The firmware does not fit the hardware.", "", "Load the firmware of this drive."),
+    0x2310: ("The motor current was too high.", "A short, or controller gains too high.", _WIRING),
+    0x2320: ("The power stage protected itself.", "A short or overload of its output.", _WIRING),
+    0x3210: ("The supply voltage is too high.", "Braking feeds energy back.", _SUPPLY),
+    0x3220: ("The supply voltage is too low.", "The supply gives in under load.", _SUPPLY),
+    0x4210: ("The power stage is too hot.", "", _LOAD),
+    0x4380: ("The motor is too hot.", "Its I2t model has reached the limit.", _LOAD),
+    0x5113: ("The logic supply is too low.", "", _SUPPLY),
+    0x6080: ("The sign of life is missing.", "", _BUS),
+    0x6081: ("The external watchdog ran out.", "", _BUS),
+    0x6320: ("A parameter is out of range.", "", _SETTINGS),
+    0x6380: ("The stored parameters are damaged.", "", _SETTINGS),
+    0x7320: ("The position sensor failed.", "", _SENSOR),
+    0x7380: ("The position sensor's signals broke off.", "A wire is broken or loose.", _SENSOR),
+    0x7381: ("The encoder's resolution does not fit.", "", _SENSOR),
+    0x7382: ("The encoder's index is wrong.", "", _SENSOR),
+    0x7388: ("The Hall sensors' pattern is wrong.", "", _SENSOR),
+    0x7389: ("The Hall sensors' sequence is wrong.", "", _SENSOR),
+    0x738A: ("The SSI sensor does not answer well.", "", _SENSOR),
+    0x738C: ("The SSI sensor's frames are wrong.", "", _SENSOR),
+    0x8110: ("The drive lost CAN frames.", "Its receive buffer overran.", _BUS),
+    0x8111: ("The drive lost CAN frames.", "A receive buffer overran.", _BUS),
+    0x8120: ("The drive's CAN is error passive.", "Many frames are damaged.", _BUS),
+    0x8130: (
+        "The drive heard no heartbeat of the host.",
+        "The program stopped or was late, or the cable is out.",
+        "Check that the program reads without pauses, and the cable.",
+    ),
+    0x8150: ("A PDO's identifier is used twice.", "", "Give every PDO its own identifier."),
+    0x81FD: ("The drive's CAN is bus-off.", "It could not get its frames through.", _BUS),
+    0x81FE: ("The drive's CAN receive queue overran.", "", _BUS),
+    0x81FF: ("The drive's CAN transmit queue overran.", "", _BUS),
+    0x8210: ("A PDO had the wrong length.", "The mapping does not fit.", "Start the driver again."),
+    0x8250: ("An RPDO did not come in time.", "The program stopped or was late.", _BUS),
+    0x8611: ("The following error is too large.", "", _LIMITS),
+    0x8A80: ("The negative limit switch is hit.", "", _LIMITS),
+    0x8A81: ("The positive limit switch is hit.", "", _LIMITS),
+    0x8A82: ("A software position limit is passed.", "", _LIMITS),
+    0x8A88: ("Safe torque off is active.", "", "Release the emergency stop, check the STO inputs."),
+    0xFF01: ("The drive's processor is overloaded.", "", _MAKER),
+    0xFF02: ("The drive's watchdog ran out.", "", _MAKER),
+    0xFF0B: ("The peak load was too high.", "", _LOAD),
+    0xFF10: ("A controller gain is out of range.", "", _SETTINGS),
+}
+"""What, why and what to do, by error code."""
+
+_RANGES: tuple[tuple[range, tuple[str, str, str]], ...] = (
+    (range(0x1080, 0x1084), ("The drive did not start properly.", "", _MAKER)),
+    (range(0x5280, 0x5282), ("The drive's hardware failed.", "", _MAKER)),
+    (range(0x5480, 0x5484), ("The drive's hardware failed.", "", _MAKER)),
+    (range(0x6180, 0x6191), ("The drive's firmware failed.", "", _MAKER)),
+    (range(0x7390, 0x7393), ("A position sensor failed.", "", _SENSOR)),
+    (range(0x8180, 0x8184), ("The drive's EtherCAT failed.", "", _BUS)),
+    (range(0xFF12, 0xFF22), ("Auto-tuning failed.", "", "Tune again with the axis free to move.")),
+)
+
+
+class DriveFaultError(DriverError):
+    """The drive has a fault, or has left operation by itself.
+
+    Attributes:
+        code: Its error code, 0 when it told none.
+    """
+
+    def __init__(self, what: str, why: str = "", fix: str = "", code: int = 0) -> None:
+        self.code = code
+        super().__init__(what, why, fix)
+
+
+def explain(code: int) -> tuple[str, str, str]:
+    """Return what an error code means: what, why, what to do."""
+    if code in ERRORS:
+        return ERRORS[code]
+    for codes, words in _RANGES:
+        if code in codes:
+            return words
+    return ("The drive has an error this program does not know.", "", "Look it up in its manual.")
+
+
+def fault(code: int) -> DriveFaultError:
+    """Return the error of an error code."""
+    what, why, fix = explain(code)
+    then = "Then clear the fault and arm again."
+    return DriveFaultError(f"{what} (error {code:#06x})", why, f"{fix} {then}".strip(), code)

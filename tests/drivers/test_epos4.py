@@ -1,0 +1,429 @@
+"""An EPOS4 in virtual time and on a virtual bus: set-up, torque, faults, and a safe end."""
+
+import threading
+from collections.abc import Callable, Iterator
+from time import monotonic
+
+import can
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.device import SampleFlag
+from drivers.epos4 import faults, protocol
+from drivers.epos4.canopen_link import CanopenLink, ObjectRefusedError
+from drivers.epos4.driver import Epos4, open_epos4
+from drivers.epos4.fake import Epos4Fake
+from drivers.epos4.faults import DriveFaultError
+from drivers.epos4.protocol import Feedback, Ratings, State
+from drivers.errors import (
+    DisarmUnconfirmedError,
+    DriverError,
+    FrameError,
+    LinkError,
+    LinkLostError,
+    LinkTimeoutError,
+    ProtocolMismatchError,
+)
+from drivers.transport.can_bus import CanFrame
+from drivers.transport.faulty import Fault, Faults
+from drivers.transport.faulty_can import FaultyCanBus
+from drivers.transport.python_can import PythonCanBus
+from drivers.transport.simulated_can import SimulatedCanBus
+from tests.drivers.scripted_can import ScriptedCanBus
+
+RATINGS = Ratings(12.46e-3, 17.8e-3, 0.7, 1.4)
+
+
+class Tapped(SimulatedCanBus):
+    """A simulated bus that notes what the host sends and may lose some of it."""
+
+    def __init__(self, *nodes: Epos4Fake) -> None:
+        super().__init__(nodes)
+        self.sent: list[CanFrame] = []
+        self.lose: Callable[[CanFrame], bool] = lambda _: False
+
+    def send(self, frame: CanFrame) -> None:
+        self.sent.append(frame)
+        if not self.lose(frame):
+            super().send(frame)
+
+
+def armed(node: Epos4Fake) -> tuple[Epos4, Tapped]:
+    bus = Tapped(node)
+    device = Epos4(bus)
+    device.start()
+    device.arm()
+    return device, bus
+
+
+def test_a_torque_turns_the_motor_and_the_end_is_powerless() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    sent_n_m = device.set_torque(1.001e-3)
+    assert sent_n_m == pytest.approx(80 * 12.46e-6)
+    positions = []
+    for number in range(300):
+        batch = device.read(0.1)
+        assert batch.sequence[0] == number
+        assert batch.flags[0] == 0
+        positions.append(batch.columns["position_count"][0])
+    assert batch.columns["motor_torque_n_m"][0] == pytest.approx(sent_n_m)
+    assert batch.columns["motor_current_a"][0] == pytest.approx(sent_n_m / 17.8e-3)
+    assert batch.columns["command_torque_n_m"][0] == pytest.approx(sent_n_m)
+    assert np.all(np.diff(positions[5:]) > 0)
+    assert node.torque_n_m == pytest.approx(sent_n_m)
+    device.close()
+    assert node.state is State.SWITCH_ON_DISABLED
+    assert node.torque_n_m == 0.0
+    with pytest.raises(LinkLostError):
+        device.read(0.1)
+
+
+def test_what_is_said_to_set_up_and_arm_in_its_order() -> None:
+    device, bus = armed(Epos4Fake())
+    heartbeat = 0x700 + 127
+    spoken = [frame for frame in bus.sent if frame.can_id != heartbeat]
+    said = [f"{frame.can_id:x} {frame.data.hex()}" for frame in spoken]
+    writes = [line for line in said if line[:3] != "601" or line[4:6] in ("2f", "2b", "23")]
+    expected = [
+        "0 8001",
+        "601 2b17100064000000",
+        "601 2300180181010080",  # TPDO1 off, synchronous, mapped, counted, on
+        "601 2f00180201000000",
+        "601 2f001a0000000000",
+        "601 23001a0110004160",
+        "601 23001a0220006460",
+        "601 23001a031001d230",
+        "601 2f001a0003000000",
+        "601 2300180181010000",
+        "601 2300140101020080",  # RPDO1 off, at once, mapped, counted, on
+        "601 2f001402ff000000",
+        "601 2f00160000000000",
+        "601 2300160110004060",
+        "601 2300160210007160",
+        "601 2f00160002000000",
+        "601 2300140101020000",
+    ]
+    assert writes[: len(expected)] == expected
+    assert writes[-6:] == [
+        "601 23161001fa007f00",  # the host is node 127 and beats every 250 ms at the latest
+        "0 0101",
+        "601 2b71600000000000",  # target torque 0
+        "601 2f6060000a000000",  # cyclic torque
+        "601 2b40600006000000",  # shutdown
+        "601 2b4060000f000000",  # enable operation
+    ]
+    device.read(0.1)
+    assert [frame for frame in bus.sent if frame.can_id != heartbeat][-2:] == [
+        CanFrame(0x201, bytes.fromhex("0f000000")),
+        CanFrame(0x80),
+    ]
+    device.disarm()
+    assert CanFrame(0x201, bytes(4)) in bus.sent
+    device.close()
+
+
+def test_an_unarmed_drive_is_only_watched() -> None:
+    node = Epos4Fake()
+    bus = Tapped(node)
+    device = Epos4(bus)
+    with pytest.raises(DriverError, match="start"):
+        device.arm()
+    device.start()
+    assert len(device.read(0.1)) == 1
+    assert not [frame for frame in bus.sent if frame.can_id == 0x201]
+    with pytest.raises(DriverError, match="arm"):
+        device.set_torque(1e-3)
+    assert node.state is State.SWITCH_ON_DISABLED
+    device.close()
+
+
+@pytest.mark.parametrize("torque", [np.nan, np.inf, -np.inf, 0.025, -0.025])
+def test_a_torque_that_must_not_be_is_refused(torque: float) -> None:
+    device, _ = armed(Epos4Fake())
+    with pytest.raises(DriverError, match=r"cannot be commanded|beyond"):
+        device.set_torque(torque)
+    assert device.read(0.1).columns["command_torque_n_m"][0] == 0.0
+    device.close()
+
+
+@given(st.floats(-0.0249, 0.0249))
+def test_a_command_is_off_by_half_a_step_at_most(torque: float) -> None:
+    assert abs(RATINGS.torque_n_m(RATINGS.per_mille(torque)) - torque) <= 0.5001 * 12.46e-6
+
+
+def test_the_units_of_the_documented_motor() -> None:
+    assert RATINGS.torque_n_m(500) == pytest.approx(6.23e-3)
+    assert RATINGS.current_a(1000) == pytest.approx(0.7)
+    assert RATINGS.torque_limit_n_m == pytest.approx(2 * 12.46e-3)
+
+
+def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    device.set_torque(1e-3)
+    device.read(0.1)
+    node.fail(0x3220, 4)
+    with pytest.raises(DriveFaultError, match=r"supply voltage is too low.*0x3220") as caught:
+        device.read(0.1)
+    assert caught.value.code == 0x3220
+    assert "power supply" in caught.value.fix
+    after = device.read(0.1)
+    assert after.flags[0] == SampleFlag.SUSPECT
+    assert device.counters["device_errors"] == 1
+    with pytest.raises(DriveFaultError, match="0x3220"):
+        device.arm()
+    device.clear_fault()
+    assert device.last_error == 0
+    device.arm()
+    assert device.read(0.1).flags[0] == 0
+    assert node.torque_n_m == 0.0
+    device.close()
+
+
+def test_a_drive_that_leaves_operation_by_itself_is_said() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    node.state = State.QUICK_STOP
+    with pytest.raises(DriveFaultError, match="quick stop"):
+        device.read(0.1)
+    device.close()
+    assert node.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_silent_host_is_noticed_by_the_drive() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    device.set_torque(1e-3)
+    device.read(0.1)
+    node.advance(180)  # the host's last beat may be 63 ms old
+    assert node.state is State.OPERATION_ENABLED
+    node.advance(71)
+    assert node.state is State.FAULT
+    assert node.torque_n_m == 0.0
+    with pytest.raises(DriveFaultError, match="heartbeat of the host"):
+        device.read(0.1)
+    device.close()
+
+
+def test_a_host_that_only_waits_beats_all_the_same() -> None:
+    node = Epos4Fake()
+    bus = SimulatedCanBus([node])
+    device = Epos4(bus, rate_hz=0.5)
+    device.start()
+    device.arm()
+    for _ in range(30):
+        device.read(0.1)
+    assert node.state is State.OPERATION_ENABLED
+    device.close()
+
+
+def test_a_closed_driver_leaves_no_watchdog_running() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    device.close()
+    node.advance(2000)
+    assert node.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_silent_drive_is_said_at_every_reading() -> None:
+    trouble = Faults()
+    device = Epos4(FaultyCanBus(SimulatedCanBus([Epos4Fake()]), trouble))
+    device.start()
+    trouble.inject(Fault.STALL, duration_s=2.0)
+    errors = 0
+    for _ in range(60):
+        try:
+            device.read(0.1)
+        except LinkTimeoutError as error:
+            errors += "fallen silent" in str(error)
+    assert errors > 10
+    assert device.counters["stalls"] == 1
+    device.close()
+
+
+def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
+    device, bus = armed(Epos4Fake())
+    bus.lose = lambda frame: frame.can_id == 0x601
+    with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*250 ms"):
+        device.disarm()
+    with pytest.raises(DisarmUnconfirmedError):
+        device.close()
+    with pytest.raises(LinkLostError):
+        bus.read(0.0)
+
+
+def test_a_disarm_is_not_believed_while_the_statusword_says_otherwise() -> None:
+    node = Epos4Fake()
+    device, bus = armed(node)
+    # the drive confirms the write of the controlword and does not follow it
+    deaf = bytes.fromhex("2b406000 00000000")
+    bus.lose = lambda frame: frame.can_id == 0x201
+
+    original = node.receive
+    node.receive = lambda frame: (  # type: ignore[method-assign]
+        original(CanFrame(0x601, bytes.fromhex("2b716000 00000000")))
+        if frame.data == deaf
+        else original(frame)
+    )
+    with pytest.raises(DisarmUnconfirmedError):
+        device.disarm()
+    assert node.state is State.OPERATION_ENABLED
+    node.receive = original  # type: ignore[method-assign]
+    device.close()
+    assert node.state is State.SWITCH_ON_DISABLED
+
+
+def test_the_wrong_device_is_refused_before_anything_is_written() -> None:
+    bus = Tapped(Epos4Fake(objects={(0x1018, 1): 0x2E}))
+    with pytest.raises(ProtocolMismatchError, match=r"0x2e.*0xfb"):
+        Epos4(bus).start()
+    assert all(frame.data[0] == 0x40 for frame in bus.sent)
+    with pytest.raises(ProtocolMismatchError, match="torque mode"):
+        Epos4(SimulatedCanBus([Epos4Fake(objects={(0x6502, 0): 0xA5})])).start()
+    with pytest.raises(DriverError, match="EPOS Studio"):
+        Epos4(SimulatedCanBus([Epos4Fake(objects={(0x6076, 0): 0})])).start()
+    with pytest.raises(LinkTimeoutError, match="Node 9"):
+        Epos4(SimulatedCanBus([Epos4Fake()]), node_id=9).identify()
+
+
+def test_a_mapping_that_is_not_held_is_noticed() -> None:
+    node = Epos4Fake()
+
+    def forget(index: int, subindex: int, **_: object) -> int | None:
+        return 0x606C0020 if (index, subindex) == (0x1A00, 2) else None
+
+    node._node.add_read_callback(forget)
+    with pytest.raises(ProtocolMismatchError, match="0x606c0020"):
+        Epos4(SimulatedCanBus([node])).start()
+
+
+def test_an_absent_object_is_refused_with_its_code() -> None:
+    link = CanopenLink(SimulatedCanBus([Epos4Fake(absent=(0x6502,))]), 1)
+    with pytest.raises(ObjectRefusedError, match=r"0x6502.*does not exist") as caught:
+        link.read(0x6502)
+    assert caught.value.code == 0x06020000
+    bus = SimulatedCanBus([Epos4Fake()])
+    bus.send(CanFrame(0x601, bytes.fromhex("4072600000000000")))  # 0x6072, absent from every EPOS4
+    answers = [bus.read(0.0), bus.read(0.0)]
+    assert CanFrame(0x581, bytes.fromhex("8072600000000206")) in answers
+    with pytest.raises(DriverError, match=r"epos4\.eds"):
+        link.read(0x6072)
+
+
+def test_a_lost_answer_is_asked_for_again() -> None:
+    trouble = Faults()
+    device = Epos4(FaultyCanBus(SimulatedCanBus([Epos4Fake()]), trouble))
+    trouble.inject(Fault.DROP, 2)
+    assert device.identify().serial == "00c0ffee"
+    assert device.counters["retries"] >= 1
+    device.close()
+
+
+def test_a_number_is_read_with_the_bytes_of_the_standard() -> None:
+    question = CanFrame(0x601, bytes.fromhex("4018100100000000"))
+    answer = CanFrame(0x581, bytes.fromhex("43181001fb000000"))
+    with ScriptedCanBus([(question, [answer])]) as bus:
+        assert CanopenLink(bus, 1).read(0x1018, 1) == 0xFB
+
+
+@pytest.mark.parametrize("options", [{"node_id": 0}, {"node_id": 127}, {"rate_hz": 0.0}])
+def test_options_that_are_no_drives(options: dict[str, float]) -> None:
+    with pytest.raises(LinkError, match="not"):
+        open_epos4("can:virtual:options", **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("word", "state"),
+    [
+        (0x0200, State.NOT_READY),
+        (0x0240, State.SWITCH_ON_DISABLED),
+        (0x0231, State.READY),
+        (0x0233, State.SWITCHED_ON),
+        (0x0637, State.OPERATION_ENABLED),
+        (0x0217, State.QUICK_STOP),
+        (0x021F, State.FAULT_REACTION),
+        (0x0208, State.FAULT),
+    ],
+)
+def test_a_statusword_says_a_state(word: int, state: State) -> None:
+    assert protocol.state_of(word) is state
+
+
+@given(st.integers(0, 2**16 - 1))
+def test_any_statusword_is_read_or_refused(word: int) -> None:
+    try:
+        state = protocol.state_of(word)
+    except FrameError:
+        state = None
+    powered = word & 0x6F in (0x23, 0x27, 0x07)
+    assert (state in (State.SWITCHED_ON, State.OPERATION_ENABLED, State.QUICK_STOP)) == powered
+
+
+@given(
+    st.integers(0, 2**16 - 1), st.integers(-(2**31), 2**31 - 1), st.integers(-(2**15), 2**15 - 1)
+)
+def test_feedback_survives_its_frame(word: int, position: int, torque: int) -> None:
+    feedback = Feedback(word, position, torque)
+    assert protocol.decode_feedback(protocol.encode_feedback(feedback)) == feedback
+
+
+def test_every_error_says_what_and_what_to_do() -> None:
+    for code, (what, _, fix) in faults.ERRORS.items():
+        assert what.endswith(".")
+        assert fix or code == 0
+    assert faults.explain(0x5482)[0] == "The drive's hardware failed."
+    assert "does not know" in faults.fault(0x1234).what
+
+
+class Served:
+    """A fake on a python-can virtual bus, in real time, in a thread of the test."""
+
+    def __init__(self, node: Epos4Fake, channel: str) -> None:
+        self.node = node
+        self._bus = PythonCanBus(channel, can.Bus(interface="virtual", channel=channel))
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        began_s, ticks = monotonic(), 0
+        while not self._over.is_set():
+            frame = self._bus.read(0.0005)
+            if frame is not None:
+                self.node.receive(frame)
+            due = int((monotonic() - began_s) * 1000)
+            self.node.advance(due - ticks)
+            ticks = due
+            for answer in self.node.transmit():
+                self._bus.send(answer)
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join(10)
+        self._bus.close()
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    drive = Served(Epos4Fake(), "epos4-test")
+    yield drive
+    drive.close()
+
+
+def test_a_session_on_a_virtual_bus(served: Served) -> None:
+    device = open_epos4("can:virtual:epos4-test", rate_hz=100.0, host_timeout_ms=10_000)
+    device.start()
+    device.arm()
+    device.set_torque(1e-3)
+    samples = 0
+    for _ in range(400):
+        samples += len(device.read(0.5))
+        if samples >= 50:
+            break
+    assert samples >= 50
+    assert served.node.torque_n_m == pytest.approx(80 * 12.46e-6)
+    device.close()
+    assert served.node.state is State.SWITCH_ON_DISABLED
