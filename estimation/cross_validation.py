@@ -47,7 +47,11 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
     for split in campaign.folds(folds, seed):
         fitted = fit(declared, split.train, bootstrap=0)
         for recording in split.test:
-            run = settled(balance_channels(fitted, recording), fitted.low_pass)
+            run = settled(
+                balance_channels(fitted, recording),
+                fitted.low_pass,
+                moving_only=fitted.has_friction,
+            )
             errors[recording.name] = run[fitted.target] - estimate(fitted, run)
     whole = np.concatenate(list(errors.values()))
     centred = {name: error - error.mean() for name, error in errors.items() if error.size}

@@ -25,6 +25,7 @@ from estimation.filters import (
     holoborodko_derivative,
 )
 from estimation.recording import FloatArray, Recording
+from estimation.rest import SPEED, in_motion
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -113,7 +114,9 @@ def _travel(values: FloatArray, window: int) -> FloatArray:
     return travelled
 
 
-def settled(channels: Recording, low_pass: LowPass, step: int = 1) -> Recording:
+def settled(
+    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+) -> Recording:
     """Return every n-th sample that is valid and away from the ends of its run.
 
     At the ends the filter works on a reflection of the run, and a second derivative shows it.
@@ -122,11 +125,14 @@ def settled(channels: Recording, low_pass: LowPass, step: int = 1) -> Recording:
         channels: Filtered channels of one whole run.
         low_pass: The filter they went through.
         step: Keep every n-th sample.
+        moving_only: Leave out samples at rest too, where the motor's speed is among the channels.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
     inner[:edge] = False
     inner[max(len(inner) - edge, 0) :] = False
+    if moving_only and SPEED in channels:
+        inner &= in_motion(channels[SPEED], inner, channels.sample_rate_hz)
     kept = np.flatnonzero(inner)[::step]
     return replace(
         channels,

@@ -115,13 +115,15 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recor
     runs = []
     for recording in campaign.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
-        run = settled(balance_channels(model, recording), model.low_pass, step)
+        run = settled(balance_channels(model, recording), model.low_pass, step, model.has_friction)
         if len(run):
             runs.append(run)
     if not runs:
         raise FitError(
-            f"There is no valid sample to fit the model {model.name!r} on.",
-            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded.",
+            f"These runs do not tell the model {model.name!r}: there is no valid sample to fit.",
+            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded; samples at rest"
+            " do not count where friction is fitted.",
+            "Record runs in which the rig moves.",
         )
     return runs
 

@@ -185,6 +185,11 @@ class Model:
         return tuple(dict.fromkeys(names))
 
     @property
+    def has_friction(self) -> bool:
+        """Whether friction is among the effects: then the model says nothing of a rig at rest."""
+        return any(term.effect.id.startswith("friction.") for term in self.terms)
+
+    @property
     def unit(self) -> str:
         """Unit symbol of the target."""
         return unit_of(self.target)

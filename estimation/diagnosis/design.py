@@ -20,17 +20,11 @@ from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-
-SPEED = "motor_velocity_rad_s"
+from estimation.rest import SPEED, in_motion
 
 WITH_FRICTION = ("motor", "cable", "grasp")
 """Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
 at rest tell nothing of a model of motion: they are left out of search, fit and error."""
-
-REST_SHARE, REST_RAD_S, REST_REACH_S = 0.05, 0.7, 0.02
-"""At rest is: slower than this share of the run's 95th percentile of speed or than this speed of
-the motor, and what is this near to it. The share grows with what the filter smears at a reversal.
-"""
 
 TAPS = 8
 """Length of the decimating filter, in decimated samples."""
@@ -103,7 +97,7 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
     channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
-    moving = _moving(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
+    moving = in_motion(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
     run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
@@ -112,13 +106,6 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
             "Record it anew, or exclude it.",
         )
     return run
-
-
-def _moving(speed: FloatArray, valid: NDArray[np.bool_], rate_hz: float) -> NDArray[np.bool_]:
-    size = np.abs(speed)
-    usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
-    rest = (size < max(REST_RAD_S, REST_SHARE * usual)).astype(np.uint8)
-    return np.asarray(ndimage.maximum_filter1d(rest, 2 * round(REST_REACH_S * rate_hz) + 1) == 0)
 
 
 def decimate(columns: FloatArray, down: int) -> FloatArray:
