@@ -4,13 +4,15 @@ A driver is made from an open link, speaks to one device, and does nothing in th
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from drivers.errors import LinkError
 
 
 class SampleFlag(IntFlag):
@@ -132,3 +134,18 @@ class Device(Protocol):
     def close(self) -> None:
         """Stop, and let go of the link. Closing twice does nothing."""
         ...
+
+
+def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> None:
+    """End a device's stream where it can still be reached, and let go of its link in any case.
+
+    Args:
+        stop: Ends the stream; a link that is gone already is no error here.
+        let_go: Closes the link.
+    """
+    try:
+        stop()
+    except LinkError:
+        pass  # it is gone already
+    finally:
+        let_go()

@@ -8,6 +8,7 @@ from drivers.amt21 import protocol
 from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
+from drivers.polling import PollSchedule
 from drivers.registry import Driver
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -40,12 +41,10 @@ class Amt21:
         self._requests = [protocol.request(address, turns) for turns in (False, True)]
         self._address = address
         self._multi_turn = multi_turn
-        self._period_s = 1.0 / rate_hz
         self._reply_timeout_s = reply_timeout_s
         self._counters = DeviceCounters()
-        self._began_s = transport.now_s
-        self._asked = 0
-        self._lost = 0
+        self._schedule = PollSchedule(rate_hz, self._counters)
+        self._schedule.restart(transport.now_s)
         angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
         half = protocol.FULL_TURN // 2
         turns = Channel("turns", "1", rate_hz, -half, half - 1, "whole turns")
@@ -78,25 +77,22 @@ class Amt21:
     def start(self) -> None:
         """Number the samples from 0, the first being due now."""
         self._discard(self._transport.read(0.0))
-        self._began_s = self._transport.now_s
-        self._asked = self._lost = 0
+        self._schedule.restart(self._transport.now_s)
 
     def read(self, timeout_s: float) -> Batch:
         """Ask when the next sample is due and return it, or nothing when it is not due in time."""
-        wait_s = self._began_s + self._asked * self._period_s - self._transport.now_s
+        wait_s = self._schedule.wait_s(self._transport.now_s)
         self._discard(self._transport.read(max(0.0, min(wait_s, timeout_s))))
         now_s = self._transport.now_s
-        if self._began_s + self._asked * self._period_s > now_s + 1e-9:
+        if self._schedule.wait_s(now_s) > 0:
             return self._batch(None, None)
-        missed = int((now_s - self._began_s) / self._period_s + 1e-6) - self._asked
-        if missed > 0:  # the caller came too late for these
-            self._lose(missed)
+        self._schedule.skip_missed(now_s)
         angle = self._ask(turns=False)
         turns = self._ask(turns=True) if self._multi_turn and angle is not None else None
         if angle is None or (self._multi_turn and turns is None):
-            self._lose(1)
+            self._schedule.lose()
             return self._batch(None, None)
-        self._asked += 1
+        self._schedule.asked += 1
         self._counters.frames += 1
         return self._batch(angle, turns)
 
@@ -107,12 +103,6 @@ class Amt21:
         """Let go of the line."""
         self._transport.close()
 
-    def _lose(self, samples: int) -> None:
-        self._asked += samples
-        self._lost += samples
-        self._counters.gaps += 1
-        self._counters.lost += samples
-
     def _batch(self, angle: int | None, turns: int | None) -> Batch:
         count = 0 if angle is None else 1
         values = {"angle_rad": 0.0 if angle is None else angle * protocol.RAD_PER_COUNT}
@@ -122,9 +112,9 @@ class Amt21:
             {name: np.full(count, value) for name, value in values.items()},
             np.full(count, self._transport.now_s),
             "host",
-            np.full(count, self._asked - 1, np.int64),
+            np.full(count, self._schedule.asked - 1, np.int64),
             np.zeros(count, np.uint8),
-            self._lost,
+            self._schedule.lost,
         )
 
     def _ask(self, turns: bool) -> int | None:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from drivers.ati_net import protocol
 from drivers.ati_net.sequence import RecordSequence
 from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.registry import Driver
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
@@ -149,12 +149,7 @@ class AtiNet:
         if self._closed:
             return
         self._closed = True
-        try:
-            self.stop()
-        except LinkError:
-            pass  # it is gone already
-        finally:
-            self._transport.close()
+        stop_and_let_go(self.stop, self._transport.close)
 
     def _receive(self, timeout_s: float) -> NDArray[np.void]:
         """Return the records of the datagrams that are there, waiting for the first."""

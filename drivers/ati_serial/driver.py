@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from drivers.ati_net.protocol import AXES, N_M_PER_UNIT, N_PER_UNIT
 from drivers.ati_serial import protocol
 from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.registry import Driver
 from drivers.sliding import SlidingFrames
 from drivers.transport.serial_port import open_line
@@ -159,12 +159,7 @@ class AtiSerial:
         if self._closed:
             return
         self._closed = True
-        try:
-            self.stop()
-        except LinkError:
-            pass  # it is gone already
-        finally:
-            self._transport.close()
+        stop_and_let_go(self.stop, self._transport.close)
 
     def _quieten(self) -> None:
         """End the stream and wait until nothing more comes."""

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import DriverError, LinkError, LinkTimeoutError
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.errors import DriverError, LinkTimeoutError
 from drivers.qia128 import protocol
 from drivers.registry import Driver
 from drivers.sliding import SlidingFrames
@@ -129,12 +129,7 @@ class Qia128:
         if self._closed:
             return
         self._closed = True
-        try:
-            self.stop()
-        except LinkError:
-            pass  # it is gone already
-        finally:
-            self._transport.close()
+        stop_and_let_go(self.stop, self._transport.close)
 
     def _load(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         assert self._points is not None  # noqa: S101

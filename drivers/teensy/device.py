@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import LinkError
+from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.registry import Driver
 from drivers.teensy.channels import RAW, TeensyChannel
 from drivers.teensy.driver import TeensyLogger
@@ -88,12 +87,7 @@ class TeensyDevice:
         if self._closed:
             return
         self._closed = True
-        try:
-            self.stop()
-        except LinkError:
-            pass  # it is gone already
-        finally:
-            self.logger.close()
+        stop_and_let_go(self.stop, self.logger.close)
 
 
 def open_teensy(url: str) -> TeensyDevice:
