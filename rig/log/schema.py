@@ -11,6 +11,7 @@ import json
 import re
 import zlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -107,12 +108,12 @@ class Stream:
                 "Put 8-byte fields first, then 4, 2 and 1.",
             )
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[np.void]:
         """NumPy type of one message's fields, packed, little-endian."""
         return np.dtype([(field.name, NUMPY_TYPES[field.dtype]) for field in self.fields])
 
-    @property
+    @cached_property
     def record_dtype(self) -> np.dtype[np.void]:
         """NumPy type of one MCAP message record of this stream, opcode to last field."""
         return np.dtype(
