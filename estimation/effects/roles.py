@@ -1,8 +1,10 @@
 """Which channel plays which role of an effect in which balance.
 
-The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder, also for
-the cable, since the jaw's coarse encoder makes a delay that is not there. A load is never the
-balance's own target: noise shared by both sides of a balance looks like an effect.
+The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder. Behind
+the gearbox, for cable and stretch, it comes from the spindle's: what winds up turns the motor and
+not the spindle (on measured data the motor's speed doubles the cable's error), and the jaw's coarse
+encoder makes a delay that is not there. A load is never the balance's own target: noise shared by
+both sides of a balance looks like an effect.
 """
 
 from collections.abc import Mapping
@@ -28,6 +30,8 @@ _MOTION = {
     "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
 }
 
+_BEHIND_THE_GEAR = _MOTION | {"speed": ("spindle_velocity_rad_s",)}
+
 CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": _MOTION
     | {
@@ -47,7 +51,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "other_reading": ("motor_current_a", "distal_torque_n_m"),
         "encoder": ("motor_angle_rad", "spindle_angle_rad"),
     },
-    "cable": _MOTION
+    "cable": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "reading": ("distal_torque_n_m",),
@@ -56,7 +60,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
-    "stretch": _MOTION
+    "stretch": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "travel": ("spindle_angle_rad",),
