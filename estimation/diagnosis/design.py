@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.candidate import Candidate
@@ -91,7 +92,9 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     filtered = zero_phase_channels(recording, wanted, low_pass)
     rate_hz = recording.sample_rate_hz
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
-    valid = filtered.valid.copy()
+    # the filter smears what is flagged as it smears the ends
+    spoilt = ndimage.maximum_filter1d((~filtered.valid).astype(np.uint8), 2 * edge + 1)
+    valid = spoilt == 0
     valid[:edge] = False
     valid[max(len(valid) - edge, 0) :] = False
     down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
