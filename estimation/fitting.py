@@ -240,7 +240,17 @@ def _search_shape(problem: _Problem) -> list[float]:
     best = optimize.minimize(
         error, point, method="Powell", bounds=bounds, options={"xtol": 1e-4, "ftol": 1e-10}
     )
-    return values(best.x if best.fun <= error(point) else point)
+    if best.fun > error(point):  # along a shape of flats and steps, such as the time of a change
+        spans = [(high - low) / p.points for (low, high), p in zip(bounds, parameters, strict=True)]
+        around = np.vstack([point, np.add(point, np.diag(spans))])
+        best = optimize.minimize(
+            error,
+            point,
+            method="Nelder-Mead",
+            bounds=bounds,
+            options={"xatol": 1e-4, "fatol": 1e-10, "initial_simplex": around},
+        )
+    return values(best.x)
 
 
 def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:

@@ -43,7 +43,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("motor_current_a", MOTOR_LOAD),
         "other_reading": ("jaw_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
     "gearbox": _MOTION
@@ -70,7 +70,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
         "encoder": ("spindle_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
     },
     "grasp": _MOTION
     | {
@@ -78,7 +78,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("motor_current_a",),
         "other_reading": ("spindle_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("spindle_angle_rad",),
     },
 }
