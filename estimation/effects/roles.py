@@ -1,8 +1,10 @@
 """Which channel plays which role of an effect in which balance.
 
-The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder, also for
-the cable, since the jaw's coarse encoder makes a delay that is not there. A load is never the
-balance's own target: noise shared by both sides of a balance looks like an effect.
+The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder. Behind
+the gearbox, for cable and stretch, it comes from the spindle's: what winds up turns the motor and
+not the spindle (on measured data the motor's speed doubles the cable's error), and the jaw's coarse
+encoder makes a delay that is not there. A load is never the balance's own target: noise shared by
+both sides of a balance looks like an effect.
 """
 
 from collections.abc import Mapping
@@ -29,11 +31,14 @@ _MOTION = {
     "motor_angle": ("motor_angle_rad",),
     "output_angle": ("spindle_angle_rad",),
     "current": ("motor_current_a",),
+    "temperature": ("motor_temperature_k",),
     "clock": ("time_s",),
     "elapsed": ("time_s", "campaign_time_s"),
     "campaign_clock": ("campaign_time_s",),
     "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
 }
+
+_BEHIND_THE_GEAR = _MOTION | {"speed": ("spindle_velocity_rad_s",)}
 
 CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": _MOTION
@@ -41,6 +46,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "travel": ("motor_angle_rad",),
         "load": (MOTOR_LOAD,),
         "reading": ("motor_current_a", MOTOR_LOAD),
+        "creeping": (MOTOR_LOAD,),
         "other_reading": ("jaw_angle_rad",),
         "encoder": ("motor_angle_rad",),
         "stop": ("jaw_angle_rad",),
@@ -51,25 +57,28 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "load": ("proximal_torque_n_m",),
         "travel": ("proximal_torque_n_m",),
         "reading": ("proximal_torque_n_m",),
+        "creeping": ("proximal_torque_n_m",),
         "other_reading": ("motor_current_a", "distal_torque_n_m"),
         "encoder": ("motor_angle_rad", "spindle_angle_rad"),
     },
-    "cable": _MOTION
+    "cable": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "reading": ("distal_torque_n_m",),
+        "creeping": ("distal_torque_n_m",),
         "other_reading": ("motor_current_a",),
         "encoder": ("spindle_angle_rad",),
         "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
-    "stretch": _MOTION
+    "stretch": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "travel": ("spindle_angle_rad",),
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
+        "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
-        "encoder": ("spindle_angle_rad",),
+        "encoder": ("spindle_angle_rad", "jaw_angle_rad"),
         "stop": ("jaw_angle_rad",),
     },
     "grasp": _MOTION
