@@ -1,16 +1,24 @@
 """Effects that remember, and those that came with them: what was put in is what a fit finds."""
 
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.derived import zero_phase_channels
+from estimation.diagnosis.diagnose import diagnose
+from estimation.diagnosis.search import Gates
+from estimation.diagnosis.split import split
 from estimation.effects import catalogue, effect
 from estimation.fitting import fit
-from estimation.model import Model, Term
+from estimation.model import Model, Term, predict
 from estimation.recording import Recording
+from estimation.stream import Stream
+from tests.estimation import synthetic
 
 TRUE = {
     "change.step": ((7.0, 2.0), [0.02]),
@@ -181,3 +189,69 @@ def test_a_straight_wrist_adds_no_wrap():
     lost = kind.columns(still, (0.5, 0.1))[:, 0]
     assert lost[0] == 0.0
     assert lost[1] == lost[2] > 0
+
+
+def started(recording: Recording, start_s: float | None) -> Recording:
+    columns = {k: v for k, v in recording.columns.items() if k != "campaign_time_s"}
+    start_ns = None if start_s is None else 1_700_000_000_000_000_000 + round(start_s * 1e9)
+    return replace(recording, columns=columns, started_at_ns=start_ns)
+
+
+def test_a_campaign_whose_starts_are_known_has_a_clock_of_its_own():
+    recordings = [started(r, s) for r, s in zip(runs(), (90.0, 30.0, 0.0, 200.0), strict=True)]
+    timed = list(Campaign.of(recordings).timed())
+    firsts = [recording["campaign_time_s"][0] for recording in timed]
+    assert firsts == pytest.approx([90.0, 30.0, 0.0, 200.0])
+    assert np.ptp(timed[0]["campaign_time_s"]) == pytest.approx(recordings[0].duration_s)
+    unknown = Campaign.of([*recordings[:3], started(recordings[3], None)])
+    assert all("campaign_time_s" not in recording for recording in unknown.timed())
+
+
+def test_a_model_of_warm_up_is_fitted_on_the_campaign_and_runs_live():
+    kind = effect("friction.warmup.campaign")
+    made = [
+        recording.with_columns(
+            made_torque_n_m=0.02
+            * np.exp(-recording["campaign_time_s"] / 120.0)
+            * np.tanh(np.gradient(recording["motor_angle_rad"], recording.time_s) / 2.0)
+        )
+        for recording in runs()
+    ]
+    bare = [started(recording, 60.0 * k) for k, recording in enumerate(made)]
+    declared = Model("warm-up", "motor", "made_torque_n_m", (Term(kind),), run_offsets=False)
+    fitted = fit(declared, Campaign.of(bare), every=20, bootstrap=0)
+    assert fitted.terms[0].values["time"].value == pytest.approx(120.0, rel=0.05)
+    live = Stream(fitted, 1000.0)
+    assert live.channels == ("motor_angle_rad",)
+    first = made[0]  # the campaign's clock starts with it, as the live one with its first sample
+    there = {name: first[name] for name in live.channels}
+    steps = [
+        live.step(first.time_s[part], {name: values[part] for name, values in there.items()})
+        for part in (slice(0, 1), slice(1, 700), slice(700, None))
+    ]
+    offline = predict(fitted, first, causal=True)
+    assert np.concatenate(steps) == pytest.approx(offline, rel=1e-9, abs=1e-12)
+
+
+def test_a_change_between_runs_is_found_by_the_diagnosis():
+    def rubs(motor_rad, speed_rad_s, load_n_m):
+        return 0.01 * np.tanh(speed_rad_s / 3.0)
+
+    recordings = []
+    for k in range(12):
+        run = synthetic.run(
+            f"run{k:02d}",
+            0.2 + 0.15 * (k % 3),
+            0.05 * (1 + k // 3),
+            seed=k,
+            seconds=4.0,
+            extra=rubs if k >= 5 else None,
+        )
+        recordings.append(started(run, 60.0 * k))
+    motor = model_file.read(Path("motor"))
+    sealed = split(recordings, 1)
+    diagnosis, _ = diagnose(recordings, [motor], sealed, gates=Gates(surrogates=59))
+    assert [finding.family for finding in diagnosis.findings] == ["change.step"]
+    (finding,) = diagnosis.findings
+    assert 240 < finding.parameters["since"].value <= 300
+    assert finding.rmse_after < 0.5 * finding.rmse_before
