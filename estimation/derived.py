@@ -27,7 +27,7 @@ from estimation.filters import (
     holoborodko_derivative,
 )
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SLOWEST_RAD_S, in_motion
+from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -125,7 +125,7 @@ def _travel(values: FloatArray, window: int) -> FloatArray:
 
 
 def settled_places(
-    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
 ) -> NDArray[np.intp]:
     """Return the places of every n-th sample that is valid and away from the ends of its run.
 
@@ -135,25 +135,27 @@ def settled_places(
         channels: Filtered channels of one whole run.
         low_pass: The filter they went through.
         step: Keep every n-th sample.
-        moving_only: Leave out samples at rest too, as the speeds among the channels say.
+        samples: Which samples; whether one moves is told by the speeds among the channels.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
     inner[:edge] = False
     inner[max(len(inner) - edge, 0) :] = False
-    if moving_only:
+    if samples == "motion":
         valid = inner.copy()
         for speed, slowest in SLOWEST_RAD_S.items():
             if speed in channels:
                 inner &= in_motion(channels[speed], valid, channels.sample_rate_hz, slowest)
+    if samples == "closing":
+        inner &= closing(channels[SPINDLE_SPEED], channels.sample_rate_hz)
     return np.flatnonzero(inner)[::step]
 
 
 def settled(
-    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
 ) -> Recording:
     """Return the samples of `settled_places` alone; an effect with memory needs the whole run."""
-    return channels.at(settled_places(channels, low_pass, step, moving_only))
+    return channels.at(settled_places(channels, low_pass, step, samples))
 
 
 def zero_phase_channels(

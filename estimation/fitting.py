@@ -135,7 +135,7 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]
     for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
-        places = settled_places(whole, model.low_pass, step, model.has_friction)
+        places = settled_places(whole, model.low_pass, step, model.samples)
         if places.size:
             runs.append(_Run(whole, places, whole.at(places)))
     if not runs:

@@ -67,6 +67,7 @@ class Effect(ABC):
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
     """
 
     id: ClassVar[str]
@@ -77,6 +78,7 @@ class Effect(ABC):
     shape: ClassVar[tuple[Parameter, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Let the family be the id where none is stated."""

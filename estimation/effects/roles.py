@@ -31,6 +31,7 @@ _MOTION = {
     "motor_angle": ("motor_angle_rad",),
     "output_angle": ("spindle_angle_rad",),
     "current": ("motor_current_a",),
+    "drive": ("motor_current_a",),
     "temperature": ("motor_temperature_k",),
     "clock": ("time_s",),
     "elapsed": ("time_s", "campaign_time_s"),

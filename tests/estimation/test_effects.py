@@ -180,7 +180,7 @@ def test_what_it_may_be_confused_with_exists(kind):
 
 def test_every_family_of_a_diagnosis_has_an_effect():
     found = {k.family for k in catalogue().values() if k.balances}
-    assert found == set(FAMILIES) - {UNKNOWN, "compliance.link"}
+    assert found == set(FAMILIES) - {UNKNOWN}
 
 
 WIDE = LowPass(cutoff_hz=400.0)
