@@ -52,7 +52,7 @@ class BoucWen(Remembering):
     """
 
     id = "hysteresis.bouc_wen"
-    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "half the height of the loop", lower=0.0),)
     shape = (

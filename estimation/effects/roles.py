@@ -80,7 +80,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
         "encoder": ("spindle_angle_rad", "jaw_angle_rad"),
-        "stop": ("jaw_angle_rad",),
+        "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION
     | {

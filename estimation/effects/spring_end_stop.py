@@ -19,10 +19,10 @@ class EndStop(Pointwise):
     """
 
     id = "spring.end_stop"
-    balances: ClassVar = {"cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"stop": "jaw_angle_rad"}
     amplitudes = (Parameter("stiffness", "target / stop", "torque a radian beyond", lower=0.0),)
-    shape = (Parameter("onset", "stop", "angle at which it is met", 0.6, 2.6, True, 41),)
+    shape = (Parameter("onset", "stop", "angle at which it is met", -0.7, 2.5, True, 41),)
     confused_with = ("spring.position", "gravity.payload", "transmission.stiffening")
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 

@@ -20,7 +20,7 @@ class OpenEndStop(Pointwise):
 
     id = "spring.end_stop.opening"
     family = "spring.end_stop"
-    balances: ClassVar = {"cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"stop": "jaw_angle_rad"}
     amplitudes = (Parameter("stiffness", "target / stop", "torque a radian beyond", lower=0.0),)
     shape = (Parameter("onset", "stop", "angle at which it is met", -2.6, 0.6, True, 41),)
