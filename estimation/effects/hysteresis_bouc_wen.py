@@ -7,8 +7,8 @@ import numba
 from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
-STEP, STEPS = 0.05, 200
-"""Longest piece of a path integrated at once, in reaches, and most pieces; ten reaches sate it."""
+STEP, SATED = 0.05, 8.0
+"""Longest piece of a path integrated at once, and a path after which it slides, in reaches."""
 
 
 @numba.njit(cache=True)
@@ -20,8 +20,10 @@ def slope(z: float, way: float, sharpness: float) -> float:
 @numba.njit(cache=True)
 def follow(z: float, moved: float, sharpness: float) -> float:
     """Return z after a path without reversal, `moved` in reaches (midpoint rule)."""
-    pieces = min(int(abs(moved) / STEP) + 1, STEPS)
-    piece = min(max(moved, -STEP * STEPS), STEP * STEPS) / pieces
+    if abs(moved) > SATED:
+        return 1.0 if moved > 0.0 else -1.0
+    pieces = int(abs(moved) / STEP) + 1
+    piece = moved / pieces
     for _ in range(pieces):
         middle = z + 0.5 * piece * slope(z, piece, sharpness)
         z = min(max(z + piece * slope(middle, piece, sharpness), -1.0), 1.0)
@@ -50,7 +52,7 @@ class BoucWen(Remembering):
     """
 
     id = "hysteresis.bouc_wen"
-    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "half the height of the loop", lower=0.0),)
     shape = (

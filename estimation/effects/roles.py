@@ -50,7 +50,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "creeping": (MOTOR_LOAD,),
         "other_reading": ("jaw_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
     "gearbox": _MOTION
@@ -88,7 +88,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("motor_current_a",),
         "other_reading": ("spindle_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("spindle_angle_rad",),
     },
 }

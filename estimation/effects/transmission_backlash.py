@@ -19,7 +19,7 @@ class Backlash(Pointwise):
     """
 
     id = "transmission.backlash"
-    balances: ClassVar = {"gearbox": 1, "stretch": 1}
+    balances: ClassVar = {"gearbox": 1, "stretch": -1}
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("gap", "target", "half the play", lower=0.0),)
     shape = (
