@@ -20,7 +20,7 @@ from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SLOWEST_RAD_S, SPEED, in_motion
+from estimation.rest import SLOWEST_RAD_S, SPEED, SPINDLE_SPEED, closing, in_motion
 
 WITH_FRICTION = ("motor", "cable", "grasp")
 """Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
@@ -101,8 +101,11 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
     moving = np.ones(len(valid), bool)
-    for speed in speeds:
-        moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
+    if model.counted == "closing":
+        moving = closing(channels[SPINDLE_SPEED], rate_hz)
+    else:
+        for speed in speeds:
+            moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
     run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
@@ -114,8 +117,10 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
 
 
 def _friction_speeds(model: Model, recording: Recording) -> list[str]:
-    """Return the speeds that tell when a balance with friction is at rest; none without."""
-    if model.balance not in WITH_FRICTION:
+    """Return the speeds that tell which samples count; none where all do."""
+    if model.counted == "closing":
+        return [SPINDLE_SPEED]
+    if model.counted == "all" or model.balance not in WITH_FRICTION:
         return []
     own = [channel for channel in model.channels if channel in SLOWEST_RAD_S]
     return own or ([SPEED] if "motor_angle_rad" in recording else [])
