@@ -82,6 +82,10 @@ class Term:
         )
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to other processes: a view of a mapping does not."""
+        return Term, (self.effect, self.sign, dict(self.channels), dict(self.values))
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters of the effect: the amplitudes, then the shape."""

@@ -26,6 +26,9 @@ def diagnose(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first answer in seconds, without simulated twins.")
+    ] = False,
     ledger: Annotated[
         Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
     ] = None,
@@ -64,6 +67,7 @@ def diagnose(
             seed=seed,
             format_name=format_,
             executor=executor,
+            quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),
         )
     for line in sentences(done.diagnosis):

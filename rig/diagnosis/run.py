@@ -12,6 +12,7 @@ from estimation.diagnosis.split import Sealed, evidence, split
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.twins import Twins, twins_of
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 
@@ -73,6 +74,7 @@ def run_diagnosis(
     seed: int = 0,
     format_name: str | None = None,
     executor: Executor | None = None,
+    quick: bool = False,
     on_stage: Stage = lambda _: None,
 ) -> Diagnosed:
     """Diagnose declared models on the recordings of a path.
@@ -84,6 +86,7 @@ def run_diagnosis(
         seed: Seed of the split and of everything random.
         format_name: Importer to use; guessed when None.
         executor: Runs work in parallel.
+        quick: A first answer, held against surrogates only, without simulated twins.
         on_stage: Told what begins.
 
     Raises:
@@ -95,16 +98,27 @@ def run_diagnosis(
     recordings = evidence(open_campaign(path, format_name))
     sealed = split(recordings, seed)
     seen = ledger.seen(recordings, sealed)
+    twins = Twins(None) if quick else _twins(recordings, models, sealed, on_stage)
     diagnosis, stories = diagnose(
         recordings,
         models,
         sealed,
         executor=executor,
+        twins=twins.makers,
         on_stage=on_stage,
         on_open=lambda: ledger.write(recordings, sealed),
     )
     notes = diagnosis.notes
+    if twins.note:
+        notes = (*notes, twins.note)
     if seen:
         notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
     diagnosis = replace(diagnosis, exploratory=bool(seen), notes=notes)
     return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)
+
+
+def _twins(
+    recordings: list[Recording], models: list[Model], sealed: Sealed, on_stage: Stage
+) -> Twins:
+    on_stage("building the simulated twin of the declared models")
+    return twins_of(models, [r for r in recordings if r.name in sealed.discover])

@@ -6,8 +6,8 @@ of the method: the null of a parametric bootstrap (Efron and Tibshirani, "An Int
 Bootstrap", 1993, chapter 6).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class Reference:
         start_rad: Where the spindle stood at the first sample.
         started_at_ns: Start of the run, or None.
         instrument: Identity of the instrument.
+        others: Recorded channels that no plant simulates, such as a temperature; twins share them.
     """
 
     plan: RunPlan
@@ -59,6 +60,7 @@ class Reference:
     start_rad: float
     started_at_ns: int | None
     instrument: Instrument
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +161,7 @@ def reference_of(run: Recording) -> Reference:
         start_rad=float(run["spindle_angle_rad"][0]),
         started_at_ns=run.started_at_ns,
         instrument=run.instrument,
+        others={name: values for name, values in run.columns.items() if name not in NEEDED},
     )
 
 
@@ -180,7 +183,7 @@ def simulate(
     return Recording(
         reference.plan.name,
         reference.time_s,
-        {name: values[logged] for name, values in played.items()},
+        {**reference.others, **{name: values[logged] for name, values in played.items()}},
         flags=reference.flags,
         conditions=reference.plan.conditions,
         rig="simulated twin",
