@@ -12,7 +12,9 @@ from estimation.diagnosis.split import Sealed, evidence, split
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.twins import Twins, twins_of
+from rig.diagnosis.noise import noise_floors
+from rig.diagnosis.propose import propose
+from rig.diagnosis.twins import twins_of
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 
@@ -96,15 +98,16 @@ def run_diagnosis(
     """
     on_stage("reading the recordings")
     recordings = evidence(open_campaign(path, format_name))
-    sealed = split(recordings, seed)
+    sealed = split(recordings, seed, ledger.known(recordings))
     seen = ledger.seen(recordings, sealed)
-    twins = Twins(None) if quick else _twins(recordings, models, sealed, on_stage)
+    on_stage("building the simulated twin of the declared models")
+    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     diagnosis, stories = diagnose(
         recordings,
         models,
         sealed,
         executor=executor,
-        twins=twins.makers,
+        twins=None if quick else twins.makers,
         on_stage=on_stage,
         on_open=lambda: ledger.write(recordings, sealed),
     )
@@ -113,12 +116,12 @@ def run_diagnosis(
         notes = (*notes, twins.note)
     if seen:
         notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
-    diagnosis = replace(diagnosis, exploratory=bool(seen), notes=notes)
+    on_stage("looking for the experiment that tells rivals apart")
+    diagnosis = replace(
+        diagnosis,
+        exploratory=bool(seen),
+        notes=notes,
+        noise_floor=noise_floors(stories, recordings),
+        next_experiment=propose(diagnosis, stories, recordings, twins.twin),
+    )
     return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)
-
-
-def _twins(
-    recordings: list[Recording], models: list[Model], sealed: Sealed, on_stage: Stage
-) -> Twins:
-    on_stage("building the simulated twin of the declared models")
-    return twins_of(models, [r for r in recordings if r.name in sealed.discover])

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 
 from estimation import model_file
 from estimation.campaign import Campaign
-from estimation.diagnosis.twin import Twin
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.errors import RigError
-from rig.simulation.twin import build_twin
+from rig.simulation.twin import Twin, build_twin
 
 PLAYED = ("motor", "gearbox", "cable", "stretch")
 """Balances of the simulated rig's own parts."""

@@ -77,6 +77,22 @@ class Twin:
     sensors: SensorParameters
     references: tuple[Reference, ...]
 
+    def play(self, plan: RunPlan, seed: int) -> Recording:
+        """Return one simulated run of another plan: the same rig, another motion and load."""
+        size = plan.target_angle_rad.size
+        first = self.references[0]
+        reference = Reference(
+            plan=plan,
+            time_s=np.arange(size) / SAMPLE_RATE_HZ,
+            tick=np.arange(size),
+            flags=np.zeros(size, np.uint8),
+            start_rad=float(plan.target_angle_rad[0]),
+            started_at_ns=None,
+            instrument=first.instrument,
+            others={name: np.full(size, x.mean()) for name, x in first.others.items()},
+        )
+        return simulate(reference, self.plant, self.sensors, seed)
+
     def __call__(self, seed: int) -> tuple[Recording, ...]:
         """Return one campaign's recordings; the same seed gives the same samples."""
         return tuple(
