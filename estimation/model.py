@@ -134,6 +134,8 @@ class Evidence:
         rmse: Root mean square error with each run's mean error removed, in the target's unit.
         rmse_with_means: The same with the means left in.
         seed: Seed of the bootstrap behind the spreads.
+        run_spread: Standard deviation over runs of the logarithm of a run's error, None where a
+            single run was fitted or the file does not tell.
     """
 
     runs: tuple[str, ...]
@@ -141,6 +143,7 @@ class Evidence:
     rmse: float
     rmse_with_means: float
     seed: int
+    run_spread: float | None = None
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def run_loop(
         raise UsageError(
             f"{config.name} is a real rig, and the loop moves a simulated one.",
             "Nobody would stand by while it chooses its own experiments.",
-            "Use `rig record`, `rig diagnose --protocol-out FILE` and `rig record --protocol FILE`.",
+            "Use `rig diagnose --protocol-out FILE`, then `rig record --protocol FILE`.",
         )
     if folder.exists() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty.", fix="Name another folder with --out.")
