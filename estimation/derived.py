@@ -1,9 +1,10 @@
 """Channels that are computed: speeds, accelerations, the twist of the gearbox.
 
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
-and second derivative of `X_angle_rad`; `X_travel_rad` is how far that angle has come since its
-lowest value of the last `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal;
-`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
+and second derivative of `X_angle_rad`, `X_rate_n_m_s` is the first of `X_n_m`; `X_travel_rad` is
+how far that angle has come since its lowest value of the last `TRAVEL_WINDOW_S`, the state of
+hysteresis after a reversal; `gearbox_differential_rad` is the motor's angle behind the gear ratio
+less the spindle's;
 `motor_load_n_m` is the spindle's torque projected from the current. Offline they come from a
 zero-phase filter and a noise-robust derivative, live from a causal filter and backward differences:
 the same names, two sources.
@@ -25,7 +26,7 @@ from estimation.filters import (
     holoborodko_derivative,
 )
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPEED, in_motion
+from estimation.rest import SLOWEST_RAD_S, in_motion
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -42,6 +43,7 @@ LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
 
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
+RATE = "_rate_n_m_s"
 
 TRAVEL_WINDOW_S = 0.5
 """How far back a travel looks, s. Longer memory could tell which run it is in."""
@@ -73,6 +75,8 @@ def _differentiated(name: str) -> tuple[str, int]:
     for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
         if name.endswith(suffix):
             return name.removesuffix(suffix) + "_angle_rad", times
+    if name.endswith(RATE):
+        return name.removesuffix(RATE) + "_n_m", 1
     return name, 0
 
 
@@ -125,14 +129,17 @@ def settled_places(
         channels: Filtered channels of one whole run.
         low_pass: The filter they went through.
         step: Keep every n-th sample.
-        moving_only: Leave out samples at rest too, where the motor's speed is among the channels.
+        moving_only: Leave out samples at rest too, as the speeds among the channels say.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
     inner[:edge] = False
     inner[max(len(inner) - edge, 0) :] = False
-    if moving_only and SPEED in channels:
-        inner &= in_motion(channels[SPEED], inner, channels.sample_rate_hz)
+    if moving_only:
+        valid = inner.copy()
+        for speed, slowest in SLOWEST_RAD_S.items():
+            if speed in channels:
+                inner &= in_motion(channels[speed], valid, channels.sample_rate_hz, slowest)
     return np.flatnonzero(inner)[::step]
 
 

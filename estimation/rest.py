@@ -14,24 +14,31 @@ from estimation.recording import FloatArray
 SPEED = "motor_velocity_rad_s"
 """The cleanest speed there is."""
 
-REST_SHARE, REST_RAD_S, REST_REACH_S = 0.05, 0.7, 0.02
-"""At rest is: slower than this share of the run's 95th percentile of speed or than this speed of
-the motor, and what is this near to it. The share grows with what the filter smears at a reversal.
-"""
+SLOWEST_RAD_S = {SPEED: 0.7, "spindle_velocity_rad_s": 0.02}
+"""Speeds that friction goes with, and below which each is at rest. While the gearbox winds up the
+motor turns and the spindle stands: a balance is at rest when the speed of its own friction is."""
+
+REST_SHARE, REST_REACH_S = 0.05, 0.02
+"""At rest is also: slower than this share of the run's 95th percentile of speed, and what is this
+near to rest. The share grows with what the filter smears at a reversal."""
 
 
 def in_motion(
-    speed: FloatArray, valid: NDArray[np.bool_], sample_rate_hz: float
+    speed: FloatArray,
+    valid: NDArray[np.bool_],
+    sample_rate_hz: float,
+    slowest_rad_s: float = SLOWEST_RAD_S[SPEED],
 ) -> NDArray[np.bool_]:
     """Return which samples of a run are away from rest, shape (n,).
 
     Args:
-        speed: Filtered speed of the motor, rad/s, shape (n,).
+        speed: Filtered speed, rad/s, shape (n,).
         valid: Samples whose speed can be trusted, shape (n,).
         sample_rate_hz: Rate of the samples.
+        slowest_rad_s: Speed below which it is at rest; the motor's unless stated.
     """
     size = np.abs(speed)
     usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
-    rest = (size < max(REST_RAD_S, REST_SHARE * usual)).astype(np.uint8)
+    rest = (size < max(slowest_rad_s, REST_SHARE * usual)).astype(np.uint8)
     reach = 2 * round(REST_REACH_S * sample_rate_hz) + 1
     return np.asarray(ndimage.maximum_filter1d(rest, reach) == 0)

@@ -1,6 +1,7 @@
 """Candidates: each effect of the catalogue at each point of its shape's grid, set in a balance."""
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -141,7 +142,7 @@ def pool(model: Model, measured: Collection[str]) -> list[Candidate]:
 def grid(kind: Effect) -> Iterator[tuple[float, ...]]:
     """Walk the grid of an effect's shape; one empty point for an effect without shape."""
     points = [[float(x) for x in p.grid()] for p in kind.shape]
-    if len(points) > 1:
+    if math.prod(map(len, points)) > MOST_TOGETHER and len(points) > 1:
         most = max(3, int(MOST_TOGETHER ** (1 / len(points))))
         points = [_spread(values, most) for values in points]
     return itertools.product(*points)
