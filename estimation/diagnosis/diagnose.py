@@ -440,5 +440,4 @@ def _notes(
         for name, story in stories.items()
         for what in story.refused
     ]
-    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
     return notes

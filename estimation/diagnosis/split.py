@@ -5,7 +5,7 @@ runs are sorted by what was held constant and every stratum of neighbours gives 
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,12 +49,16 @@ class Sealed:
         return len(self.discover) >= LEAST_TO_NAME
 
 
-def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
+def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()) -> Sealed:
     """Choose the confirm runs, stratified over the conditions.
+
+    Where there are enough new runs beside those of earlier diagnoses, only new ones confirm: a run
+    proves something once.
 
     Args:
         recordings: Runs that count as evidence, three at least.
         seed: Seed of the choice inside each stratum.
+        seen: Names of runs that an earlier diagnosis held.
 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
@@ -66,7 +70,8 @@ def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
             "Some runs must find an effect, and others, never touched, confirm it.",
             f"Record {SHARE} runs at least; to name an effect, eight.",
         )
-    ordered = sorted(recordings, key=_place)
+    new = [recording for recording in recordings if recording.name not in seen]
+    ordered = sorted(new if len(new) >= SHARE else recordings, key=_place)
     random = np.random.default_rng(seed)
     confirm = set()
     for start in range(0, len(ordered) - SHARE + 1, SHARE):
@@ -80,14 +85,17 @@ def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
 
 def data_hash(recordings: Sequence[Recording]) -> str:
     """Return SHA-256 over the runs' names and samples, in the order of their names."""
-    digest = hashlib.sha256()
-    for recording in sorted(recordings, key=lambda r: r.name):
-        digest.update(f"{recording.name}\0{len(recording)}\0".encode())
-        digest.update(recording.time_s.tobytes())
-        digest.update(recording.flags.tobytes())
-        for name in sorted(recording.columns):
-            digest.update(name.encode())
-            digest.update(recording.columns[name].tobytes())
+    ordered = sorted(recordings, key=lambda r: r.name)
+    return _hash(*(part for r in ordered for part in (r.name, samples_hash(r))))
+
+
+def samples_hash(recording: Recording) -> str:
+    """Return SHA-256 over one run's samples, whatever the run is called."""
+    digest = hashlib.sha256(recording.time_s.tobytes())
+    digest.update(recording.flags.tobytes())
+    for name in sorted(recording.columns):
+        digest.update(name.encode())
+        digest.update(recording.columns[name].tobytes())
     return digest.hexdigest()
 
 

@@ -42,6 +42,7 @@ def live(
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
+    from rig.live.watching import watched
     from rig.logger import open_logger
     from rig.protocol import load_protocol
     from rig.trajectory import SAMPLE_RATE_HZ
@@ -55,6 +56,8 @@ def live(
     blocks = session_blocks(
         settings, lambda: open_logger(settings, pace=pace or None), plans, estimator
     )
+    if estimator is not None:
+        blocks = watched(blocks, estimator.model)
     options = ShowOptions(
         title=f"rig live: {settings.name}",
         channels=(estimator.target_channel if estimator else "distal_torque_n_m",),

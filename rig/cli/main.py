@@ -13,6 +13,7 @@ from rig.cli.diagnose import diagnose
 from rig.cli.fit import fit
 from rig.cli.live import live
 from rig.cli.log import log_app
+from rig.cli.loop import loop
 from rig.cli.record import record
 from rig.cli.replay import replay
 from rig.cli.study import study_app
@@ -36,6 +37,7 @@ app.command()(replay)
 app.command()(fit)
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(loop)
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
 

@@ -12,6 +12,9 @@ from estimation.diagnosis.split import Sealed, evidence, split
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.noise import noise_floors
+from rig.diagnosis.propose import propose
+from rig.diagnosis.twins import twins_of
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 
@@ -75,6 +78,7 @@ def run_diagnosis(
     seed: int = 0,
     format_name: str | None = None,
     executor: Executor | None = None,
+    quick: bool = False,
     on_stage: Stage = lambda _: None,
 ) -> Diagnosed:
     """Diagnose declared models on the recordings of a path.
@@ -86,6 +90,7 @@ def run_diagnosis(
         seed: Seed of the split and of everything random.
         format_name: Importer to use; guessed when None.
         executor: Runs work in parallel.
+        quick: A first answer, held against surrogates only, without simulated twins.
         on_stage: Told what begins.
 
     Raises:
@@ -95,18 +100,30 @@ def run_diagnosis(
     """
     on_stage("reading the recordings")
     recordings = evidence(open_campaign(path, format_name))
-    sealed = split(recordings, seed)
+    sealed = split(recordings, seed, ledger.known(recordings))
     seen = ledger.seen(recordings, sealed)
+    on_stage("building the simulated twin of the declared models")
+    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     diagnosis, stories = diagnose(
         recordings,
         models,
         sealed,
         executor=executor,
+        twins=None if quick else twins.makers,
         on_stage=on_stage,
         on_open=lambda: ledger.write(recordings, sealed),
     )
     notes = diagnosis.notes
+    if twins.note:
+        notes = (*notes, twins.note)
     if seen:
         notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
-    diagnosis = replace(diagnosis, exploratory=bool(seen), notes=notes)
+    on_stage("looking for the experiment that tells rivals apart")
+    diagnosis = replace(
+        diagnosis,
+        exploratory=bool(seen),
+        notes=notes,
+        noise_floor=noise_floors(stories, recordings),
+        next_experiment=propose(diagnosis, stories, recordings, twins.twin),
+    )
     return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)
