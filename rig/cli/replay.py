@@ -11,6 +11,7 @@ from rig.cli.output import JsonFlag, console
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
+    from rig.live.estimator import ModelEstimator
 
 
 def replay(
