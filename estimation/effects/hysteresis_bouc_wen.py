@@ -7,7 +7,7 @@ import numba
 from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
-STEP, SATED = 0.05, 8.0
+STEP, SATED = 0.5, 8.0
 """Longest piece of a path integrated at once, and a path after which it slides, in reaches."""
 
 
@@ -19,14 +19,18 @@ def slope(z: float, way: float, sharpness: float) -> float:
 
 @numba.njit(cache=True)
 def follow(z: float, moved: float, sharpness: float) -> float:
-    """Return z after a path without reversal, `moved` in reaches (midpoint rule)."""
+    """Return z after a path without reversal, `moved` in reaches (classic Runge-Kutta rule)."""
     if abs(moved) > SATED:
         return 1.0 if moved > 0.0 else -1.0
     pieces = int(abs(moved) / STEP) + 1
     piece = moved / pieces
     for _ in range(pieces):
-        middle = z + 0.5 * piece * slope(z, piece, sharpness)
-        z = min(max(z + piece * slope(middle, piece, sharpness), -1.0), 1.0)
+        first = slope(z, piece, sharpness)
+        second = slope(z + 0.5 * piece * first, piece, sharpness)
+        third = slope(z + 0.5 * piece * second, piece, sharpness)
+        last = slope(z + piece * third, piece, sharpness)
+        z += piece * (first + 2.0 * second + 2.0 * third + last) / 6.0
+        z = min(max(z, -1.0), 1.0)
     return z
 
 
