@@ -8,6 +8,7 @@ from typer.exceptions import TyperException
 
 from rig import __version__
 from rig.cli.cal import cal_app
+from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.fit import fit
@@ -38,6 +39,7 @@ app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
+app.add_typer(config_app, name="config")
 
 
 def _version(wanted: bool) -> None:
