@@ -90,6 +90,43 @@ class LimitsSection(_Section):
     spindle_angle_rad: Angle
 
 
+class SafetySection(_Section):
+    """What is watched besides the limits, by the board first and by this computer again; on always.
+
+    A time or a heat of 0 switches its watch off.
+
+    Attributes:
+        safe_state: What the drive motor does once something tripped: `release`, no current; or
+            `hold`, stay where it stands with a low command, where encoder and current are sound.
+        hold_command_ratio: Largest command while holding, of full scale.
+        continuous_current_a: Motor current that warms the motor no further.
+        heat_a2_s: Heat above it the motor can take: integral of current squared less that squared.
+        stall_current_a: Current above which a motor that stands still is stalled.
+        stall_motor_angle_rad: Motor shaft angle within which it stands still.
+        stall_s: How long it may be stalled.
+        motor_speed_rad_s: Fastest motor shaft.
+        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; none if unset.
+        jaw_open_rad: Jaw angle below which it must not open; none if unset.
+        saturated_s: How long a torque or current sensor may be at the end of its range.
+        stale_s: How long its reading may not change at all.
+        watchdog_s: How long this computer may be silent.
+    """
+
+    safe_state: Literal["release", "hold"] = "release"
+    hold_command_ratio: float = Field(default=0.05, ge=0, le=0.5)
+    continuous_current_a: Current = 0.5
+    heat_a2_s: float = Field(default=0.5, ge=0, le=2000)
+    stall_current_a: Current = 0.55
+    stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
+    stall_s: float = Field(default=1.0, ge=0, le=600)
+    motor_speed_rad_s: float = Field(default=900.0, gt=0, le=20000)
+    jaw_closed_rad: Number | None = None
+    jaw_open_rad: Number | None = None
+    saturated_s: float = Field(default=0.02, ge=0, le=60)
+    stale_s: float = Field(default=0.5, ge=0, le=60)
+    watchdog_s: float = Field(default=0.25, ge=0.005, le=1)
+
+
 class DriftSection(_Section):
     """Largest change of a sensor's zero over a run that passes."""
 
@@ -145,6 +182,7 @@ class Config(_Section):
     logger: LoggerSection
     controller: ControllerSection
     limits: LimitsSection
+    safety: SafetySection = SafetySection()
     drift: DriftSection
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()

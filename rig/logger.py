@@ -19,5 +19,7 @@ def open_logger(config: Config, pace: float | None = None) -> Transport:
         # the plant is compiled code that a session with a real rig does not need
         from rig.simulation.logger import open_simulated_logger
 
-        return open_simulated_logger(config.simulation, config.logger.url, pace)
+        return open_simulated_logger(
+            config.simulation, config.logger.url, pace, config.safety.watchdog_s
+        )
     return open_transport(config.logger.url)

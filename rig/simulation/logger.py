@@ -12,7 +12,10 @@ UNPACED_STEP_S = 0.2
 
 
 def open_simulated_logger(
-    simulation: SimulationSection, url: str = "sim://", pace: float | None = None
+    simulation: SimulationSection,
+    url: str = "sim://",
+    pace: float | None = None,
+    watchdog_s: float = 0.25,
 ) -> SimulatedTransport:
     """Return the transport of a simulated rig.
 
@@ -20,6 +23,7 @@ def open_simulated_logger(
         simulation: Seed, spread, hidden effects, and whether the compiled firmware is in the loop.
         url: Name for messages.
         pace: Virtual seconds a real second, None for as fast as possible.
+        watchdog_s: Patience of the board with a silent host; time moves in smaller steps than that.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
@@ -33,13 +37,13 @@ def open_simulated_logger(
         sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     if uses_firmware(simulation):
-        return _transport(FirmwareBoard(bench), url, pace)
-    return _transport(TeensyFake(bench), url, pace)
+        return _transport(FirmwareBoard(bench), url, pace, watchdog_s)
+    return _transport(TeensyFake(bench), url, pace, watchdog_s)
 
 
-def _transport(board: Board, url: str, pace: float | None) -> SimulatedTransport:
+def _transport(board: Board, url: str, pace: float | None, watchdog_s: float) -> SimulatedTransport:
     # nobody watches a rig that is faster than real time, so it may move in larger steps
-    step_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
+    step_s = min(UNPACED_STEP_S if pace is None else PACED_STEP_S, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace)
 
 
