@@ -4,13 +4,16 @@ from drivers.transport import Transport, open_transport
 from rig.config import Config
 
 
-def open_logger(config: Config, pace: float | None = None) -> Transport:
+def open_logger(
+    config: Config, pace: float | None = None, step_s: float | None = None
+) -> Transport:
     """Return an open transport to the configured logger.
 
     Args:
         config: The configuration.
         pace: Simulated seconds a real second, None for as fast as possible; a real logger has its
             own pace.
+        step_s: Longest simulated time between looks at the logger's output; its own choice if None.
 
     Raises:
         DriverError: The logger cannot be reached.
@@ -20,6 +23,6 @@ def open_logger(config: Config, pace: float | None = None) -> Transport:
         from rig.simulation.logger import open_simulated_logger
 
         return open_simulated_logger(
-            config.simulation, config.logger.url, pace, config.safety.watchdog_s
+            config.simulation, config.logger.url, pace, config.safety.watchdog_s, step_s
         )
     return open_transport(config.logger.url)

@@ -16,6 +16,7 @@ def open_simulated_logger(
     url: str = "sim://",
     pace: float | None = None,
     watchdog_s: float = 0.25,
+    step_s: float | None = None,
 ) -> SimulatedTransport:
     """Return the transport of a simulated rig.
 
@@ -24,6 +25,7 @@ def open_simulated_logger(
         url: Name for messages.
         pace: Virtual seconds a real second, None for as fast as possible.
         watchdog_s: Patience of the board with a silent host; time moves in smaller steps than that.
+        step_s: Longest virtual time between looks at the board; a choice of its own if None.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
@@ -37,13 +39,12 @@ def open_simulated_logger(
         sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     if uses_firmware(simulation):
-        return _transport(FirmwareBoard(bench), url, pace, watchdog_s)
-    return _transport(TeensyFake(bench), url, pace, watchdog_s)
-
-
-def _transport(board: Board, url: str, pace: float | None, watchdog_s: float) -> SimulatedTransport:
+        board: Board = FirmwareBoard(bench)
+    else:
+        board = TeensyFake(bench)
     # nobody watches a rig that is faster than real time, so it may move in larger steps
-    step_s = min(UNPACED_STEP_S if pace is None else PACED_STEP_S, 0.8 * watchdog_s)
+    usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
+    step_s = min(step_s or usual_s, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace)
 
 
