@@ -3,6 +3,9 @@
 from drivers.transport import Transport, open_transport
 from rig.config import Config
 
+PTY_URL = "sim://pty"
+"""The firmware as a process, in real time."""
+
 
 def open_logger(
     config: Config, pace: float | None = None, step_s: float | None = None
@@ -18,6 +21,10 @@ def open_logger(
     Raises:
         DriverError: The logger cannot be reached.
     """
+    if config.logger.url == PTY_URL:
+        from rig.simulation.firmware_process import FirmwareProcess
+
+        return FirmwareProcess()
     if config.is_simulated:
         # the plant is compiled code that a session with a real rig does not need
         from rig.simulation.logger import open_simulated_logger
