@@ -86,7 +86,7 @@ class LimitsSection(_Section):
     proximal_torque_n_m: Torque
     distal_torque_n_m: Torque
     motor_current_a: Current
-    load_command_a: Current
+    load_command_a: float = Field(ge=0, le=60)
     spindle_angle_rad: Angle
 
 
@@ -128,11 +128,11 @@ class SafetySection(_Section):
 
 
 class DriftSection(_Section):
-    """Largest change of a sensor's zero over a run that passes."""
+    """Largest change of a sensor's zero over a run that passes; without a limit none is judged."""
 
-    proximal_torque_n_m: Torque
-    distal_torque_n_m: Torque
-    motor_current_a: Current
+    proximal_torque_n_m: Torque | None = None
+    distal_torque_n_m: Torque | None = None
+    motor_current_a: Current | None = None
 
 
 class InstrumentSection(_Section):
@@ -183,7 +183,7 @@ class Config(_Section):
     controller: ControllerSection
     limits: LimitsSection
     safety: SafetySection = SafetySection()
-    drift: DriftSection
+    drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
     calibration: str = "reference"
@@ -227,6 +227,11 @@ class Config(_Section):
             return base
         refuse_errors(self.calibration_verdicts())
         return compose(base, active_lines(self.store, self.instrument.serial).values())
+
+    @property
+    def drift_limits(self) -> dict[str, float]:
+        """The limits of the zeros' drift, of the channels that have one."""
+        return {name: limit for name, limit in self.drift if limit is not None}
 
     def calibration_verdicts(self) -> list[Verdict]:
         """Return what speaks against the store's active lines now; empty without a store."""

@@ -5,6 +5,7 @@ from functools import partial
 
 from drivers.device import Device
 from drivers.registry import fakes, open_device
+from drivers.teensy.channels import RAW
 from drivers.teensy.device import TeensyDevice
 from drivers.transport.faulty import Faults
 from rig.config import Config, DeviceSection, is_simulated
@@ -28,6 +29,10 @@ def open_section(section: DeviceSection) -> Device:
 
 def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
     """Yield name and a function that opens it, of the logger and of each further device."""
-    yield LOGGER, lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S))
+    counts = {line.counts for line in config.calibration_set().channels.values()}
+    if config.logger.driver == "epos4":
+        counts -= {"current"}  # a drive that is switched off tells no current at all
+    wired = [channel for channel in RAW if channel.field in counts]
+    yield LOGGER, lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired)
     for name, section in config.devices.items():
         yield name, partial(open_section, section)

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
-from drivers.errors import DriverError
+from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity
+from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Trip
 from drivers.transport.transport import Transport
+from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
 from rig.interrupts import leaving_safely
@@ -63,6 +64,7 @@ class Session:
         self._spindle_angle_rad = 0.0
         self._watch: HostWatch | None = None
         self.newest_tick_us = 0
+        self.companions: list[Companion] = []
         self.clock = ClockFit()
         """The logger's clock against this computer's; its line states the residual of the fit."""
 
@@ -71,7 +73,12 @@ class Session:
             ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
+            self.companions = open_companions(self.config)
+            for companion in self.companions:
+                ways_out.callback(companion.device.close)
             ways_out.callback(self._stop_streaming)
+            for companion in self.companions:
+                companion.begin(self._transport.now_s)
             self._logger.start()
             self._ways_out = ways_out.pop_all()
         return self
@@ -154,7 +161,7 @@ class Session:
         while played < targets.size:
             while queued < min(played + lead, targets.size):
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
-                self._logger.queue(targets[block], loads_ma[block])
+                self._queue(targets[block], loads_ma[block])
                 queued = block.stop
             reading = self._read()
             reading = with_setpoints(reading, played, targets.size, newest_sequence)
@@ -182,6 +189,8 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
+        for companion in self.companions:
+            companion.poll(self._transport.now_s)
         if self._first_tick_us is None:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
@@ -197,6 +206,17 @@ class Session:
             self.safe()
             raise
         return reading
+
+    def _queue(self, targets: NDArray[np.int32], loads_ma: NDArray[np.int32]) -> None:
+        """Queue setpoints; a board that has tripped since it was read says over what."""
+        try:
+            self._logger.queue(targets, loads_ma)
+        except CommandRefusedError as error:
+            report = self._logger.trip()
+            if report.code is Trip.NONE:
+                raise
+            state = "It is in its safe state, until armed again."
+            raise trip_error(report, self.calibrations, state) from error
 
     def _require_no_trip(self, reading: Reading) -> None:
         """Look for what the board itself tripped over.

@@ -40,6 +40,7 @@ from drivers.teensy.guard import (
 from drivers.teensy.protocol import (
     SAMPLE_DTYPE,
     STATUS_ARMED,
+    STATUS_HOLDING,
     STATUS_LIMIT_TRIPPED,
     STATUS_QUEUE_DRY,
     STATUS_SATURATED,
@@ -153,6 +154,17 @@ class TeensyFake:
                 block = ticks
             self._run_block(block)
             ticks -= block
+
+    @property
+    def in_force(self) -> bool:
+        """Whether the motors are, or may any moment be, given current."""
+        return bool(self._state & (STATUS_ARMED | STATUS_HOLDING))
+
+    def skip(self, ticks: int) -> None:
+        """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
+        self._targets, self._loads = self._targets[ticks:], self._loads[ticks:]
+        self._sequence = (self._sequence + ticks) % 2**32
+        self._next_tick_us = (self._next_tick_us + ticks * TICK_US) % 2**32
 
     # commands
 

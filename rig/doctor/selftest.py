@@ -76,7 +76,7 @@ def _zero_drift(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     before = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
     _read(logger, APART_S)
     after = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
-    drifts = drift_verdicts(before, after, calibrations, config.drift.model_dump())
+    drifts = drift_verdicts(before, after, calibrations, config.drift_limits)
     detail = ", ".join(f"{d.channel} {d.after - d.before:+.2g} {d.unit}" for d in drifts)
     return all(d.passes for d in drifts), f"in {APART_S:g} s: {detail or 'no tared channel'}"
 

@@ -30,13 +30,7 @@ def open_simulated_logger(
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
     """
-    effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
-    if simulation.draw_hidden is not None:
-        effects.append(hidden.draw(simulation.draw_hidden))
-    plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
-    if simulation.spread:
-        plant = parameters.vary(plant, simulation.seed, simulation.spread)
-        sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
+    plant, sensors, effects = plant_and_sensors(simulation)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     if uses_firmware(simulation):
         board: Board = FirmwareBoard(bench)
@@ -46,6 +40,24 @@ def open_simulated_logger(
     usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
     step_s = min(step_s or usual_s, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace)
+
+
+def plant_and_sensors(
+    simulation: SimulationSection,
+) -> tuple[parameters.PlantParameters, parameters.SensorParameters, list[hidden.HiddenEffect]]:
+    """Return the plant, the sensors and the hidden effects of a simulated rig.
+
+    Raises:
+        UnknownHiddenEffectError: A hidden effect has no such name.
+    """
+    effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
+    if simulation.draw_hidden is not None:
+        effects.append(hidden.draw(simulation.draw_hidden))
+    plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
+    if simulation.spread:
+        plant = parameters.vary(plant, simulation.seed, simulation.spread)
+        sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
+    return plant, sensors, effects
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:
