@@ -7,6 +7,7 @@ like a large one, and a single odd run is not.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ class ResidualWatch:
         self._least_spread = least_spread
         self._learnt: list[float] = []
         self._sum = 0.0
-        self._rising: str | None = None
+        self._rising: list[tuple[str, float]] = []
         self._since: str | None = None
 
     def see(self, recording: Recording) -> Sight | None:
@@ -89,12 +90,9 @@ class ResidualWatch:
             return Sight(recording.name, error, None, 0.0, None)
         worse = min((math.log(error / usual)) / max(spread, self._least_spread), MOST)
         self._sum = max(0.0, self._sum + worse - SLACK)
-        if self._sum == 0.0:
-            self._rising = None
-        elif self._rising is None:
-            self._rising = recording.name
+        self._rising = [*self._rising, (recording.name, worse)] if self._sum > 0.0 else []
         if self._sum > LIMIT and self._since is None:
-            self._since = self._rising
+            self._since = _begin(self._rising)
         return Sight(recording.name, error, usual, self._sum, self._since)
 
     def _usual(self) -> tuple[float | None, float]:
@@ -107,6 +105,15 @@ class ResidualWatch:
             return None, 0.0
         logs = np.log(self._learnt)
         return float(np.exp(logs.mean())), float(logs.std(ddof=1))
+
+
+def _begin(rising: Sequence[tuple[str, float]]) -> str:
+    """Return the run at which a step in the error explains most of it, in least squares."""
+    errors = np.array([worse for _, worse in rising])
+    after = np.cumsum(errors[::-1])[::-1]
+    lengths = np.arange(len(errors), 0, -1)
+    gain = np.where(after > 0, after**2 / lengths, 0.0)
+    return rising[int(np.argmax(gain))][0]
 
 
 def run_error(model: Model, recording: Recording) -> float | None:

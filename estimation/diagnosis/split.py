@@ -63,7 +63,7 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
     """
-    _check_one_rig(recordings)
+    check_one_rig(recordings)
     if len(recordings) < SHARE:
         raise SplitError(
             f"{len(recordings)} runs are too few to diagnose.",
@@ -80,7 +80,12 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     data = data_hash(recordings)
     kept = tuple(n for n in names if n not in confirm)
     held = tuple(n for n in names if n in confirm)
-    return Sealed(kept, held, seed, data, _hash(data, *kept, "|", *held))
+    return Sealed(kept, held, seed, data, seal(data, kept, held))
+
+
+def seal(data: str, discover: Sequence[str], confirm: Sequence[str]) -> str:
+    """Return SHA-256 over the data's hash and both lists."""
+    return _hash(data, *discover, "|", *confirm)
 
 
 def data_hash(recordings: Sequence[Recording]) -> str:
@@ -117,7 +122,7 @@ def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
     return (*keys, ("~name", 0, 0.0, recording.name))
 
 
-def _check_one_rig(recordings: Sequence[Recording]) -> None:
+def check_one_rig(recordings: Sequence[Recording]) -> None:
     """Raise when the runs come from different rigs or instruments."""
     for what, found in (
         ("rigs", {r.rig for r in recordings}),

@@ -37,6 +37,7 @@ def live(
     without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
     """
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.live.estimator import ModelEstimator
     from rig.live.options import ShowOptions
     from rig.live.run import show
@@ -48,8 +49,9 @@ def live(
     from rig.trajectory import SAMPLE_RATE_HZ
 
     settings = load_config(config)
+    refuse_problems(settings)
     if protocol is None and settings.is_simulated:
-        protocol = "quick"
+        protocol = "quick" if settings.limits.load_command_a else "unloaded"
     plans = load_protocol(protocol).plans() if protocol else []
     model_path = model or settings.model_path
     estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None

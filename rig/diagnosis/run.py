@@ -7,6 +7,7 @@ from pathlib import Path
 
 from estimation import model_file
 from estimation.diagnosis.diagnose import Story, diagnose
+from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import Sealed, evidence, split
 from estimation.model import Model
@@ -99,9 +100,13 @@ def run_diagnosis(
         EstimationError: Nothing can be decided; says why.
     """
     on_stage("reading the recordings")
-    recordings = evidence(open_campaign(path, format_name))
-    sealed = split(recordings, seed, ledger.known(recordings))
-    seen = ledger.seen(recordings, sealed)
+    whole = evidence(open_campaign(path, format_name))
+    known = ledger.known(whole)
+    if len(whole) == PATHS:
+        recordings, sealed = split_paths(whole, seed, known)
+    else:
+        recordings, sealed = whole, split(whole, seed, known)
+    seen = tuple(name for name in sealed.confirm if path_of(name) in known)
     on_stage("building the simulated twin of the declared models")
     twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     diagnosis, stories = diagnose(
@@ -111,9 +116,11 @@ def run_diagnosis(
         executor=executor,
         twins=None if quick else twins.makers,
         on_stage=on_stage,
-        on_open=lambda: ledger.write(recordings, sealed),
+        on_open=lambda: ledger.write(whole, sealed),
     )
     notes = diagnosis.notes
+    if len(whole) == PATHS:
+        notes = (claim(sealed), *notes)
     if twins.note:
         notes = (*notes, twins.note)
     if seen:
