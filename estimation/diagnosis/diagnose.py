@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from estimation.campaign import Campaign, with_campaign_time
+from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, prepare
@@ -133,6 +134,7 @@ def diagnose(
             failed[model.balance] = error
     if failed and not stories:
         raise next(iter(failed.values()))
+    discovering = [r for r in recordings if r.name in sealed.discover]
     on_stage("opening the confirm runs")
     on_open()
     stories = {name: _confirmed(story, gates) for name, story in stories.items()}
@@ -148,7 +150,7 @@ def diagnose(
         moved={name: _moved(s) for name, s in stories.items()},
         sealed=sealed,
         undecided={name: str(error) for name, error in failed.items()},
-        notes=tuple(_notes(sealed, twins, stories)),
+        notes=(*audit(discovering), *_notes(sealed, twins, stories)),
         seconds=time.monotonic() - began,
     )
     return diagnosis, stories
