@@ -16,6 +16,7 @@ from rig.log.check import logs_in
 from rig.log.container import Attached
 from rig.log.convert import log_times_ns, recording_from_log
 from rig.log.reader import read_log
+from rig.log.recalibrate import ATTACHMENT, carried_calibrations
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
@@ -72,8 +73,7 @@ def read_raw(folder: Path) -> tuple[str, list[Measurement], CalibrationSet]:
         counts = log.topics[COUNTS].rows if COUNTS in log.topics else None
         said = dict(log.run.details["devices"])
         measurements.append(Measurement(recording_from_log(log), counts, said))
-        carried = [a for a in log.attachments if a.name == "calibrations.json"]
-        lines = CalibrationSet.from_json(carried[0].data.decode())
+        lines = carried_calibrations(log)
     if len(kinds) != 1 or lines is None:
         raise UsageError(
             f"{folder} holds {len(kinds) or 'no'} kinds of calibration.",
@@ -95,7 +95,7 @@ def _write(path: Path, kind: str, measurement: Measurement, lines: CalibrationSe
         details={KIND: kind, "rig_version": __version__, "devices": dict(measurement.details)},
     )
     streams = [sample_stream(tuple(recording.columns), round(rate_hz))]
-    attached = [Attached("calibrations.json", "application/json", lines.to_json().encode())]
+    attached = [Attached(ATTACHMENT, "application/json", lines.to_json().encode())]
     expected = {SAMPLE: len(recording)}
     if counts is not None:
         streams.append(COUNTS_STREAM)
