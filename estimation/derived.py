@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from estimation.filters import (
@@ -114,10 +114,10 @@ def _travel(values: FloatArray, window: int) -> FloatArray:
     return travelled
 
 
-def settled(
+def settled_places(
     channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
-) -> Recording:
-    """Return every n-th sample that is valid and away from the ends of its run.
+) -> NDArray[np.intp]:
+    """Return the places of every n-th sample that is valid and away from the ends of its run.
 
     At the ends the filter works on a reflection of the run, and a second derivative shows it.
 
@@ -133,13 +133,14 @@ def settled(
     inner[max(len(inner) - edge, 0) :] = False
     if moving_only and SPEED in channels:
         inner &= in_motion(channels[SPEED], inner, channels.sample_rate_hz)
-    kept = np.flatnonzero(inner)[::step]
-    return replace(
-        channels,
-        time_s=channels.time_s[kept],
-        columns={name: values[kept] for name, values in channels.columns.items()},
-        flags=channels.flags[kept],
-    )
+    return np.flatnonzero(inner)[::step]
+
+
+def settled(
+    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+) -> Recording:
+    """Return the samples of `settled_places` alone; an effect with memory needs the whole run."""
+    return channels.at(settled_places(channels, low_pass, step, moving_only))
 
 
 def zero_phase_channels(
