@@ -20,7 +20,7 @@ from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPEED, in_motion
+from estimation.rest import SLOWEST_RAD_S, SPEED, SPINDLE_SPEED, closing, in_motion
 
 WITH_FRICTION = ("motor", "cable", "grasp")
 """Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
@@ -86,8 +86,8 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
         FilterError: The run cannot be filtered.
     """
     low_pass = model.low_pass
-    resting = model.balance in WITH_FRICTION and "motor_angle_rad" in recording
-    wanted = list(dict.fromkeys([*names, *([SPEED] if resting else [])]))
+    speeds = _friction_speeds(model, recording)
+    wanted = list(dict.fromkeys([*names, *speeds]))
     filtered = zero_phase_channels(recording, wanted, low_pass)
     rate_hz = recording.sample_rate_hz
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -97,7 +97,12 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
     channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
-    moving = in_motion(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
+    moving = np.ones(len(valid), bool)
+    if model.counted == "closing":
+        moving = closing(channels[SPINDLE_SPEED], rate_hz)
+    else:
+        for speed in speeds:
+            moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
     run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
@@ -106,6 +111,16 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
             "Record it anew, or exclude it.",
         )
     return run
+
+
+def _friction_speeds(model: Model, recording: Recording) -> list[str]:
+    """Return the speeds that tell which samples count; none where all do."""
+    if model.counted == "closing":
+        return [SPINDLE_SPEED]
+    if model.counted == "all" or model.balance not in WITH_FRICTION:
+        return []
+    own = [channel for channel in model.channels if channel in SLOWEST_RAD_S]
+    return own or ([SPEED] if "motor_angle_rad" in recording else [])
 
 
 def decimate(columns: FloatArray, down: int) -> FloatArray:

@@ -17,6 +17,9 @@ from rig.importers.registry import open_campaign
 
 Stage = Callable[[str], None]
 
+REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
+"""Shipped models that together declare the reference rig, measured or simulated."""
+
 
 @dataclass(frozen=True)
 class Diagnosed:
@@ -41,8 +44,8 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     """Return the declared models to diagnose.
 
     Args:
-        path: A model file or the name of a shipped one; every shipped model that is named after its
-            balance when None.
+        path: A model file or the name of a shipped one; the balances of the reference rig when
+            None.
         balance: Only this balance.
 
     Raises:
@@ -52,8 +55,7 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     if path is not None:
         models = [model_file.read(path)]
     else:
-        read = [model_file.read(place) for place in model_file.shipped().values()]
-        models = [model for model in read if model.name == model.balance]
+        models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
     chosen = [model for model in models if balance in (None, model.balance)]
     if not chosen:
         known = ", ".join(dict.fromkeys(model.balance for model in models))

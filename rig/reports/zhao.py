@@ -69,7 +69,8 @@ def notes(study: Study) -> list[str]:
         " than it is reported on.",
         f"Ours: the declared model (torque constant, offset) with {' and '.join(ADDED)}, low-passed"
         f" at {FILTER.cutoff_hz:g} Hz on both sides of the balance, causal, fitted on runs whose"
-        " objects differ. `inertia.missing` is what the diagnosis names in the grasp; `hysteresis.bearing` was"
+        " objects differ. `inertia.missing` is what the diagnosis names in the grasp;"
+        " `hysteresis.bearing` was"
         " chosen by hand from the shape of what is left at the ends of holds, where the diagnosis"
         " does not look.",
         *diagnosis,
