@@ -247,7 +247,8 @@ class Search:
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
-        if all(p.lower < 0 and p.upper > 0 for c in added for p in c.effect.amplitudes):
+        bounds = [b for c in added for p in c.effect.amplitudes for b in (p.lower, p.upper)]
+        if np.isinf(bounds).all():
             return True
         together = [*terms, *added]
         before, after = self.balance.loss(terms), self.balance.loss(together)
