@@ -130,17 +130,20 @@ def step(bound: Parameter, value: float, steps: float) -> float:
     return float(min(max(moved, bound.lower), bound.upper))
 
 
-def pool(model: Model, measured: Collection[str]) -> list[Candidate]:
+def pool(
+    model: Model, measured: Collection[str], instead: Mapping[str, str] | None = None
+) -> list[Candidate]:
     """Return every effect the declared model lacks, at every point of its grid.
 
     Args:
         model: The declared model.
         measured: Channels that every run has.
+        instead: Channel to the one that plays its roles.
     """
     declared = {(t.effect.id, *sorted(t.channels.items())) for t in model.terms}
     return [
         Candidate.of(term, shape)
-        for term in candidates(model.balance, measured)
+        for term in candidates(model.balance, measured, instead, model.counted == "all")
         if term.effect.family in FAMILIES and term.effect.family != UNKNOWN
         if (term.effect.id, *sorted(term.channels.items())) not in declared
         for shape in grid(term.effect)

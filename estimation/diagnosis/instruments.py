@@ -63,8 +63,7 @@ def _fitted(
         return None
     columns, aims = [], []
     for run in runs:
-        used = np.flatnonzero(run.used)[:: run.down]
-        table = np.column_stack([_columns(run.channels, forces), run.channels[name]])[used]
+        table = np.column_stack([_columns(run.channels, forces), run.channels[name]])[run.kept]
         table -= table.mean(axis=0)
         columns.append(table[:, :-1])
         aims.append(table[:, -1])

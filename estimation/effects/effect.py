@@ -69,6 +69,7 @@ class Effect(ABC):
             whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
     """
 
     id: ClassVar[str]
@@ -80,6 +81,7 @@ class Effect(ABC):
     projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Let the family be the id where none is stated."""

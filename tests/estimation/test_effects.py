@@ -198,6 +198,8 @@ def typical(kind) -> list[float]:
     """
     if kind.id == "change.step.campaign":
         return [BETWEEN_RUNS_S, 3.0]
+    if kind.family == "spring.end_stop":
+        return [0.62 if kind.id == kind.family else -0.2]
     whole = {"sensor.encoder_inl": 11 / 31, "sensor.encoder_inl.harmonics": 6 / 15}.get(kind.id)
     return [at(p, whole or (0.7 if p.unit == "speed" else 0.37)) for p in kind.shape]
 
