@@ -79,6 +79,7 @@ def _channel(name: str, description: str) -> tuple[str, Channel]:
 CHANNELS: dict[str, Channel] = dict(
     [
         _channel("time_s", "device clock, starts near zero in each run"),
+        _channel("campaign_time_s", "time since the campaign's first run began, derived"),
         _channel("motor_angle_rad", "drive motor shaft, before the gearhead"),
         _channel("spindle_angle_rad", "instrument spindle, after the gearhead"),
         _channel("jaw_angle_rad", "jaw, from the encoder of the load motor"),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from estimation.campaign import Campaign
-from estimation.derived import settled_places
+from estimation.derived import CAMPAIGN_TIME, settled_places
 from estimation.effects import Parameter, Remembering
 from estimation.errors import EstimationError
 from estimation.model import (
@@ -131,10 +131,11 @@ def fit(
 def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]:
     """Read the runs and find every n-th valid sample of them."""
     runs = []
-    for recording in campaign.evidence:
+    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+    for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
-        places = settled_places(whole, model.low_pass, step, model.has_friction)
+        places = settled_places(whole, model.low_pass, step, model.samples)
         if places.size:
             runs.append(_Run(whole, places, whole.at(places)))
     if not runs:

@@ -23,9 +23,9 @@ class CampaignFrictionStep(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "campaign_clock": "campaign_time_s"}
     amplitudes = (Parameter("friction", "target", "loss after the change less that before"),)
     shape = (
-        Parameter("since", "campaign_clock", "time of the change", 20.0, 2e4, points=13),
+        Parameter("since", "campaign_clock", "time of the change", 20.0, 2e4, points=20),
         Parameter(
-            "width", "speed", "speed at which 76 % of the direction is there", 1e-2, 50.0, points=3
+            "width", "speed", "speed at which 76 % of the direction is there", 0.1, 10.0, points=2
         ),
     )
     confused_with = ("friction.warmup", "sensor.drift")

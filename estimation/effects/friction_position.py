@@ -11,7 +11,8 @@ from estimation.effects.effect import Parameter, Pointwise
 class PositionFriction(Pointwise):
     """Friction of a track, a hose or a cable that rubs more in one place than in another.
 
-    Equation: torque = (a position + b position^2) tanh(speed / width), beside Coulomb friction.
+    Equation: torque = (a position + b position^2 + c position^3) tanh(speed / width), beside
+    Coulomb friction.
 
     Source: Popovic and Goldenberg 1998 (friction of a drive as a function of its position).
     """
@@ -22,6 +23,7 @@ class PositionFriction(Pointwise):
     amplitudes = (
         Parameter("slope", "target / position", "loss that comes with one radian"),
         Parameter("bend", "target / position / position", "loss with the radian's square"),
+        Parameter("twist", "target / position / position / position", "loss with its cube"),
     )
     shape = (
         Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
@@ -32,4 +34,5 @@ class PositionFriction(Pointwise):
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return one value or array for each amplitude."""
         along = inputs["position"] * np.tanh(inputs["speed"] / shape[0])
-        return along, inputs["position"] * along
+        square = inputs["position"] * along
+        return along, square, inputs["position"] * square

@@ -7,8 +7,8 @@ import numba
 from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
-STEP, STEPS = 0.05, 200
-"""Longest piece of a path integrated at once, in reaches, and most pieces; ten reaches sate it."""
+STEP, SATED = 0.5, 8.0
+"""Longest piece of a path integrated at once, and a path after which it slides, in reaches."""
 
 
 @numba.njit(cache=True)
@@ -19,12 +19,18 @@ def slope(z: float, way: float, sharpness: float) -> float:
 
 @numba.njit(cache=True)
 def follow(z: float, moved: float, sharpness: float) -> float:
-    """Return z after a path without reversal, `moved` in reaches (midpoint rule)."""
-    pieces = min(int(abs(moved) / STEP) + 1, STEPS)
-    piece = min(max(moved, -STEP * STEPS), STEP * STEPS) / pieces
+    """Return z after a path without reversal, `moved` in reaches (classic Runge-Kutta rule)."""
+    if abs(moved) > SATED:
+        return 1.0 if moved > 0.0 else -1.0
+    pieces = int(abs(moved) / STEP) + 1
+    piece = moved / pieces
     for _ in range(pieces):
-        middle = z + 0.5 * piece * slope(z, piece, sharpness)
-        z = min(max(z + piece * slope(middle, piece, sharpness), -1.0), 1.0)
+        first = slope(z, piece, sharpness)
+        second = slope(z + 0.5 * piece * first, piece, sharpness)
+        third = slope(z + 0.5 * piece * second, piece, sharpness)
+        last = slope(z + piece * third, piece, sharpness)
+        z += piece * (first + 2.0 * second + 2.0 * third + last) / 6.0
+        z = min(max(z, -1.0), 1.0)
     return z
 
 
@@ -50,7 +56,7 @@ class BoucWen(Remembering):
     """
 
     id = "hysteresis.bouc_wen"
-    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "half the height of the loop", lower=0.0),)
     shape = (

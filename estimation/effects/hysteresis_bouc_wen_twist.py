@@ -18,7 +18,7 @@ class Twist(Remembering):
 
     id = "hysteresis.bouc_wen.twist"
     family = "hysteresis.bouc_wen"
-    balances: ClassVar = {"gearbox": -1, "stretch": -1}
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m"}
     amplitudes = (Parameter("lost", "target", "half the width of the loop", lower=0.0),)
     shape = (

@@ -35,7 +35,7 @@ class LuGre(Remembering):
 
     id = "hysteresis.presliding.lugre"
     family = "hysteresis.presliding"
-    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {"motor": -1, "cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"travel": "spindle_angle_rad", "speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss once it slides fast", lower=0.0),)
     shape = (

@@ -38,7 +38,7 @@ class MaxwellSlip(Remembering):
         "motor": -1,
         "gearbox": -1,
         "cable": 1,
-        "stretch": 1,
+        "stretch": -1,
         "grasp": -1,
         "joint": 1,
     }

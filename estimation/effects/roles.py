@@ -31,6 +31,7 @@ _MOTION = {
     "motor_angle": ("motor_angle_rad",),
     "output_angle": ("spindle_angle_rad",),
     "current": ("motor_current_a",),
+    "drive": ("motor_current_a",),
     "temperature": ("motor_temperature_k",),
     "clock": ("time_s",),
     "elapsed": ("time_s", "campaign_time_s"),
@@ -49,7 +50,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "creeping": (MOTOR_LOAD,),
         "other_reading": ("jaw_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
     "gearbox": _MOTION
@@ -78,7 +79,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
         "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
-        "encoder": ("spindle_angle_rad", "jaw_angle_rad"),
+        "encoder": ("spindle_angle_rad",),
         "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION
@@ -87,7 +88,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("motor_current_a",),
         "other_reading": ("spindle_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("spindle_angle_rad",),
     },
 }

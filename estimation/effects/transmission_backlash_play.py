@@ -29,7 +29,7 @@ class Play(Remembering):
 
     id = "transmission.backlash.play"
     family = "transmission.backlash"
-    balances: ClassVar = {"stretch": 1}
+    balances: ClassVar = {"stretch": -1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("gap", "target", "half the play", lower=0.0),)
     shape = (Parameter("reach", "travel", "half the travel that crosses it", 1e-3, 0.5),)

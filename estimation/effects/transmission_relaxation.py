@@ -45,7 +45,7 @@ class Relaxation(Remembering):
     """
 
     id = "transmission.relaxation"
-    balances: ClassVar = {"gearbox": -1, "stretch": -1}
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m", "clock": "time_s"}
     amplitudes = (
         Parameter("compliance", "target / load", "compliance that comes with time", lower=0.0),

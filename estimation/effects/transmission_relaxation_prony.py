@@ -17,7 +17,7 @@ class Prony(Remembering):
 
     id = "transmission.relaxation.prony"
     family = "transmission.relaxation"
-    balances: ClassVar = {"gearbox": -1, "stretch": -1}
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m", "clock": "time_s"}
     amplitudes = (
         Parameter("fast", "target / load", "compliance that comes soon", lower=0.0),

@@ -18,7 +18,7 @@ class AsymmetricStiffness(Pointwise):
 
     id = "transmission.stiffening.asymmetric"
     family = "transmission.stiffening"
-    balances: ClassVar = {"gearbox": 1, "stretch": 1}
+    balances: ClassVar = {"gearbox": 1, "stretch": -1}
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (
         Parameter("asymmetry", "target / load", "half the compliance of closing less of opening"),

@@ -16,7 +16,7 @@ class CubicStiffening(Pointwise):
 
     id = "transmission.stiffening.cubic"
     family = "transmission.stiffening"
-    balances: ClassVar = {"gearbox": -1, "stretch": -1}
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (
         Parameter("bend", "target / load / load / load", "deflection lost at one unit of load"),

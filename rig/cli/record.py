@@ -34,6 +34,7 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.errors import UsageError
     from rig.logger import open_logger
     from rig.protocol import load_protocol
@@ -56,6 +57,7 @@ def record(
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
+    refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
         screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
     watch = watch_runs(model) if model else None

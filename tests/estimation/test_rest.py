@@ -28,7 +28,7 @@ def test_the_cable_rests_when_the_spindle_does():
     run = Recording("a", time_s, angles)
     for speed, rests in (("spindle_velocity_rad_s", True), ("motor_velocity_rad_s", False)):
         channels = zero_phase_channels(run, [speed])
-        kept = settled_places(channels, PAPER, moving_only=True)
+        kept = settled_places(channels, PAPER, samples="motion")
         held = np.abs(spindle_rad[kept]) > 0.2399
         assert held.any() != rests
 
