@@ -5,10 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import DesignError, prepare, targets
 from estimation.diagnosis.diagnose import Story
-from estimation.diagnosis.maps import projection
+from estimation.diagnosis.instruments import projection as instrumented
+from estimation.diagnosis.maps import PROJECTED_LOAD, projection
 from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.twin import coarse
@@ -75,6 +76,9 @@ def _scored(
     limits = load_config().limits
     balance = story.balance
     known = list(balance.runs[0].channels)
+    made = {"time_s", PROJECTED_LOAD, *(projected(name) for name in known)}
+    others = beside(story, finding)
+    told = instrumented(balance.runs, [*others, *rivals], balance.model.target)
     whole = projection(balance)
     # old and new runs are thinned alike
     old = [coarse(run) for run in balance.runs]
@@ -85,17 +89,16 @@ def _scored(
         played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
         if not within(played, limits):
             continue
-        wanted = [name for name in known if name not in ("time_s", "projected_load_n_m")]
+        wanted = [name for name in known if name not in made]
         runs = []
         for run in played:
             try:
-                runs.append(coarse(whole(prepare(run, wanted, balance.model))))
+                runs.append(coarse(whole(told(prepare(run, wanted, balance.model)))))
             except DesignError:
                 continue  # a run that only rests tells nothing of this balance
         if runs:
             seconds = sum(plan.duration_s for plan in plans)
-            told = worth(thin, beside(story, finding), rivals, protocol.name, runs, seconds)
-            scored.append((protocol, told))
+            scored.append((protocol, worth(thin, others, rivals, protocol.name, runs, seconds)))
     return sorted(scored, key=lambda pair: -pair[1].net)
 
 
