@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from estimation.diagnosis.candidate import Candidate, projected
-from estimation.diagnosis.design import DesignError, prepare, targets
+from estimation.diagnosis.design import DesignError, Run, prepare, targets
 from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import PROJECTED_LOAD, projection
@@ -19,6 +19,8 @@ from rig.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
 from rig.protocol import Protocol, protocol_toml
 from rig.simulation.twin import Twin
+
+CAMPAIGN_TIME = "campaign_time_s"
 
 SEED = 7_000_000
 """Far from the seeds of the twins that prove a finding."""
@@ -89,6 +91,8 @@ def _scored(
         played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
         if not within(played, limits):
             continue
+        if CAMPAIGN_TIME in known:
+            played = _after(balance.runs, played)
         wanted = [name for name in known if name not in made]
         runs = []
         for run in played:
@@ -100,6 +104,15 @@ def _scored(
             seconds = sum(plan.duration_s for plan in plans)
             scored.append((protocol, worth(thin, others, rivals, protocol.name, runs, seconds)))
     return sorted(scored, key=lambda pair: -pair[1].net)
+
+
+def _after(runs: Sequence[Run], played: Sequence[Recording]) -> list[Recording]:
+    """Return played runs on the campaign's clock, a minute apart behind the runs there are."""
+    last = max(float(run.channels[CAMPAIGN_TIME].max()) for run in runs)
+    return [
+        recording.with_columns(**{CAMPAIGN_TIME: last + 60.0 * (k + 1) + recording.time_s})
+        for k, recording in enumerate(played)
+    ]
 
 
 def _described(
