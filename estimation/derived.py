@@ -2,7 +2,8 @@
 
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
 and second derivative of `X_angle_rad`; `X_travel_rad` is how far that angle has come since its
-lowest value of the last `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal;
+lowest value of the last `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal; `X_fall_a` is
+how far the channel `X_a` (any unit) is below its highest value of that window;
 `gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
 `motor_load_n_m` is the spindle's torque projected from the current. Offline they come from a
 zero-phase filter and a noise-robust derivative, live from a causal filter and backward differences:
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
+from estimation.channels import UNIT_BY_SUFFIX
 from estimation.filters import (
     PAPER,
     CausalFilter,
@@ -42,6 +44,7 @@ LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
 
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
+FALL = "_fall_"
 
 TRAVEL_WINDOW_S = 0.5
 """How far back a travel looks, s. Longer memory could tell which run it is in."""
@@ -57,6 +60,8 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
             needed |= {"motor_angle_rad", "spindle_angle_rad"}
         elif name.endswith(TRAVEL):
             needed.add(_travelled(name))
+        elif FALL in name:
+            needed.add(_fallen(name))
         elif name == MOTOR_LOAD:
             needed |= {"motor_current_a", "motor_angle_rad"}
         elif name != "time_s":
@@ -66,6 +71,16 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
 
 def _travelled(name: str) -> str:
     return name.removesuffix(TRAVEL) + "_angle_rad"
+
+
+def fall_of(channel: str) -> str:
+    """Return the name of a measured channel's fall: `motor_current_fall_a`."""
+    suffix = next(s for s in UNIT_BY_SUFFIX if channel.endswith(f"_{s}"))
+    return channel.removesuffix(f"_{suffix}") + FALL + suffix
+
+
+def _fallen(name: str) -> str:
+    return name.replace(FALL, "_")
 
 
 def _differentiated(name: str) -> tuple[str, int]:
@@ -91,6 +106,9 @@ def _derive(
             continue
         if name.endswith(TRAVEL):
             channels[name] = travel(filtered[_travelled(name)])
+            continue
+        if FALL in name:
+            channels[name] = travel(-filtered[_fallen(name)])
             continue
         if name == MOTOR_LOAD:
             direction = np.tanh(derivative(filtered["motor_angle_rad"]) / LOAD_WIDTH_RAD_S)
@@ -200,7 +218,7 @@ class CausalChannels:
         self._filter = CausalFilter(sample_rate_hz, low_pass)
         self._last_time_s: float | None = None
         self._last_row: FloatArray = np.empty(0)
-        travels = any(name.endswith(TRAVEL) for name in self.names)
+        travels = any(name.endswith(TRAVEL) or FALL in name for name in self.names)
         self._kept = max(2, _window(sample_rate_hz) if travels else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
 

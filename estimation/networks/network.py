@@ -159,12 +159,25 @@ def read_arrays(path: Path, schema: str) -> dict[str, np.ndarray]:
     Raises:
         NetworkError: The file is missing, damaged, or of another layout.
     """
+    arrays, found = _content(path)
+    if found != schema:
+        raise NetworkError(f"The file {path} has the layout {found}, not {schema}.")
+    return arrays
+
+
+def schema_of(path: Path) -> str:
+    """Return the name of the layout that `write_arrays` wrote.
+
+    Raises:
+        NetworkError: The file is missing or damaged.
+    """
+    return _content(path)[1]
+
+
+def _content(path: Path) -> tuple[dict[str, np.ndarray], str]:
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
             arrays = {name: content[name] for name in content.files}
     except Exception as error:  # a damaged archive raises one of many
         raise NetworkError(f"The file {path} cannot be read.", str(error)) from error
-    found = str(arrays.pop("schema", "none"))
-    if found != schema:
-        raise NetworkError(f"The file {path} has the layout {found}, not {schema}.")
-    return arrays
+    return arrays, str(arrays.pop("schema", "none"))
