@@ -3,7 +3,8 @@
 The width follows the state: a linear fit of the absolute error on a few products. It is then scaled
 so that the wanted share of the errors on left-out runs lies inside. Since the run's offset is the
 larger part of the error, a run lies wholly inside, or has a tail outside; the share holds over runs
-like those fitted, not within each.
+like those fitted, not within each. Runs are the units that can be exchanged, so of R runs the
+quantile is taken at coverage x (1 + 1 / R), as conformal prediction does for R samples.
 
 Source: locally weighted split conformal prediction, J. Lei et al., "Distribution-free predictive
 inference for regression", Journal of the American Statistical Association 113 (2018), section 5.2.
@@ -89,5 +90,6 @@ def calibrate(
     size = np.concatenate(sizes)
     least = NARROWEST * float(size.mean())
     width = np.maximum(np.concatenate(parts) @ weights, least)
-    scale = float(np.quantile(size / width, coverage))
+    level = min(coverage * (1 + 1 / len(sizes)), 1.0)
+    scale = float(np.quantile(size / width, level))
     return Interval(columns, scale * weights, scale * least)

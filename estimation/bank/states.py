@@ -54,14 +54,12 @@ def _grid(positions: int, loads: int) -> list[Product]:
     return [("q",) * i + ("c",) * j for i in range(positions + 1) for j in range(loads + 1)]
 
 
-GROUPS: dict[str, list[Product]] = {
-    "load and position": [
-        *_grid(3, 2), ("c",) * 3, ("q",) + ("c",) * 3, ("q",) * 4, ("q",) * 4 + ("c",), ("q",) * 5,
-    ],
-    "speed": [("v",), ("v", "v"), ("c", "v"), ("q", "v"), ("i",), ("c", "i")],
-    "acceleration": [("a",), ("q", "a"), ("v", "a")],
-    "fall of the load": [("d",), ("q", "d"), ("d", "d")],
-    "hysteresis": [
+NEUTRAL: list[Product] = [
+    *_grid(3, 2), ("c",) * 3, ("q",) + ("c",) * 3, ("q",) * 4, ("q",) * 4 + ("c",), ("q",) * 5,
+    ("v",), ("v", "v"), ("c", "v"), ("q", "v"), ("i",), ("c", "i"),
+    ("a",), ("q", "a"), ("v", "a"),
+    ("d",), ("q", "d"), ("d", "d"),
+    *[
         product
         for clip in CLIPS
         for product in [
@@ -69,18 +67,29 @@ GROUPS: dict[str, list[Product]] = {
             (clip, "a"), (clip, "c", "c"),
         ]
     ],
-}  # fmt: skip
-"""Products by the effect they describe; an ablation leaves one group out."""
+]  # fmt: skip
+"""Products for any pose."""
 
 POSED: list[Product] = [
-    *[("p",) * n + rest for n in (1, 2, 3, 4) for rest in [(), ("c",), ("q",)]],
-    *[("p",) * n + rest for n in (1, 2) for rest in [("q", "c"), ("q", "q"), ("v",), ("c", "c")]],
-    *[("p", clip, *rest) for clip in ("k2", "k4", "n2") for rest in [(), ("c",)]],
-]
+    ("p",) * power + rest
+    for power in (1, 2, 3, 4)
+    for rest in [
+        *_grid(2, 1), ("c", "c"), ("q", "c", "c"), ("q", "q", "q"), ("v",), ("i",), ("a",),
+        *[(clip, *load) for clip in ("k1", "k2", "k4", "n1", "n2") for load in [(), ("c",)]],
+    ]
+]  # fmt: skip
 """Products that a wrist's pose adds."""
 
 RIPPLE = "ripple"
-"""Name of the ripple among the groups."""
+
+EFFECTS: dict[str, tuple[str, ...]] = {
+    "speed": ("v", "i"),
+    "acceleration": ("a",),
+    "fall of the load": ("d",),
+    "hysteresis": CLIPS,
+    RIPPLE: (),
+}
+"""Effects that an ablation leaves out, and their states; products of these states go with them."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +99,7 @@ class Bank:
     Attributes:
         surrogate: Channel that stands for the load; a key of `LOAD_SCALES`.
         pose: Channel of the wrist's pose in rad, or empty.
-        without: Groups left out: keys of `GROUPS`, or `RIPPLE`.
+        without: Effects left out, keys of `EFFECTS`.
     """
 
     surrogate: str = "motor_command_ratio"
@@ -107,8 +116,9 @@ class Bank:
     @cached_property
     def products(self) -> tuple[Product, ...]:
         """Products in order; each one but the first, the constant, is an earlier one by a state."""
-        wanted = [p for name, group in GROUPS.items() if name not in self.without for p in group]
-        return closed([*wanted, *(POSED if self.pose else [])])
+        absent = {state for effect in self.without for state in EFFECTS[effect]}
+        wanted = [*NEUTRAL, *(POSED if self.pose else [])]
+        return closed(product for product in wanted if absent.isdisjoint(product))
 
     @cached_property
     def tables(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation import oneill
 from estimation.bank.fitting import Settings
-from estimation.bank.states import GROUPS, RIPPLE, Bank
+from estimation.bank.states import EFFECTS, Bank
 from estimation.campaign import Campaign
 from estimation.derived import causal_channels
 from estimation.estimators.bank import EVERY, Estimates, RunEvidence, fit_runs, rows_of
@@ -43,7 +43,7 @@ class StateJob:
         target: Channel that is estimated.
         filters: `zero-phase`, or `live` for inputs filtered causally.
         protocol: `run-wise`, `lofo` or `lopo`.
-        without: Group of products left out, or empty.
+        without: Effect left out, a key of `EFFECTS`, or empty.
     """
 
     pose: str
@@ -127,8 +127,8 @@ def jobs(poses: Sequence[str]) -> list[StateJob]:
                 ]
     planned += [StateJob("neutral", "sensor", target) for target in (DISTAL, JAW)]
     planned += [
-        StateJob("neutral", "command", target, without=group)
-        for group in (*list(GROUPS)[1:], RIPPLE)
+        StateJob("neutral", "command", target, without=effect)
+        for effect in EFFECTS
         for target in TARGETS
     ]
     planned += [
@@ -283,6 +283,6 @@ def _row(
 
 
 def ablated(rows: Sequence[StateRow], target: str) -> dict[str, StateRow]:
-    """Return the ablation's rows of a target by the group left out; the whole one under ''."""
+    """Return the ablation's rows of a target by the effect left out; the whole one under ''."""
     whole = StateJob("neutral", "command", target)
     return {r.job.without: r for r in rows if replace(r.job, without="") == whole}
