@@ -61,28 +61,52 @@ class Normal:
         return Normal(self.count, self.gram, self.cross[:, one], self.mean, self.target[one])
 
 
-def solve(
-    runs: Sequence[Normal], settings: Settings, prior: FloatArray | None = None
-) -> FloatArray:
+def spread(runs: Sequence[Normal]) -> FloatArray:
+    """Return the standard deviation of each column over all samples, shape (p,).
+
+    It is infinite where a column does not vary, and 1 for the first column, the constant.
+    """
+    count = sum(run.count for run in runs)
+    mean = np.sum([run.count * run.mean for run in runs], axis=0) / count
+    variance = np.diag(np.sum([run.gram for run in runs], axis=0)) / count - mean**2
+    found = np.sqrt(np.where(variance > 1e-12 * np.maximum(mean**2, 1.0), variance, np.inf))
+    found[0] = 1.0
+    return np.asarray(found)
+
+
+def solve(runs: Sequence[Normal], settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
+
+    A column that does not vary gets no weight.
 
     Args:
         runs: The runs to fit, none of them empty.
         settings: How.
-        prior: Weights that the penalty pulls towards, shape (p, targets); zero if None.
     """
     share = settings.offset_share
     gram = np.sum([r.gram - share * r.count * np.outer(r.mean, r.mean) for r in runs], axis=0)
     cross = np.sum([r.cross - share * r.count * np.outer(r.mean, r.target) for r in runs], axis=0)
-    count = sum(r.count for r in runs)
-    mean = np.sum([r.count * r.mean for r in runs], axis=0) / count
-    variance = np.diag(np.sum([r.gram for r in runs], axis=0)) / count - mean**2
-    # a column that does not vary says nothing: it gets no weight, or keeps the prior's
-    scale = np.sqrt(np.where(variance > 1e-12 * np.maximum(mean**2, 1.0), variance, np.inf))
-    scale[0] = 1.0
-    penalty = np.full(len(scale), settings.ridge * count)
+    scale = spread(runs)
+    penalty = np.full(len(scale), settings.ridge * sum(run.count for run in runs))
     penalty[0] = 0.0
-    start = np.zeros_like(cross) if prior is None else prior
     scaled = gram / np.outer(scale, scale) + np.diag(penalty)
-    rest = (cross - gram @ start) / scale[:, None]
-    return np.asarray(start + np.linalg.solve(scaled, rest) / scale[:, None])
+    return np.asarray(np.linalg.solve(scaled, cross / scale[:, None]) / scale[:, None])
+
+
+def pull(
+    runs: Sequence[Normal], prior: FloatArray, scale: FloatArray, stiffness: FloatArray
+) -> FloatArray:
+    """Return weights that fit the runs and stay near the prior, shape (p,).
+
+    Args:
+        runs: The runs to fit, of one target.
+        prior: Weights to stay near, shape (p,).
+        scale: Spread of each column where the prior was found, shape (p,).
+        stiffness: Penalty on a weight's change in units of `scale`, a sample, shape (p,).
+    """
+    gram = np.sum([run.gram for run in runs], axis=0)
+    cross = np.sum([run.cross for run in runs], axis=0)[:, 0]
+    penalty = stiffness * sum(run.count for run in runs)
+    scaled = gram / np.outer(scale, scale) + np.diag(penalty)
+    rest = (cross - gram @ prior) / scale
+    return np.asarray(prior + np.linalg.solve(scaled, rest) / scale)

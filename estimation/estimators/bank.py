@@ -8,19 +8,25 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.bank.fitting import Normal, Settings, solve
+from estimation.bank.fitting import Normal, Settings, solve, spread
 from estimation.bank.interval import COVERAGE, Interval, calibrate
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.errors import EstimationError
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.oneill import is_closing, processed
 from estimation.recording import FloatArray, Recording, read_only
+from estimation.scores import Score, score
 
 INNER_FOLDS = 5
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
+
+
+class InstrumentError(EstimationError):
+    """An estimator is asked about an instrument it was not fitted on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +54,8 @@ class BankEstimator:
         weights: Weight of each product, shape (size,).
         interval: What is known of the error; None where too few runs were fitted to know it.
         ranges: Lowest and highest value of each channel fitted on, shape (2, channels).
-        instrument: Identity of the instrument it was fitted on, or empty.
+        scale: Spread of each product over the samples fitted on, shape (size,).
+        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
     """
 
@@ -59,20 +66,21 @@ class BankEstimator:
     weights: FloatArray
     interval: Interval | None
     ranges: FloatArray
+    scale: FloatArray
     instrument: str = ""
     low_pass: LowPass = PAPER
 
     def __post_init__(self) -> None:
         for name, shape in {
             "weights": (self.bank.size,),
+            "scale": (self.bank.size,),
             "ranges": (2, len(self.bank.channels)),
         }.items():
             values = read_only(getattr(self, name))
-            if values.shape != shape or not np.isfinite(values).all():
+            if values.shape != shape or np.isnan(values).any():
                 raise NetworkError(
-                    f"The {name} of a state estimator have shape {values.shape} or values that"
-                    " are not finite.",
-                    f"They must be {shape} and finite.",
+                    f"The {name} of a state estimator have shape {values.shape} or holds NaN.",
+                    f"They must be {shape} and numbers.",
                 )
             object.__setattr__(self, name, values)
 
@@ -80,13 +88,19 @@ class BankEstimator:
         """Return the estimate for each sample, shape (n,).
 
         Raises:
+            InstrumentError: The recording is of another instrument.
             MissingChannelError: The recording lacks a channel.
             FilterError: The run cannot be filtered.
         """
         return self.estimate(recording, causal).value
 
     def estimate(self, recording: Recording, causal: bool = False) -> Estimates:
-        """Return the estimate for each sample with its interval and its validity."""
+        """Return the estimate for each sample with its interval and its validity.
+
+        Raises:
+            InstrumentError: The recording is of another instrument.
+        """
+        self._require_own(instrument_of(recording))
         source = causal_channels if causal else zero_phase_channels
         return self.of_rows(
             rows_of(source(recording, self.bank.channels, self.low_pass), self.bank)
@@ -100,6 +114,18 @@ class BankEstimator:
             width = self.interval.half_width(design)
         within = (rows >= self.ranges[0]) & (rows <= self.ranges[1])
         return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
+
+    def for_any_instrument(self) -> "BankEstimator":
+        """Return the estimator for use on instruments it was not fitted on."""
+        return replace(self, instrument="")
+
+    def _require_own(self, instrument: str) -> None:
+        if self.instrument and instrument and instrument != self.instrument:
+            raise InstrumentError(
+                f"The estimator was fitted on {self.instrument}, the recording is of {instrument}.",
+                "Another instrument has other friction and another zero.",
+                "Adapt it: rig adapt MODEL PATH --runs NAMES.",
+            )
 
     def stepper(self, sample_rate_hz: float) -> "BankStepper":
         """Return the estimator as it runs live."""
@@ -119,6 +145,7 @@ class BankEstimator:
                 "instrument": np.array(self.instrument),
                 "weights": self.weights,
                 "ranges": self.ranges,
+                "scale": self.scale,
                 "low_pass": np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)]),
                 **interval,
             },
@@ -145,6 +172,7 @@ class BankEstimator:
                 arrays["weights"],
                 Interval.from_arrays(arrays),
                 arrays["ranges"],
+                arrays["scale"],
                 str(arrays["instrument"]),
                 LowPass(cutoff_hz, int(order)),
             )
@@ -214,32 +242,12 @@ class RunEvidence:
         ]
 
 
-def evidence_of(
-    recording: Recording, bank: Bank, target: str, low_pass: LowPass = PAPER, causal: bool = False
-) -> RunEvidence | None:
-    """Reduce a raw run; None where it has no valid closing sample.
-
-    Which samples close, and the target, are always taken without lag.
-
-    Raises:
-        MissingChannelError: The run lacks a channel.
-    """
-    run = processed(recording, [*bank.channels, target], low_pass)
-    kept = np.flatnonzero(is_closing(run) & run.valid)[::EVERY]
-    if not len(kept):
-        return None
-    source = causal_channels(recording, bank.channels, low_pass) if causal else run
-    (evidence,) = RunEvidence.of_rows(bank, rows_of(source, bank)[kept], run[target][kept, None])
-    return evidence
-
-
 def fit_runs(
     runs: Sequence[RunEvidence],
     bank: Bank,
     target: str,
     settings: Settings,
     coverage: float = COVERAGE,
-    prior: BankEstimator | None = None,
 ) -> BankEstimator:
     """Fit weights and, from runs left out in turn, the interval.
 
@@ -249,17 +257,15 @@ def fit_runs(
         target: Channel that is estimated.
         settings: How weights are found.
         coverage: Share of the samples of unseen runs that the interval covers.
-        prior: Estimator that the weights are pulled towards; of the same bank.
 
     Raises:
         NetworkError: There is no run.
     """
     if not runs:
         raise NetworkError("There is no closing sample to fit a state estimator on.")
-    start = None if prior is None else prior.weights[:, None]
 
     def weights(part: Iterable[RunEvidence]) -> FloatArray:
-        return solve([run.normal for run in part], settings, start)[:, 0]
+        return solve([run.normal for run in part], settings)[:, 0]
 
     interval = None
     if len(runs) >= INNER_FOLDS:
@@ -273,7 +279,8 @@ def fit_runs(
         interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
-    return BankEstimator(bank, target, weights(runs), interval, np.array([lowest, highest]))
+    ranges, scale = np.array([lowest, highest]), spread([run.normal for run in runs])
+    return BankEstimator(bank, target, weights(runs), interval, ranges, scale)
 
 
 @dataclass(frozen=True)
@@ -305,7 +312,7 @@ class BankRecipe:
         """
         runs, instruments = [], set()
         for recording in campaign.evidence:
-            run = evidence_of(recording, self.bank, self.target, self.low_pass, self.causal)
+            run = self.evidence_of(recording)
             if run is not None:
                 runs.append(run)
             instruments.add(instrument_of(recording))
@@ -313,9 +320,50 @@ class BankRecipe:
         known = instruments.pop() if len(instruments) == 1 else ""
         return replace(fitted, instrument=known, low_pass=self.low_pass)
 
+    def evidence_of(self, recording: Recording) -> RunEvidence | None:
+        """Reduce a raw run; None where it has no valid closing sample.
+
+        Which samples close, and the target, are always taken without lag.
+
+        Raises:
+            MissingChannelError: The run lacks a channel.
+        """
+        bank = self.bank
+        run = processed(recording, [*bank.channels, self.target], self.low_pass)
+        kept = np.flatnonzero(is_closing(run) & run.valid)[::EVERY]
+        if not len(kept):
+            return None
+        source = causal_channels(recording, bank.channels, self.low_pass) if self.causal else run
+        truths = run[self.target][kept, None]
+        (evidence,) = RunEvidence.of_rows(bank, rows_of(source, bank)[kept], truths)
+        return evidence
+
+
+def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int) -> Score:
+    """Return the error on runs not fitted, each held out once; flagged samples are left out.
+
+    Args:
+        recipe: What is fitted.
+        campaign: The runs; excluded ones are left out.
+        folds: Number of folds, at least 2.
+        seed: Seed of the folds.
+
+    Raises:
+        NetworkError: There is no closing sample to fit.
+    """
+    found = [recipe.evidence_of(recording) for recording in campaign.evidence]
+    runs = [run for run in found if run is not None]
+    order = np.random.default_rng(seed).permutation(len(runs))
+    estimates, truths = [], []
+    for held_out in (order[k::folds] for k in range(folds)):
+        rest = [run for k, run in enumerate(runs) if k not in held_out]
+        weights = fit_runs(rest, recipe.bank, recipe.target, recipe.settings).weights
+        estimates += [runs[k].design @ weights for k in held_out]
+        truths += [runs[k].truth for k in held_out]
+    return score(np.concatenate(estimates), np.concatenate(truths))
+
 
 def instrument_of(recording: Recording) -> str:
-    """Return a recording's instrument in words, empty where it is not known."""
+    """Return the model and serial number of a recording's instrument, empty if not known."""
     own = recording.instrument
-    named = {"": own.model, "serial ": own.serial, "lot ": own.lot}
-    return ", ".join(f"{label}{value}" for label, value in named.items() if value)
+    return " ".join(part for part in (own.model, own.serial) if part)

@@ -7,6 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -34,6 +35,7 @@ app.command()(record)
 app.command()(live)
 app.command()(replay)
 app.command()(fit)
+app.command()(adapt)
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.add_typer(log_app, name="log")
