@@ -11,6 +11,7 @@ from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
+from rig.cli.export import export
 from rig.cli.fit import fit
 from rig.cli.live import live
 from rig.cli.log import log_app
@@ -36,6 +37,7 @@ app.command()(live)
 app.command()(replay)
 app.command()(fit)
 app.command()(adapt)
+app.command()(export)
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.add_typer(log_app, name="log")
