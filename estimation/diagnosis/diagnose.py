@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, with_campaign_time
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, prepare
@@ -22,6 +23,9 @@ from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Estimate, Model
 from estimation.recording import FloatArray, Recording
+
+Maker = Callable[[Model, Sequence[Recording]], Twin]
+"""Fitted model and discovery runs to their simulated twin."""
 
 Stage = Callable[[str], None]
 """Told what begins, in words."""
@@ -86,7 +90,7 @@ def diagnose(
     *,
     gates: Gates | None = None,
     executor: Executor | None = None,
-    twins: Mapping[str, Callable[[Model, Sequence[Recording]], Twin]] | None = None,
+    twins: Mapping[str, Maker] | None = None,
     on_stage: Stage = lambda _: None,
     on_open: Callable[[], None] = lambda: None,
 ) -> tuple[Diagnosis, dict[str, Story]]:
@@ -112,6 +116,11 @@ def diagnose(
     gates = gates or Gates()
     stories: dict[str, Story] = {}
     failed: dict[str, EstimationError] = {}
+    starts = [recording.started_at_ns for recording in recordings]
+    if starts and None not in starts:
+        first_ns = min(start for start in starts if start is not None)
+        recordings = [with_campaign_time(recording, first_ns) for recording in recordings]
+        twins = {name: partial(_timed, make, first_ns) for name, make in (twins or {}).items()}
     for model in models:
         on_stage(f"searching what the {model.balance} balance lacks")
         try:
@@ -142,13 +151,22 @@ def diagnose(
     return diagnosis, stories
 
 
+def _timed(make: Maker, first_ns: int, model: Model, discover: Sequence[Recording]) -> Twin:
+    """Return a twin whose runs have the campaign's time too."""
+    return partial(_timed_runs, make(model, discover), first_ns)
+
+
+def _timed_runs(twin: Twin, first_ns: int, seed: int) -> list[Recording]:
+    return [with_campaign_time(recording, first_ns) for recording in twin(seed)]
+
+
 def _balance(
     recordings: Sequence[Recording],
     model: Model,
     sealed: Sealed,
     gates: Gates,
     executor: Executor | None,
-    maker: Callable[[Model, Sequence[Recording]], Twin] | None,
+    maker: Maker | None,
 ) -> Story:
     """Fit the declared model and search, on the runs that discover; prepare those that confirm."""
     discover = [r for r in recordings if r.name in sealed.discover]
@@ -422,5 +440,4 @@ def _notes(
         for name, story in stories.items()
         for what in story.refused
     ]
-    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
     return notes

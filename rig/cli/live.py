@@ -37,24 +37,29 @@ def live(
     without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
     """
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.live.estimator import ModelEstimator
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
+    from rig.live.watching import watched
     from rig.logger import open_logger
     from rig.protocol import load_protocol
     from rig.trajectory import SAMPLE_RATE_HZ
 
     settings = load_config(config)
+    refuse_problems(settings)
     if protocol is None and settings.is_simulated:
-        protocol = "quick"
+        protocol = "quick" if settings.limits.load_command_a else "unloaded"
     plans = load_protocol(protocol).plans() if protocol else []
     model_path = model or settings.model_path
     estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None
     blocks = session_blocks(
         settings, lambda: open_logger(settings, pace=pace or None), plans, estimator
     )
+    if estimator is not None:
+        blocks = watched(blocks, estimator.model)
     options = ShowOptions(
         title=f"rig live: {settings.name}",
         channels=(estimator.target_channel if estimator else "distal_torque_n_m",),

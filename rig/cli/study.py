@@ -177,6 +177,43 @@ def pique(
         emit_json(study)
 
 
+@study_app.command()
+def loop(
+    data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
+    seed: Annotated[int, typer.Option(help="Seed of the split and of the surrogates.")] = 0,
+    task: Annotated[
+        list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
+    from estimation.files import write_text_atomic
+    from rig.errors import UsageError
+    from rig.reports import loop as shown
+    from rig.reports.table import to_rich
+    from rig.studies.loop import TASKS, run_study
+
+    if any(not 1 <= number <= len(TASKS) for number in task or []):
+        raise UsageError(f"There are {len(TASKS)} rows.", fix="Write for example --task 1.")
+    tasks = [TASKS[number - 1] for number in task] if task else TASKS
+    with progress() as bar:
+        shown_stage = bar.add_task("loop", total=None)
+        study = run_study(
+            data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
+        )
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.studies.oneill import Source

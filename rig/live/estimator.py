@@ -26,6 +26,7 @@ class ModelEstimator:
         model = model_file.read(path)
         self._stream = Stream(model, sample_rate_hz)
         self.target_channel = model.target
+        self.model = model
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,).
