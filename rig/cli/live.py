@@ -58,7 +58,7 @@ def live(
     blocks = session_blocks(
         settings, lambda: open_logger(settings, pace=pace or None), plans, estimator
     )
-    if estimator is not None:
+    if estimator is not None and estimator.model is not None:
         blocks = watched(blocks, estimator.model)
     options = ShowOptions(
         title=f"rig live: {settings.name}",

@@ -58,7 +58,7 @@ def replay(
         json=json_,
     )
     blocks = replay_blocks(recording, estimator, speed or None)
-    if estimator is not None:
+    if estimator is not None and estimator.model is not None:
         blocks = watched(blocks, estimator.model)
     summary = show(blocks, options, console())
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
