@@ -119,7 +119,7 @@ def _begin(rising: Sequence[tuple[str, float]]) -> str:
 def run_error(model: Model, recording: Recording) -> float | None:
     """Return a model's error on one run as its fit counts it, or None without a usable sample."""
     channels = balance_channels(model, recording)
-    places = settled_places(channels, model.low_pass, moving_only=model.has_friction)
+    places = settled_places(channels, model.low_pass, samples=model.samples)
     if places.size == 0:
         return None
     error = (channels[model.target] - estimate(model, channels))[places]

@@ -43,6 +43,11 @@ class Interval:
     weights: FloatArray
     least: float
 
+    @property
+    def typical(self) -> float:
+        """Half the width where the error is of its mean size, in the target's unit."""
+        return self.least / NARROWEST
+
     def half_width(self, design: FloatArray) -> FloatArray:
         """Return half the interval's width for each row of a design, shape (n,)."""
         width = np.maximum(design[:, self.columns] @ self.weights, self.least)

@@ -9,6 +9,7 @@ from typer.exceptions import TyperException
 from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
+from rig.cli.calibrate import calibrate_app
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -43,6 +44,7 @@ app.command()(replay)
 app.command()(fit)
 app.command()(adapt)
 app.command()(export)
+app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.command()(loop)

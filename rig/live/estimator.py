@@ -5,6 +5,7 @@ from pathlib import Path
 
 from estimation import model_file
 from estimation.estimator import Stepper, load
+from estimation.estimators.bank import BankEstimator
 from estimation.model import Model
 from estimation.recording import MissingChannelError
 from estimation.stream import Stream
@@ -26,14 +27,21 @@ class ModelEstimator:
                 this rate.
         """
         self.model: Model | None = None  # only a physical model has effects to watch
+        self.half_width: float | None = None
         self._stream: Stepper
         if path.suffix == ".npz":
             estimator = load(path)
             self._stream, self.target_channel = estimator.stepper(sample_rate_hz), estimator.target
-        else:
-            self.model = model_file.read(path)
-            self._stream = Stream(self.model, sample_rate_hz)
-            self.target_channel = self.model.target
+            if isinstance(estimator, BankEstimator) and estimator.interval is not None:
+                self.half_width = estimator.interval.typical
+            return
+        model = model_file.read(path)
+        self._stream = Stream(model, sample_rate_hz)
+        self.target_channel = model.target
+        self.model = model
+        # two standard errors of the runs it was fitted on, their means left in: what a person at
+        # the bench has to reckon with, in motion, on a rig that is as it was then
+        self.half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,).
