@@ -101,10 +101,12 @@ class BankEstimator:
             InstrumentError: The recording is of another instrument.
         """
         self._require_own(instrument_of(recording))
-        source = causal_channels if causal else zero_phase_channels
-        return self.of_rows(
-            rows_of(source(recording, self.bank.channels, self.low_pass), self.bank)
-        )
+        names = self.bank.channels
+        if causal:
+            channels = causal_channels(recording, names, self.low_pass, tracked=True)
+        else:
+            channels = zero_phase_channels(recording, names, self.low_pass)
+        return self.of_rows(rows_of(channels, self.bank))
 
     def of_rows(self, rows: FloatArray) -> Estimates:
         """Return the estimates for rows of filtered channels, shape (n, channels)."""
@@ -185,7 +187,9 @@ class BankStepper:
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
         self._estimator = estimator
-        self._source = CausalChannels(estimator.bank.channels, sample_rate_hz, estimator.low_pass)
+        self._source = CausalChannels(
+            estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
+        )
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -333,7 +337,9 @@ class BankRecipe:
         kept = np.flatnonzero(is_closing(run) & run.valid)[::EVERY]
         if not len(kept):
             return None
-        source = causal_channels(recording, bank.channels, self.low_pass) if self.causal else run
+        source = run
+        if self.causal:
+            source = causal_channels(recording, bank.channels, self.low_pass, tracked=True)
         truths = run[self.target][kept, None]
         (evidence,) = RunEvidence.of_rows(bank, rows_of(source, bank)[kept], truths)
         return evidence

@@ -23,8 +23,9 @@ from estimation.derived import (
 )
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
-from estimation.estimators.c_templates import BANK, HEADER, NETWORK
+from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK, TRACKER
 from estimation.estimators.network import NetworkEstimator
+from estimation.kalman import tracker
 from estimation.recording import FloatArray
 
 
@@ -50,13 +51,16 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         )
     if isinstance(estimator, BankEstimator):
         channels, model = estimator.bank.channels, _bank(estimator)
+        motion = _tracker(sample_rate_hz)
     else:
         channels, model = estimator.network.inputs, _network(estimator)
+        motion = DIFFERENCES
     measured = measured_channels(channels)
     sections = estimator.low_pass.sections(sample_rate_hz)
     windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
     text = HEADER
     for mark, value in {
+        "MOTION": motion,
         "TARGET": estimator.target,
         "MEASURED_LIST": ", ".join(measured),
         "RATE": f"{sample_rate_hz!r}",
@@ -113,6 +117,14 @@ def _channel(k: int, channel: str, measured: Sequence[str], windows: Sequence[st
     else:
         raise ExportError(f"The channel {channel} cannot be computed in C.")
     return f"    row[{k}] = (float)({value}); /* {channel} */"
+
+
+def _tracker(sample_rate_hz: float) -> str:
+    found = tracker(sample_rate_hz)
+    text = TRACKER.replace("@PERIOD@", f"{found.period_s!r}")
+    for k, gain in enumerate(found.gain):
+        text = text.replace(f"@GAIN{k}@", f"{float(gain)!r}")
+    return text
 
 
 def _bank(estimator: BankEstimator) -> str:

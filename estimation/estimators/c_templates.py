@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     uint32_t tick;
     double filter[NAME_SECTIONS][NAME_MEASURED][2];
-    double last[NAME_MEASURED], last_speed[NAME_MEASURED];
+    double angle[NAME_MEASURED], speed[NAME_MEASURED], acceleration[NAME_MEASURED];
     name_queue window[NAME_WINDOWS];
 } name_state;
 
@@ -72,12 +72,8 @@ static inline name_estimate name_step(name_state *s, const double *measured) {
             z[1] = c[2] * x - c[4] * y;
             x = y;
         }
-        if (s->tick == 0) { s->last[i] = x; s->last_speed[i] = 0; }
         value[i] = x;
-        speed[i] = (x - s->last[i]) * @RATE@;
-        acceleration[i] = (speed[i] - s->last_speed[i]) * @RATE@;
-        s->last[i] = x;
-        s->last_speed[i] = speed[i];
+@MOTION@
     }
 @FILL@
     (void)acceleration;
@@ -161,3 +157,20 @@ static inline name_estimate name_model(const float *row) {
     name_estimate found = { low + (total + 1.0f) * (high - low) / 2.0f, NAN, valid };
     return found;
 }"""
+
+DIFFERENCES = """\
+        if (s->tick == 0) { s->angle[i] = x; s->speed[i] = 0; }
+        speed[i] = (x - s->angle[i]) * @RATE@;
+        acceleration[i] = (speed[i] - s->speed[i]) * @RATE@;
+        s->angle[i] = x;
+        s->speed[i] = speed[i];"""
+
+TRACKER = """\
+        /* a Kalman filter in its steady state, on the angle as measured */
+        if (s->tick == 0) { s->angle[i] = measured[i]; s->speed[i] = s->acceleration[i] = 0; }
+        s->angle[i] += @PERIOD@ * (s->speed[i] + 0.5 * @PERIOD@ * s->acceleration[i]);
+        s->speed[i] += @PERIOD@ * s->acceleration[i];
+        double innovation = measured[i] - s->angle[i];
+        s->angle[i] += @GAIN0@ * innovation;
+        speed[i] = s->speed[i] += @GAIN1@ * innovation;
+        acceleration[i] = s->acceleration[i] += @GAIN2@ * innovation;"""

@@ -207,7 +207,7 @@ def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> 
     run = oneill.processed(recording, names)
     sources = {"zero-phase": run}
     if any(filters == "live" for _, filters in wanted):
-        sources["live"] = causal_channels(recording, names)
+        sources["live"] = causal_channels(recording, names, tracked=True)
     kept = oneill.is_closing(run)
     return _Run(
         {
