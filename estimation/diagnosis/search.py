@@ -227,6 +227,8 @@ class Search:
             family = candidate.family
             if family in trials or refused.get(family, 0) > 3 or gains[k] <= 0:
                 continue
+            if candidate.is_limit:
+                continue
             if not self.gates.akin and any(related(candidate, f) for f in found):
                 continue
             if self._too_large([*found, candidate]):
@@ -344,7 +346,9 @@ class Search:
             if rival.family == found[k].family or len(rivals) == 8:
                 continue
             if rival.gain >= 0.8 * self.gates.rival * gain:
-                rivals[rival.family] = self._polished(others, rival.candidates[0])
+                best = self._polished(others, rival.candidates[0])
+                if not best.is_limit:
+                    rivals[rival.family] = self._losses_beside(others, best)
         total = mine.base[:, 0]
         near = {
             family: losses
@@ -364,13 +368,16 @@ class Search:
             flat if better else None,
         )
 
-    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
-        """Return a rival's losses at its own best shape."""
+    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> Candidate:
+        """Return a rival at its own best shape."""
+        if not rival.shape:
+            return rival
+        return self.balance.refined([*self.balance.terms, *others, rival], passes=1)[-1]
+
+    def _losses_beside(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
+        """Return the losses of each run left out with a rival in the winner's place."""
         terms = [*self.balance.terms, *others]
-        best = rival
-        if rival.shape:
-            best = self.balance.refined([*terms, rival], passes=1)[-1]
-        block = self.balance.columns([best])
+        block = self.balance.columns([rival])
         aims = [r[:, None] for r in self.balance.left(terms)]
         base = self.balance.base(terms)
         joint = leave_one_run_out(base, block, [block[0].shape[1]], aims).joint
