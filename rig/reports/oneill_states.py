@@ -6,7 +6,7 @@ from rig.reports.oneill_networks import SHOWN
 from rig.reports.table import TextTable
 from rig.studies.oneill_networks import NetworkStudy
 from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
-from rig.studies.oneill_states import FOLDS, StateRow, StateStudy, ablated
+from rig.studies.oneill_states import FOLDS, StateJob, StateRow, StateStudy, ablated
 
 PROTOCOLS = ("run-wise", "lofo", "lopo")
 
@@ -26,6 +26,7 @@ def notes(study: StateStudy) -> list[str]:
     """Return what a reader must know about the rows."""
     settings = study.settings
     return [
+        *_lead(study),
         f"Physical states: {study.weights} weights of products of states and of a ripple in the"
         f" spindle's angle, linear, by ridge regression ({settings.ridge:g} of a column's variance;"
         f" {settings.offset_share:.0%} of each run's means left out). Nothing looks back further"
@@ -36,6 +37,23 @@ def notes(study: StateStudy) -> list[str]:
         " chosen on their own runs, out of three sets.",
         *study.notes,
     ]
+
+
+def _lead(study: StateStudy) -> list[str]:
+    """Return the run-wise errors from the command in a sentence, where they were measured."""
+    rows = {row.job: row for row in study.rows}
+    told = []
+    for filters in ("zero-phase", "live"):
+        own = [rows.get(StateJob("neutral", "command", target, filters)) for target in SHOWN]
+        if all(own):
+            errors = [
+                f"{name} {_scaled(row)} {unit}"
+                for row, (name, unit, _) in zip(own, SHOWN.values(), strict=True)
+            ]
+            told.append(f"{filters}: {', '.join(errors)}")
+    if not told:
+        return []
+    return [f"From the command by physical states, on whole runs not seen, {'; '.join(told)}."]
 
 
 def tables(study: StateStudy, deep: NetworkStudy | None) -> list[TextTable]:
