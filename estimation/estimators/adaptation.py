@@ -29,7 +29,7 @@ from estimation.recording import FloatArray, Recording
 
 Adaptable = BankEstimator | NetworkEstimator
 
-POSITION, LOAD, REST = 0.1, 10.0, 3.0
+POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
 
 OUTPUT = 0.1
