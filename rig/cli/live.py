@@ -69,7 +69,7 @@ def live(
             keys or no_keys,
             out,
         )
-        if estimator is not None:
+        if estimator is not None and estimator.model is not None:
             blocks = watched(blocks, estimator.model)
         options = ShowOptions(
             title=f"rig live: {settings.name}",
