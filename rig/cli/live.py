@@ -32,6 +32,10 @@ def live(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder of recordings that a key starts.")
     ] = Path("logs"),
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Also serve it to Foxglove, on this computer only.")
+    ] = False,
+    foxglove_port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 8765,
     json_: JsonFlag = False,
 ) -> int:
     """Show grip torque, estimate against sensor, as the rig measures it.
@@ -66,6 +70,10 @@ def live(
             keys or no_keys,
             out,
         )
+        if foxglove:
+            from rig.live.foxglove import published
+
+            blocks = published(blocks, foxglove_port)
         options = ShowOptions(
             title=f"rig live: {settings.name}",
             channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
