@@ -158,6 +158,45 @@ class Session:
             newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading
 
+    def follow(
+        self, setpoints: Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    ) -> Iterator[Reading]:
+        """Arm the rig and play setpoints that are decided while it goes, until there are no more.
+
+        A piece is asked for `LEAD_S` before it is played, so what a reading tells can change what
+        comes so much later.
+
+        Args:
+            setpoints: Pieces of spindle angle (rad) and load current (A) at 1 kHz, each of shape
+                (n,), n from 1 to `MAX_SETPOINTS`.
+
+        Raises:
+            SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
+            LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
+        """
+        limits = self.config.limits
+        lead = round(LEAD_S * TICKS_A_SECOND)
+        self._logger.arm(self.config.controller.gains(), board_limits(limits, self.calibrations))
+        queued = played = 0
+        is_over = False
+        newest_sequence: int | None = None
+        while not is_over or played < queued:
+            while not is_over and queued < played + lead:
+                piece = next(setpoints, None)
+                if piece is None:
+                    is_over = True
+                    break
+                check_setpoints(limits, *piece)
+                targets = self._to_counts("target_angle_rad", piece[0])
+                self._logger.queue(targets, self._to_counts("load_command_a", piece[1]))
+                queued += targets.size
+            reading = self._read()
+            check_board(reading)
+            reading = with_setpoints(reading, played, queued, newest_sequence)
+            played = max(played, int(reading.setpoint.max()) + 1)
+            newest_sequence = int(reading.counts["sequence"][-1]) if played else None
+            yield reading
+
     def settle(self) -> None:
         """Move the unloaded rig a little, so that friction gives up the torque it holds."""
         motion = settling(self.spindle_angle_rad)

@@ -12,6 +12,7 @@ from rig.cli.calibrate import calibrate_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.fit import fit
+from rig.cli.grip import grip
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.record import record
@@ -34,6 +35,7 @@ app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
+app.command()(grip)
 app.command()(fit)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
