@@ -397,4 +397,13 @@ def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
         rmse=float(np.sqrt(centred / samples)),
         rmse_with_means=float(np.sqrt(squares / samples)),
         seed=seed,
+        run_spread=_run_spread(fitted, errors),
     )
+
+
+def _run_spread(fitted: Model, errors: Sequence[FloatArray]) -> float | None:
+    """Return how much runs differ: the standard deviation of the logarithm of their errors."""
+    powers = np.array([e.var() if fitted.run_offsets else np.mean(e**2) for e in errors])
+    if len(powers) < 2 or not np.all(powers > 0):
+        return None
+    return float(np.std(0.5 * np.log(powers), ddof=1))

@@ -83,6 +83,10 @@ class Term:
         )
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to other processes: a view of a mapping does not."""
+        return Term, (self.effect, self.sign, dict(self.channels), dict(self.values))
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters of the effect: the amplitudes, then the shape."""
@@ -131,6 +135,8 @@ class Evidence:
         rmse: Root mean square error with each run's mean error removed, in the target's unit.
         rmse_with_means: The same with the means left in.
         seed: Seed of the bootstrap behind the spreads.
+        run_spread: Standard deviation over runs of the logarithm of a run's error, None where a
+            single run was fitted or the file does not tell.
     """
 
     runs: tuple[str, ...]
@@ -138,6 +144,7 @@ class Evidence:
     rmse: float
     rmse_with_means: float
     seed: int
+    run_spread: float | None = None
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,8 @@ def to_toml(model: Model) -> str:
             f"{key} = {_value(getattr(model.evidence, key))}"
             for key in ("runs", "samples", "rmse", "rmse_with_means", "seed")
         ]
+        if model.evidence.run_spread is not None:
+            lines.append(f"run_spread = {_value(model.evidence.run_spread)}")
     return "\n".join(lines) + "\n"
 
 
@@ -270,4 +272,5 @@ def _evidence(table: _Table) -> Evidence:
         rmse=table.number("rmse"),
         rmse_with_means=table.number("rmse_with_means"),
         seed=table.take("seed", int),
+        run_spread=table.number("run_spread") if "run_spread" in table.content else None,
     )

@@ -5,10 +5,9 @@ trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM), the 
 first, and the disarming is confirmed by the logger itself.
 """
 
-import signal
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
-from types import FrameType, TracebackType
+from contextlib import ExitStack, suppress
+from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -17,20 +16,26 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
-from drivers.errors import DriverError
+from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity
+from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Trip
 from drivers.transport.transport import Transport
+from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
+from rig.interrupts import leaving_safely
 from rig.motion import settling
 from rig.reading import Reading, reading_of, with_setpoints
-from rig.safety import board_limits, check_board, check_samples, check_setpoints
+from rig.safety import board_limits, check_samples, check_setpoints
+from rig.trips import HostWatch, trip_error, tripped
 
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
 
 TICKS_A_SECOND = 1_000_000 // TICK_US
+
+UNENDING = 2**62
+"""Number of setpoints while it is not known how many there will be."""
 
 READ_TIMEOUT_S = 0.2
 """Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
@@ -60,16 +65,23 @@ class Session:
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
+        self._watch: HostWatch | None = None
         self.newest_tick_us = 0
+        self.companions: list[Companion] = []
         self.clock = ClockFit()
         """The logger's clock against this computer's; its line states the residual of the fit."""
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
+            ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
+            self.companions = open_companions(self.config)
+            for companion in self.companions:
+                ways_out.callback(companion.device.close)
             ways_out.callback(self._stop_streaming)
-            ways_out.enter_context(_sigterm_as_interrupt())
+            for companion in self.companions:
+                companion.begin(self._transport.now_s)
             self._logger.start()
             self._ways_out = ways_out.pop_all()
         return self
@@ -98,6 +110,7 @@ class Session:
         Raises:
             DriverError: The logger did not confirm; cut the power by hand.
         """
+        self._watch = None
         self._logger.disarm()
 
     def rest(self, duration_s: float) -> Iterator[Reading]:
@@ -138,25 +151,10 @@ class Session:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        limits = self.config.limits
-        check_setpoints(limits, target_angle_rad, load_command_a)
-        targets = self._to_counts("target_angle_rad", target_angle_rad)
-        loads_ma = self._to_counts("load_command_a", load_command_a)
-        lead = round(LEAD_S * TICKS_A_SECOND)
-        self._logger.arm(self.config.controller.gains(), board_limits(limits, self.calibrations))
-        queued = played = 0
-        newest_sequence: int | None = None
-        while played < targets.size:
-            while queued < min(played + lead, targets.size):
-                block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
-                self._logger.queue(targets[block], loads_ma[block])
-                queued = block.stop
-            reading = self._read()
-            check_board(reading)
-            reading = with_setpoints(reading, played, targets.size, newest_sequence)
-            played = max(played, int(reading.setpoint.max()) + 1)
-            newest_sequence = int(reading.counts["sequence"][-1]) if played else None
-            yield reading
+        check_setpoints(self.config.limits, target_angle_rad, load_command_a)
+        cuts = range(0, target_angle_rad.size, MAX_SETPOINTS)
+        blocks = [slice(cut, cut + MAX_SETPOINTS) for cut in cuts]
+        yield from self.follow((target_angle_rad[b], load_command_a[b]) for b in blocks)
 
     def follow(
         self, setpoints: Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -174,9 +172,10 @@ class Session:
             SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        limits = self.config.limits
         lead = round(LEAD_S * TICKS_A_SECOND)
-        self._logger.arm(self.config.controller.gains(), board_limits(limits, self.calibrations))
+        board = board_limits(self.config, self.calibrations)
+        self._watch = HostWatch(board)
+        self._logger.arm(self.config.controller.gains(), board)
         queued = played = 0
         is_over = False
         newest_sequence: int | None = None
@@ -186,13 +185,14 @@ class Session:
                 if piece is None:
                     is_over = True
                     break
-                check_setpoints(limits, *piece)
+                check_setpoints(self.config.limits, *piece)
                 targets = self._to_counts("target_angle_rad", piece[0])
-                self._logger.queue(targets, self._to_counts("load_command_a", piece[1]))
+                self._queue(targets, self._to_counts("load_command_a", piece[1]))
                 queued += targets.size
             reading = self._read()
-            check_board(reading)
-            reading = with_setpoints(reading, played, queued, newest_sequence)
+            # until the end is known, a queue that ran dry is a setpoint that is missing
+            planned = queued if is_over else UNENDING
+            reading = with_setpoints(reading, played, planned, newest_sequence)
             played = max(played, int(reading.setpoint.max()) + 1)
             newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading
@@ -217,17 +217,45 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
+        for companion in self.companions:
+            companion.poll(self._transport.now_s)
         if self._first_tick_us is None:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
         self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
         try:
+            self._require_no_trip(reading)
             check_samples(self.config.limits, reading)
+            crossing = self._watch.check(reading) if self._watch else None
+            if crossing is not None:
+                raise trip_error(crossing, self.calibrations, "This computer is disarming the rig.")
         except SafetyTripError:
             self.safe()
             raise
         return reading
+
+    def _queue(self, targets: NDArray[np.int32], loads_ma: NDArray[np.int32]) -> None:
+        """Queue setpoints; a board that has tripped since it was read says over what."""
+        try:
+            self._logger.queue(targets, loads_ma)
+        except CommandRefusedError as error:
+            report = self._logger.trip()
+            if report.code is Trip.NONE:
+                raise
+            state = "It is in its safe state, until armed again."
+            raise trip_error(report, self.calibrations, state) from error
+
+    def _require_no_trip(self, reading: Reading) -> None:
+        """Look for what the board itself tripped over.
+
+        Raises:
+            SafetyTripError: It did and is in its safe state; says over what, and how late.
+        """
+        trip = tripped(reading)
+        if self._watch is not None and trip is not None:
+            state = "It holds the spindle with a low command" if trip[1] else "It is released"
+            raise trip_error(self._logger.trip(), self.calibrations, f"{state}, until armed again.")
 
     def _follow_clock(self) -> None:
         exchange = self._logger.last_exchange
@@ -256,21 +284,3 @@ class Session:
         """Let go of the link; whether the rig was disarmed has been settled before."""
         with suppress(DriverError):
             self._logger.close()
-
-
-@contextmanager
-def _sigterm_as_interrupt() -> Iterator[None]:
-    """Turn SIGTERM into KeyboardInterrupt, so that it takes the same way out as Ctrl-C."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    try:
-        previous = signal.signal(signal.SIGTERM, interrupt)
-    except ValueError:  # not in the main thread, where signals never arrive
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)

@@ -101,6 +101,9 @@ class Candidate:
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""
         inputs = {role: channels[name] for role, name in self.channels}
+        for role in self.effect.projected_roles:
+            name = projected(dict(self.channels)[role])
+            inputs[role] = channels.get(name, inputs[role])
         return self.sign * self.effect.columns(inputs, self.shape)
 
     def moved(self, k: int, steps: float) -> "Candidate":
@@ -109,6 +112,11 @@ class Candidate:
         values = list(self.shape)
         values[k] = step(bound, values[k], steps)
         return replace(self, shape=tuple(values))
+
+
+def projected(channel: str) -> str:
+    """Return the name under which a channel's projection on the other sensors goes."""
+    return f"projected {channel}"
 
 
 def step(bound: Parameter, value: float, steps: float) -> float:

@@ -13,6 +13,8 @@ from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, prepare
 from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, squares
+from estimation.diagnosis.instruments import instruments
+from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
 from estimation.diagnosis.search import Discovery, Gates, Named, Search
@@ -175,15 +177,16 @@ def _balance(
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
     wanted = [model.target, *model.channels, *needed_channels(measured)]
-    wanted += [channel for c in tried for _, channel in c.channels]
+    wanted += [*instruments(measured), *(channel for c in tried for _, channel in c.channels)]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
-    balance = lay_out(fitted, runs, mapper)
+    told = instrumented(runs, tried, fitted.target)
+    balance = lay_out(fitted, [told(run) for run in runs], mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))
-    whole = projection(balance)
-    balance = replace(balance, runs=[whole(run) for run in runs])
+    loaded = projection(balance)
+    balance = replace(balance, runs=[loaded(run) for run in balance.runs])
     twin = None
     if maker is not None:
         source = maker(fitted, discover)
@@ -199,7 +202,7 @@ def _balance(
         before=before,
         after=before,
         values=(),
-        confirm=tuple(whole(run) for run in held),
+        confirm=tuple(loaded(told(run)) for run in held),
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
         unused=(*rested, *also),
@@ -440,5 +443,4 @@ def _notes(
         for name, story in stories.items()
         for what in story.refused
     ]
-    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
     return notes

@@ -276,8 +276,12 @@ class Search:
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
-        if all(p.lower < 0 and p.upper > 0 for c in added for p in c.effect.amplitudes):
-            return True
+        own = [p for c in added for p in c.effect.amplitudes]
+        if all(p.lower < 0 < p.upper for p in own):
+            weights = self.balance.solve([*terms, *added])[-len(own) :]
+            return all(
+                0.999 * p.lower < w < 0.999 * p.upper for p, w in zip(own, weights, strict=True)
+            )
         together = [*terms, *added]
         before, after = self.balance.loss(terms), self.balance.loss(together)
         columns = np.vstack(self.balance.columns(together))

@@ -65,6 +65,8 @@ class Effect(ABC):
         roles: Role of each input, and the channel that plays it unless a model says otherwise.
         amplitudes: Linear parameters, one a column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
+        projected_roles: Roles a search takes as the other sensors tell them, not as measured: those
+            whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
         at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
@@ -76,6 +78,7 @@ class Effect(ABC):
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
+    projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     at_rest: ClassVar[bool] = False

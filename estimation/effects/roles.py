@@ -79,7 +79,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
         "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
-        "encoder": ("spindle_angle_rad", "jaw_angle_rad"),
+        "encoder": ("spindle_angle_rad",),
         "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION

@@ -20,7 +20,7 @@ class SensorCreep(Remembering):
     id = "sensor.creep"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1}
     roles: ClassVar = {"clock": "time_s", "creeping": "motor_load_n_m"}
-    amplitudes = (Parameter("creep", "target / creeping", "share that comes slowly"),)
+    amplitudes = (Parameter("creep", "target / creeping", "share that comes slowly", -1.0, 1.0),)
     shape = (Parameter("time_constant", "clock", "time until 63 % of it", 0.3, 60.0, points=7),)
     walk = behind
     rest = AT_REST

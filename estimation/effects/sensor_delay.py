@@ -67,10 +67,12 @@ class SensorDelay(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
-    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading"),)
+    # a late reading weighs as much as the reading: 1 for the target's own, at most 1.5 on the rig
+    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
     shape = (Parameter("delay", "clock", "how late it is", 2e-4, 5e-2, points=6),)
     walk = _walk
     rest = (0.0,) * (_VALUES + PLACES)
+    projected_roles = ("reading",)
     confused_with = (
         "sensor.lag",
         "motor.electrical",

@@ -12,9 +12,9 @@ class EncoderNonlinearity(Pointwise):
     """An encoder off its centre (order 1), a tilted magnet (2), unequal phases (4, or its lines).
 
     Equation: error = a sin(order angle) + b cos(order angle). In the balances of angles only: the
-    motor's or the spindle's encoder in the gearbox's, the spindle's or the jaw's in the stretch's.
-    The wave is taken of the encoder's own reading even where that is the target: its noise is far
-    below a period of the wave, so that it adds nothing that the wave could fit.
+    motor's or the spindle's encoder in the gearbox's, the spindle's in the stretch's. The jaw's own
+    encoder is the target there, and the waves of an angle add up to the angle itself; its error
+    shows over the spindle's angle, its order times the ratio of the two.
 
     Source: integral non-linearity of magnetic angle encoders by harmonics of the turn, as their
     makers' data sheets give it.

@@ -28,10 +28,12 @@ class SensorLag(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
-    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading"),)
+    # a late reading weighs as much as the reading: 1 for the target's own, at most 1.5 on the rig
+    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
     shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 0.2, points=6),)
     walk = behind
     rest = AT_REST
+    projected_roles = ("reading",)
     confused_with = (
         "sensor.delay",
         "sensor.creep",

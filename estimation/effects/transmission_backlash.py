@@ -12,7 +12,8 @@ class Backlash(Pointwise):
     """Play of teeth or keys, crossed when the load passes through zero.
 
     Equation: deflection = gap tanh((load - middle) / width). The middle is not zero where the
-    sensor's zero is off.
+    sensor's zero is off. It is crossed at a load far below those carried; a bend that takes longer
+    is a stiffness that changes.
 
     Source: Nordin and Gutman 2002 (models of mechanical systems with backlash), the dead zone as
     seen from the load, with a soft edge.
@@ -23,7 +24,7 @@ class Backlash(Pointwise):
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("gap", "target", "half the play", lower=0.0),)
     shape = (
-        Parameter("width", "load", "load at which 76 % is crossed", 5e-4, 0.1, points=6),
+        Parameter("width", "load", "load at which 76 % is crossed", 5e-4, 0.015, points=6),
         Parameter("middle", "load", "load in the middle of the play", -0.1, 0.1, True, points=7),
     )
     confused_with = ("hysteresis.presliding", "transmission.stiffening", "friction.coulomb")

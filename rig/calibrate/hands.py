@@ -10,6 +10,7 @@ from calibration.torque import weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
 from drivers.teensy.fake import TeensyFake
+from drivers.teensy.guard import COLUMNS, Drive
 from drivers.transport.simulated import SimulatedTransport
 from rig.config import Config
 from rig.simulation import hidden, parameters
@@ -36,7 +37,7 @@ class HandledBench:
         self._plant, self._sensors, self._effects = plant, sensors, effects
         self._inner = self._made(REFERENCE_START_COUNT, simulation.seed)
         self._seed = simulation.seed
-        self._added = np.zeros(9)
+        self._added = np.zeros(COLUMNS)
         self._noise = np.random.default_rng(simulation.seed)
         self.fsr: PressedFsr | None = None
 
@@ -63,13 +64,10 @@ class HandledBench:
         ticks: int,
         target: NDArray[np.int32],
         load_ma: NDArray[np.int32],
-        armed: bool,
-        control_state: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        limits: NDArray[np.int32],
+        drive: Drive,
     ) -> NDArray[np.int32]:
         """Run the bench and add what hands do; see `drivers.teensy.fake.Bench.advance`."""
-        rows = self._inner.advance(ticks, target, load_ma, armed, control_state, gains, limits)
+        rows = self._inner.advance(ticks, target, load_ma, drive)
         for column in np.flatnonzero(self._added):
             limit = self._sensors.torque_limit_count
             moved = np.clip(np.round(rows[:, column] + self._added[column]), -limit - 1, limit)

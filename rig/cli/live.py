@@ -49,12 +49,14 @@ def live(
     terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
     """
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.live.estimator import ModelEstimator
     from rig.live.keys import HELP, no_keys, pressed_keys
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
+    from rig.live.watching import watched
     from rig.logger import open_logger
     from rig.protocol import load_protocol
     from rig.trajectory import SAMPLE_RATE_HZ
@@ -62,8 +64,9 @@ def live(
     if grasper:
         return _show_grasper(duration, pace, plain, json_)
     settings = load_config(config)
+    refuse_problems(settings)
     if protocol is None and settings.is_simulated:
-        protocol = "quick"
+        protocol = "quick" if settings.limits.load_command_a else "unloaded"
     plans = load_protocol(protocol).plans() if protocol else []
     model_path = model or settings.model_path
     estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None
@@ -76,6 +79,8 @@ def live(
             keys or no_keys,
             out,
         )
+        if estimator is not None:
+            blocks = watched(blocks, estimator.model)
         if foxglove:
             from rig.live.foxglove import published
 

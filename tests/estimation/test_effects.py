@@ -200,7 +200,7 @@ def typical(kind) -> list[float]:
         return [BETWEEN_RUNS_S, 3.0]
     if kind.family == "spring.end_stop":
         return [0.62 if kind.id == kind.family else -0.2]
-    whole = {"sensor.encoder_inl": 11 / 31}.get(kind.id)
+    whole = {"sensor.encoder_inl": 11 / 31, "sensor.encoder_inl.harmonics": 6 / 15}.get(kind.id)
     return [at(p, whole or (0.7 if p.unit == "speed" else 0.37)) for p in kind.shape]
 
 
@@ -246,7 +246,8 @@ def made_by(kind, shape: list[float], runs: int = 3):
     sides = np.where(
         [p.lower >= 0 for p in kind.amplitudes], 1.0, [(-1.0) ** k for k in range(len(size))]
     )
-    weights = 0.05 * sides / size
+    most = np.array([min(1e9, p.upper) for p in kind.amplitudes])
+    weights = sides * np.minimum(0.05 / size, most / 2)
     full = [
         r.with_columns(**{target: t @ weights}) for r, t in zip(recordings, tables, strict=True)
     ]
