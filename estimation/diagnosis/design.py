@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.candidate import ANGLE_ROLES, Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -41,7 +41,7 @@ class Run:
     Attributes:
         name: Name of the run.
         channels: Channel name to values at the full rate, shape (n,).
-        valid: Samples without a flag and away from the ends, shape (n,).
+        valid: Samples without a flag and away from the ends, of those the model counts, shape (n,).
         moving: Samples that are not at rest, where friction is in the balance, shape (n,).
         down: One in so many samples is regressed on.
     """
@@ -54,7 +54,7 @@ class Run:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Samples at the full rate that errors are told over: valid and in motion, shape (n,)."""
+        """Samples at the full rate that fits and decisions count: valid, in motion, shape (n,)."""
         return self.valid & self.moving
 
     @cached_property
@@ -102,7 +102,7 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
     moving = np.ones(len(valid), bool)
     if model.counted == "closing":
-        moving = closing(channels[SPINDLE_SPEED], rate_hz)
+        valid &= closing(channels[SPINDLE_SPEED], rate_hz)  # the others are no part of the claim
     else:
         for speed in speeds:
             moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
@@ -144,6 +144,13 @@ def columns_at(run: Run, candidate: Candidate) -> FloatArray:
     if candidate.effect.start():
         return run.thin(candidate.columns(run.channels))
     return candidate.columns(run.sampled)
+
+
+def covered(wanted: Sequence[Candidate], runs: Sequence[Run]) -> list[Candidate]:
+    """Return the candidates but waves of which no run covers a whole period."""
+    angles = {channel for c in wanted for role, channel in c.channels if role in ANGLE_ROLES}
+    spans = {angle: max(float(np.ptp(run.channels[angle])) for run in runs) for angle in angles}
+    return [c for c in wanted if c.turns(spans) >= 1.0]
 
 
 def tables(

@@ -14,7 +14,7 @@ from estimation.campaign import Campaign
 from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import Candidate, pool
-from estimation.diagnosis.design import DesignError, Run, prepare
+from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.frozen import Frozen, Part, freeze
 from estimation.diagnosis.search import Gates, Search, Trial
 from estimation.diagnosis.split import Sealed, split
@@ -29,6 +29,10 @@ from rig.reports.provenance import Provenance
 
 TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
 """Families left out: they know how long a run has lasted, which means nothing for another load."""
+
+
+FLOOR = 0.002
+"""Least share of the linear model's squared error that an effect must remove."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +205,10 @@ def _row(
     tried = [c for c in pool(declared, task.measured, task.instead) if c.family not in TIMELESS]
     wanted = [task.target, *declared.channels, *(ch for c in tried for _, ch in c.channels)]
     runs = _prepared(discover, wanted, declared)
-    gates = Gates(most=task.parameters, parameters=task.parameters, akin=True, surrogates=99)
+    tried = covered(tried, runs)
+    gates = Gates(
+        most=task.parameters, parameters=task.parameters, akin=True, surrogates=99, floor=FLOOR
+    )
     search = Search(lay_out(fitted, runs), tried, gates, sealed.seed)
 
     def found(trial: Trial) -> None:
