@@ -17,6 +17,7 @@ from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
+from rig.cli.grip import grip
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
@@ -41,6 +42,7 @@ app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
+app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
 app.command()(export)
