@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.derived import settled
+from estimation.derived import settled_places
 from estimation.fitting import fit
 from estimation.model import Model, balance_channels, estimate
 from estimation.recording import FloatArray
@@ -47,12 +47,10 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
     for split in campaign.folds(folds, seed):
         fitted = fit(declared, split.train, bootstrap=0)
         for recording in split.test:
-            run = settled(
-                balance_channels(fitted, recording),
-                fitted.low_pass,
-                moving_only=fitted.has_friction,
-            )
-            errors[recording.name] = run[fitted.target] - estimate(fitted, run)
+            run = balance_channels(fitted, recording)
+            places = settled_places(run, fitted.low_pass, samples=fitted.samples)
+            error = run[fitted.target] - estimate(fitted, run)
+            errors[recording.name] = error[places]
     whole = np.concatenate(list(errors.values()))
     centred = {name: error - error.mean() for name, error in errors.items() if error.size}
     return HeldOutError(

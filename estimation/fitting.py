@@ -5,7 +5,7 @@ Where offsets of the runs are a nuisance, each run's mean is removed from the ta
 column, and the model's own offset becomes the mean over the runs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from estimation.campaign import Campaign
-from estimation.derived import settled
-from estimation.effects import Parameter
+from estimation.derived import CAMPAIGN_TIME, settled_places
+from estimation.effects import Parameter, Remembering
 from estimation.errors import EstimationError
 from estimation.model import (
     Estimate,
     Evidence,
     Model,
+    Term,
     balance_channels,
     estimate,
     with_values,
@@ -34,11 +35,26 @@ class FitError(EstimationError):
 
 
 @dataclass(frozen=True)
+class _Run:
+    """A run's filtered channels, whole for effects with memory, and the samples of the fit."""
+
+    whole: Recording
+    places: NDArray[np.intp]
+    thin: Recording
+
+    def columns(self, term: Term, shape: Sequence[float]) -> FloatArray:
+        """Return an effect's columns at the samples of the fit."""
+        if isinstance(term.effect, Remembering):
+            return np.asarray(term.columns(self.whole, shape)[self.places])
+        return term.columns(self.thin, shape)
+
+
+@dataclass(frozen=True)
 class _Problem:
     """A model laid out for fitting: its runs and which columns are which."""
 
     model: Model
-    runs: list[Recording]
+    runs: list[_Run]
     free: NDArray[np.intp]  # columns that least squares solves for
     offset: int | None  # column of the model's own offset when run offsets replace it
     names: list[str]  # of all columns
@@ -51,18 +67,20 @@ class _Problem:
         """Shape parameters of all terms, in order."""
         return [p for term in self.model.terms for p in term.effect.shape]
 
-    def columns(self, run: Recording, shape: Sequence[float]) -> FloatArray:
+    def columns(self, run: _Run, shape: Sequence[float]) -> FloatArray:
         """Return all signed columns of a run, shape (n, columns)."""
         blocks = []
         rest = list(shape)
         for term in self.model.terms:
             own, rest = rest[: len(term.effect.shape)], rest[len(term.effect.shape) :]
-            blocks.append(term.columns(run, own))
+            blocks.append(run.columns(term, own))
         return np.column_stack(blocks) * self.signs
 
-    def gram(self, run: Recording, shape: Sequence[float]) -> FloatArray:
+    def gram(self, run: _Run, shape: Sequence[float]) -> FloatArray:
         """Return the cross-products of free columns and target of one run."""
-        table = np.column_stack([self.columns(run, shape)[:, self.free], run[self.model.target]])
+        table = np.column_stack(
+            [self.columns(run, shape)[:, self.free], run.thin[self.model.target]]
+        )
         if self.model.run_offsets:
             table -= table.mean(axis=0)
         product: FloatArray = table.T @ table
@@ -110,14 +128,16 @@ def fit(
     )
 
 
-def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recording]:
-    """Read the runs and keep the model's channels at every n-th valid sample."""
+def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]:
+    """Read the runs and find every n-th valid sample of them."""
     runs = []
-    for recording in campaign.evidence:
+    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+    for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
-        run = settled(balance_channels(model, recording), model.low_pass, step, model.has_friction)
-        if len(run):
-            runs.append(run)
+        whole = balance_channels(model, recording)
+        places = settled_places(whole, model.low_pass, step, model.samples)
+        if places.size:
+            runs.append(_Run(whole, places, whole.at(places)))
     if not runs:
         raise FitError(
             f"These runs do not tell the model {model.name!r}: there is no valid sample to fit.",
@@ -128,7 +148,7 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[Recor
     return runs
 
 
-def _problem(model: Model, runs: list[Recording]) -> _Problem:
+def _problem(model: Model, runs: list[_Run]) -> _Problem:
     parameters = [(term, p) for term in model.terms for p in term.effect.amplitudes]
     names = [f"{term.effect.id}.{p.name}" for term, p in parameters]
     offset = names.index(f"{OFFSET}.offset") if f"{OFFSET}.offset" in names else None
@@ -213,15 +233,43 @@ def _search_shape(problem: _Problem) -> list[float]:
         except FitError:  # a shape at which columns fall together, such as a width far too wide
             return 1.0
 
+    grids = [[_scaled(p, float(x)) for x in p.grid()] for p in parameters]
     for _ in range(2 if len(parameters) > 1 else 1):
-        for k, parameter in enumerate(parameters):
-            grid = [_scaled(parameter, float(x)) for x in parameter.grid()]
+        for k, grid in enumerate(grids):
             tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
-    best = optimize.minimize(
-        error, point, method="Powell", bounds=bounds, options={"xtol": 1e-4, "ftol": 1e-10}
-    )
-    return values(best.x if best.fun <= error(point) else point)
+    reach = [grid[1] - grid[0] for grid in grids]
+    return values(_descended(error, point, reach, bounds))
+
+
+def _descended(
+    error: Callable[[Sequence[float] | FloatArray], float],
+    point: list[float],
+    reach: Sequence[float],
+    bounds: Sequence[tuple[float, float]],
+    most: int = 20,
+) -> list[float]:
+    """Return the lowest point near where the grid left off.
+
+    A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
+    each descent goes one step of the grid at most either way; it starts anew from where it ends
+    while that gains, since a valley of two shapes bends.
+    """
+    left = error(point)
+    for _ in range(most):
+        near = [
+            (max(low, x - step), min(high, x + step))
+            for x, step, (low, high) in zip(point, reach, bounds, strict=True)
+        ]
+        best = optimize.minimize(
+            error, point, method="Powell", bounds=near, options={"xtol": 1e-4, "ftol": 1e-10}
+        )
+        gained, left = left - best.fun, min(left, best.fun)
+        if gained > 0:
+            point = [float(x) for x in best.x]
+        if gained <= 1e-5 * left:
+            break
+    return point
 
 
 def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:
@@ -231,10 +279,8 @@ def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) ->
     return float(np.mean([_run_offset(problem, run, shape, free) for run in problem.runs]))
 
 
-def _run_offset(
-    problem: _Problem, run: Recording, shape: Sequence[float], free: FloatArray
-) -> float:
-    left = run[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free
+def _run_offset(problem: _Problem, run: _Run, shape: Sequence[float], free: FloatArray) -> float:
+    left = run.thin[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free
     return float(left.mean() * problem.signs[problem.offset or 0])
 
 
@@ -257,7 +303,8 @@ def _bootstrap(
             [
                 problem.columns(run, shape)[:, problem.free],
                 _slopes(problem, run, shape, free),
-                run[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free,
+                run.thin[problem.model.target]
+                - problem.columns(run, shape)[:, problem.free] @ free,
             ]
         )
         means.append(table.mean(axis=0))
@@ -289,10 +336,10 @@ def _bootstrap(
 
 
 def _slopes(
-    problem: _Problem, run: Recording, shape: list[float], free: FloatArray, step: float = 1e-3
+    problem: _Problem, run: _Run, shape: list[float], free: FloatArray, step: float = 1e-3
 ) -> FloatArray:
     """Return the derivative of the estimate by each shape on its scale, shape (n, shapes)."""
-    slopes = np.empty((len(run), len(shape)))
+    slopes = np.empty((run.places.size, len(shape)))
     for k, parameter in enumerate(problem.shape_parameters):
         ends = []
         for sign in (1, -1):
@@ -339,15 +386,24 @@ def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate
     return Estimate(float(value), float(replicates.std(ddof=1)), (float(low), float(high)))
 
 
-def _evidence(fitted: Model, runs: list[Recording], seed: int) -> Evidence:
-    errors = [run[fitted.target] - estimate(fitted, run) for run in runs]
+def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
+    errors = [(run.whole[fitted.target] - estimate(fitted, run.whole))[run.places] for run in runs]
     samples = sum(len(error) for error in errors)
     squares = sum(float(error @ error) for error in errors)
     centred = sum(float(np.sum((error - error.mean()) ** 2)) for error in errors)
     return Evidence(
-        runs=tuple(run.name for run in runs),
+        runs=tuple(run.whole.name for run in runs),
         samples=samples,
         rmse=float(np.sqrt(centred / samples)),
         rmse_with_means=float(np.sqrt(squares / samples)),
         seed=seed,
+        run_spread=_run_spread(fitted, errors),
     )
+
+
+def _run_spread(fitted: Model, errors: Sequence[FloatArray]) -> float | None:
+    """Return how much runs differ: the standard deviation of the logarithm of their errors."""
+    powers = np.array([e.var() if fitted.run_offsets else np.mean(e**2) for e in errors])
+    if len(powers) < 2 or not np.all(powers > 0):
+        return None
+    return float(np.std(0.5 * np.log(powers), ddof=1))

@@ -205,6 +205,15 @@ class Recording:
             raise RecordingError(f"Run {self.name!r} has {len(self)} samples: no sample rate.")
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
+    def at(self, places: NDArray[np.intp]) -> "Recording":
+        """Return the samples at these places alone, in their order, shape (k,)."""
+        return replace(
+            self,
+            time_s=self.time_s[places],
+            columns={name: values[places] for name, values in self.columns.items()},
+            flags=self.flags[places],
+        )
+
     def slice_time(self, start_s: float, stop_s: float) -> "Recording":
         """Return the samples with start_s <= time < stop_s; columns are views, not copies."""
         first, last = np.searchsorted(self.time_s, [start_s, stop_s], side="left")

@@ -17,7 +17,7 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
-from estimation.derived import measured_channels, settled, zero_phase_channels
+from estimation.derived import measured_channels, settled_places, zero_phase_channels
 from estimation.errors import EstimationError
 from estimation.model import Model, estimate
 from estimation.recording import FloatArray, Recording
@@ -129,8 +129,9 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
             recording, [*model.channels, model.target, *there], model.low_pass
         )
         step = max(1, int(recording.sample_rate_hz / rate_hz))
-        run = settled(channels, model.low_pass, step, model.has_friction)
-        estimated = estimate(model, run)
+        places = settled_places(channels, model.low_pass, step, model.samples)
+        estimated = estimate(model, channels)[places]
+        run = channels.at(places)
         found.append(RunResidual(run, estimated, run[model.target] - estimated))
     return found
 

@@ -4,14 +4,17 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, with_campaign_time
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, prepare
 from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, squares
+from estimation.diagnosis.instruments import instruments
+from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
 from estimation.diagnosis.search import Discovery, Gates, Named, Search
@@ -22,6 +25,9 @@ from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Estimate, Model
 from estimation.recording import FloatArray, Recording
+
+Maker = Callable[[Model, Sequence[Recording]], Twin]
+"""Fitted model and discovery runs to their simulated twin."""
 
 Stage = Callable[[str], None]
 """Told what begins, in words."""
@@ -86,7 +92,7 @@ def diagnose(
     *,
     gates: Gates | None = None,
     executor: Executor | None = None,
-    twins: Mapping[str, Callable[[Model, Sequence[Recording]], Twin]] | None = None,
+    twins: Mapping[str, Maker] | None = None,
     on_stage: Stage = lambda _: None,
     on_open: Callable[[], None] = lambda: None,
 ) -> tuple[Diagnosis, dict[str, Story]]:
@@ -112,6 +118,11 @@ def diagnose(
     gates = gates or Gates()
     stories: dict[str, Story] = {}
     failed: dict[str, EstimationError] = {}
+    starts = [recording.started_at_ns for recording in recordings]
+    if starts and None not in starts:
+        first_ns = min(start for start in starts if start is not None)
+        recordings = [with_campaign_time(recording, first_ns) for recording in recordings]
+        twins = {name: partial(_timed, make, first_ns) for name, make in (twins or {}).items()}
     for model in models:
         on_stage(f"searching what the {model.balance} balance lacks")
         try:
@@ -142,13 +153,22 @@ def diagnose(
     return diagnosis, stories
 
 
+def _timed(make: Maker, first_ns: int, model: Model, discover: Sequence[Recording]) -> Twin:
+    """Return a twin whose runs have the campaign's time too."""
+    return partial(_timed_runs, make(model, discover), first_ns)
+
+
+def _timed_runs(twin: Twin, first_ns: int, seed: int) -> list[Recording]:
+    return [with_campaign_time(recording, first_ns) for recording in twin(seed)]
+
+
 def _balance(
     recordings: Sequence[Recording],
     model: Model,
     sealed: Sealed,
     gates: Gates,
     executor: Executor | None,
-    maker: Callable[[Model, Sequence[Recording]], Twin] | None,
+    maker: Maker | None,
 ) -> Story:
     """Fit the declared model and search, on the runs that discover; prepare those that confirm."""
     discover = [r for r in recordings if r.name in sealed.discover]
@@ -157,15 +177,16 @@ def _balance(
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
     wanted = [model.target, *model.channels, *needed_channels(measured)]
-    wanted += [channel for c in tried for _, channel in c.channels]
+    wanted += [*instruments(measured), *(channel for c in tried for _, channel in c.channels)]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
-    balance = lay_out(fitted, runs, mapper)
+    told = instrumented(runs, tried, fitted.target)
+    balance = lay_out(fitted, [told(run) for run in runs], mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))
-    whole = projection(balance)
-    balance = replace(balance, runs=[whole(run) for run in runs])
+    loaded = projection(balance)
+    balance = replace(balance, runs=[loaded(run) for run in balance.runs])
     twin = None
     if maker is not None:
         source = maker(fitted, discover)
@@ -181,7 +202,7 @@ def _balance(
         before=before,
         after=before,
         values=(),
-        confirm=tuple(whole(run) for run in held),
+        confirm=tuple(loaded(told(run)) for run in held),
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
         unused=(*rested, *also),
@@ -422,5 +443,4 @@ def _notes(
         for name, story in stories.items()
         for what in story.refused
     ]
-    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
     return notes

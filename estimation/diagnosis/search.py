@@ -39,6 +39,9 @@ class Gates:
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        parameters: Named parameters of the whole model at most, or None for no limit.
+        akin: Whether an effect may be added beside one that looks alike: where a model must
+            predict well rather than be named surely.
         sure: Least confidence of `identified`.
     """
 
@@ -51,6 +54,8 @@ class Gates:
     veto: float = 0.9
     sure: float = 0.9
     map_floor: float = 0.2
+    parameters: int | None = None
+    akin: bool = False
 
 
 @dataclass(frozen=True)
@@ -161,6 +166,26 @@ class Search:
 
     def run(self) -> Discovery:
         """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
+        found, trials, steps, ranking = self.forwards()
+        kept = self._backwards(found)
+        named = [self._named([found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
+        stays = [n.candidate for n in named if n.veto is None]
+        terms = [*self.balance.terms, *stays]
+        left = best_map(self.balance, terms, self.gates.surrogates // 2, self.seed)
+        return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+
+    def forwards(
+        self, on_found: Callable[[Trial], None] = lambda _: None
+    ) -> tuple[list[Candidate], list[Trial], list[Trial], list[Trial]]:
+        """Add effects while the best one passes every gate; the balance's shapes move along.
+
+        Args:
+            on_found: Told each step that passed.
+
+        Returns:
+            The effects found, the step that found each, every step with the one that failed last,
+            and the first step's ranking.
+        """
         found: list[Candidate] = []
         trials: list[Trial] = []
         steps: list[Trial] = []
@@ -177,17 +202,13 @@ class Search:
             steps.append(trial)
             if not trial.passes(self.gates):
                 break
+            on_found(trial)
             found += trial.candidates
             trials += [trial] * len(trial.candidates)
             terms = self.balance.refined([*self.balance.terms, *found])
             self.balance = replace(self.balance, terms=terms[: -len(found)])
             found = terms[-len(found) :]
-        kept = self._backwards(found)
-        named = [self._named([found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
-        stays = [n.candidate for n in named if n.veto is None]
-        terms = [*self.balance.terms, *stays]
-        left = best_map(self.balance, terms, self.gates.surrogates // 2, self.seed)
-        return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+        return found, trials, steps, ranking
 
     @property
     def floor(self) -> float:
@@ -206,13 +227,21 @@ class Search:
             family = candidate.family
             if family in trials or refused.get(family, 0) > 3 or gains[k] <= 0:
                 continue
-            if any(related(candidate, f) for f in found):
+            if not self.gates.akin and any(related(candidate, f) for f in found):
+                continue
+            if self._too_large([*found, candidate]):
                 continue
             if not self._signs_hold([*self.balance.terms, *found], [candidate]):
                 refused[family] = refused.get(family, 0) + 1
                 continue
             trials[family] = self._trial((candidate,), losses, k, null)
         return list(trials.values())
+
+    def _too_large(self, found: Sequence[Candidate]) -> bool:
+        """Say whether the model with these effects has more parameters than allowed."""
+        count = sum(len(t.parameters) for t in self.balance.model.terms)
+        count += sum(len(c.term.parameters) for c in found)
+        return self.gates.parameters is not None and count > self.gates.parameters
 
     def _scored(self, terms: Sequence[Candidate], count: int) -> tuple[Losses, FloatArray]:
         """Return losses of the whole pool, and the largest gain on each surrogate."""
@@ -247,8 +276,12 @@ class Search:
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
-        if all(p.lower < 0 and p.upper > 0 for c in added for p in c.effect.amplitudes):
-            return True
+        own = [p for c in added for p in c.effect.amplitudes]
+        if all(p.lower < 0 < p.upper for p in own):
+            weights = self.balance.solve([*terms, *added])[-len(own) :]
+            return all(
+                0.999 * p.lower < w < 0.999 * p.upper for p, w in zip(own, weights, strict=True)
+            )
         together = [*terms, *added]
         before, after = self.balance.loss(terms), self.balance.loss(together)
         columns = np.vstack(self.balance.columns(together))

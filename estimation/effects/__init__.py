@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
 
-from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional
+from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
 from estimation.errors import EstimationError
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Parameter",
     "Pointwise",
     "Proportional",
+    "Remembering",
     "UnknownEffectError",
     "catalogue",
     "effect",

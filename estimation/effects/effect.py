@@ -7,7 +7,7 @@ a model says which channel plays which role and on which side of the balance the
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -65,8 +65,11 @@ class Effect(ABC):
         roles: Role of each input, and the channel that plays it unless a model says otherwise.
         amplitudes: Linear parameters, one a column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
+        projected_roles: Roles a search takes as the other sensors tell them, not as measured: those
+            whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
     """
 
     id: ClassVar[str]
@@ -75,8 +78,10 @@ class Effect(ABC):
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
+    projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Let the family be the id where none is stated."""
@@ -131,6 +136,57 @@ class Pointwise(Effect):
     ) -> Sequence[float]:
         """Return one row of the columns."""
         return [float(value) for value in self.row(inputs, shape)]
+
+
+Walk = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]
+"""Compiled: inputs (n, roles), shape (s,), state (m,) changed in place, rows (n, amplitudes)."""
+
+
+class Remembering(Effect):
+    """An effect with memory: each row of its columns depends on what came before in its run.
+
+    One compiled function walks over the samples of a run, and over a single one live. A state
+    that moves with time has the role `clock` among its roles, so that it does not depend on the
+    rate of the samples; what it forgets with time counts from the first sample it was given.
+    A sample with an input that is not finite gives NaN and leaves the state as it was.
+
+    Attributes:
+        walk: The compiled function; the columns of its first argument are the roles in order.
+        rest: State before the first sample. The first value of most is 0 until a sample has come.
+    """
+
+    walk: ClassVar[Walk]
+    rest: ClassVar[tuple[float, ...]]
+
+    def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
+        """Return the columns, shape (n, number of amplitudes)."""
+        return self._walked(
+            np.column_stack([inputs[role] for role in self.roles]), shape, np.array(self.rest)
+        )
+
+    def start(self) -> list[float]:
+        """Return the state before the first sample."""
+        return list(self.rest)
+
+    def step(
+        self, inputs: Mapping[str, float], shape: Sequence[float], state: list[float]
+    ) -> Sequence[float]:
+        """Return one row of the columns."""
+        memory = np.array(state)
+        rows = self._walked(np.array([[inputs[role] for role in self.roles]]), shape, memory)
+        state[:] = memory.tolist()
+        return [float(value) for value in rows[0]]
+
+    def _walked(self, now: FloatArray, shape: Sequence[float], state: FloatArray) -> FloatArray:
+        good = np.isfinite(now).all(axis=1)
+        seen = np.ascontiguousarray(now if good.all() else now[good], np.float64)
+        walked = np.empty((len(seen), len(self.amplitudes)))
+        type(self).walk(seen, np.array(shape, np.float64), state, walked)
+        if len(seen) == len(now):
+            return walked
+        rows = np.full((len(now), len(self.amplitudes)), np.nan)
+        rows[good] = walked
+        return rows
 
 
 class Proportional(Effect):

@@ -8,6 +8,7 @@ from typer.exceptions import TyperException
 
 from rig import __version__
 from rig.cli.cal import cal_app
+from rig.cli.calibrate import calibrate_app
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -16,6 +17,7 @@ from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.live import live
 from rig.cli.log import log_app
+from rig.cli.loop import loop
 from rig.cli.record import record
 from rig.cli.replay import replay
 from rig.cli.stop import stop
@@ -38,8 +40,10 @@ app.command()(record)
 app.command()(live)
 app.command()(replay)
 app.command()(fit)
+app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(loop)
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
 app.add_typer(config_app, name="config")

@@ -1,5 +1,6 @@
 """`rig study`: make a paper's results again."""
 
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -139,6 +140,92 @@ def pique(
         first, second, *others = open_paths(data, [*paths, *(also or [])])
         study = run_study(
             first, second, also=others, on_step=lambda step: bar.update(task, description=step)
+        )
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@study_app.command()
+def zhao(
+    prototype: Annotated[str, typer.Option(help="third, journal or ball.")] = "third",
+    seeds: Annotated[int, typer.Option(min=2, help="Simulated graspers.")] = 20,
+    spread: Annotated[
+        float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
+    ] = 0.1,
+    diagnosis: Annotated[
+        bool, typer.Option("--diagnosis", help="Ask what the model lacks: a minute each.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016 again, simulated."""
+    from estimation.files import write_text_atomic
+    from rig.errors import UsageError
+    from rig.reports import zhao as shown
+    from rig.reports.table import to_rich
+    from rig.simulation.grasper_plant import PROTOTYPES
+    from rig.studies.haptics import run_haptics
+    from rig.studies.zhao import run_study
+
+    if prototype not in PROTOTYPES:
+        raise UsageError(
+            f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
+        )
+    with progress() as bar:
+        task = bar.add_task("graspers", total=seeds)
+
+        def step(name: str) -> None:
+            bar.update(task, description=name, advance=1)
+
+        study = run_study(prototype, range(seeds), spread, with_diagnosis=diagnosis, on_step=step)
+    haptics = run_haptics(0, spread, prototype)
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study, haptics):
+        screen.print(to_rich(table))
+    drawn = shown.write_figures(figures, haptics) if figures is not None else []
+    if out is not None:
+        names = [os.path.relpath(path, out.parent) for path in drawn]
+        write_text_atomic(out, shown.markdown(study, haptics, names))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json({"study": study, "haptics": haptics})
+
+
+@study_app.command()
+def loop(
+    data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
+    seed: Annotated[int, typer.Option(help="Seed of the split and of the surrogates.")] = 0,
+    task: Annotated[
+        list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
+    from estimation.files import write_text_atomic
+    from rig.errors import UsageError
+    from rig.reports import loop as shown
+    from rig.reports.table import to_rich
+    from rig.studies.loop import TASKS, run_study
+
+    if any(not 1 <= number <= len(TASKS) for number in task or []):
+        raise UsageError(f"There are {len(TASKS)} rows.", fix="Write for example --task 1.")
+    tasks = [TASKS[number - 1] for number in task] if task else TASKS
+    with progress() as bar:
+        shown_stage = bar.add_task("loop", total=None)
+        study = run_study(
+            data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
         )
     screen = console()
     for line in [shown.lead(study), *shown.notes(study)]:

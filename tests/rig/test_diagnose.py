@@ -1,6 +1,7 @@
 """`rig diagnose` from a path to JSON, report, model file and ledger."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,31 @@ def test_new_runs_are_a_first_look(tmp_path):
     ledger.write(first, split(first))
     assert set(ledger.seen(first, split(first))) == set(split(first).confirm)
     assert ledger.seen(second, split(second)) == ()
+
+
+def test_other_names_and_folders_do_not_make_runs_new(tmp_path):
+    ledger = Ledger(tmp_path / "looks.jsonl")
+    first = runs(count=6, seconds=1.0)
+    ledger.write(first, split(first))
+    renamed = [replace(r, name=f"round-9/{k}", source="copy") for k, r in enumerate(first)]
+    assert set(ledger.seen(renamed, split(renamed))) == set(split(renamed).confirm)
+
+
+def test_beside_runs_already_seen_only_new_ones_confirm(tmp_path):
+    ledger = Ledger(tmp_path / "looks.jsonl")
+    first = runs(count=6, seconds=1.0)
+    ledger.write(first, split(first))
+    fresh = [
+        replace(r, name=f"new{k}") for k, r in enumerate(runs(count=6, seconds=1.0, first_seed=50))
+    ]
+    both = [*first, *fresh]
+    sealed = split(both, 0, ledger.known(both))
+    assert len(sealed.confirm) == 2
+    assert set(sealed.confirm) <= {r.name for r in fresh}
+    assert ledger.seen(both, sealed) == ()
+    # two new runs are too few to confirm by themselves: all are split, and the look says so
+    few = [*first, *fresh[:2]]
+    assert ledger.seen(few, split(few, 0, ledger.known(few)))
 
 
 def test_a_damaged_ledger_is_told(tmp_path):
