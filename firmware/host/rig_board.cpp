@@ -1,5 +1,6 @@
 // The board as a shared library with a C interface, for the simulated rig: the same core that runs on
 // the device, ticked from outside in virtual time. One thread per board.
+#include "../boards/escon.hpp"
 #include "../core/board.hpp"
 #include "../core/can_segments.hpp"
 
@@ -10,6 +11,9 @@ namespace {
 constexpr std::size_t kTransmitCapacity = 65536;
 
 using HostBoard = rig::Board<kTransmitCapacity>;
+
+// the module of the tests: 10 to 90 % duty is -2 to 2 A, 0 to 3.3 V is -2 to 2 A
+constexpr rig::EsconWiring kEscon{{0.1, -2.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
 
 HostBoard* board_of(void* handle) { return static_cast<HostBoard*>(handle); }
 
@@ -71,6 +75,9 @@ std::size_t rig_can_join(const std::uint8_t* frames, std::size_t count, std::uin
     }
     return used;
 }
+
+std::int32_t rig_escon_code(double current_a) { return kEscon.code(current_a); }
+std::int32_t rig_escon_milliampere(std::int32_t reading) { return kEscon.milliampere(reading); }
 
 // CRC-32 of the sources the core was built from.
 std::uint32_t rig_board_build_hash() { return rig::kBuildHash; }
