@@ -98,6 +98,18 @@ class Candidate:
         """The term of a model, without values."""
         return Term(self.effect, self.sign, dict(self.channels))
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether a shape stands where the effect turns into a simpler one.
+
+        Presliding over a way that no run covers is a spring; friction whose direction takes more
+        speed than any run has is viscous.
+        """
+        return any(
+            not p.linear and value > step(p, p.upper, -0.5)
+            for p, value in zip(self.effect.shape, self.shape, strict=True)
+        )
+
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""
         inputs = {role: channels[name] for role, name in self.channels}
@@ -143,7 +155,7 @@ def pool(
     declared = {(t.effect.id, *sorted(t.channels.items())) for t in model.terms}
     return [
         Candidate.of(term, shape)
-        for term in candidates(model.balance, measured, instead, model.counted == "all")
+        for term in candidates(model.balance, measured, instead, model.counted is not None)
         if term.effect.family in FAMILIES and term.effect.family != UNKNOWN
         if (term.effect.id, *sorted(term.channels.items())) not in declared
         for shape in grid(term.effect)

@@ -41,7 +41,7 @@ class Run:
     Attributes:
         name: Name of the run.
         channels: Channel name to values at the full rate, shape (n,).
-        valid: Samples without a flag and away from the ends, shape (n,).
+        valid: Samples without a flag and away from the ends, of those the model counts, shape (n,).
         moving: Samples that are not at rest, where friction is in the balance, shape (n,).
         down: One in so many samples is regressed on.
     """
@@ -54,7 +54,7 @@ class Run:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Samples at the full rate that errors are told over: valid and in motion, shape (n,)."""
+        """Samples at the full rate that fits and decisions count: valid, in motion, shape (n,)."""
         return self.valid & self.moving
 
     @cached_property
@@ -102,7 +102,7 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
     moving = np.ones(len(valid), bool)
     if model.counted == "closing":
-        moving = closing(channels[SPINDLE_SPEED], rate_hz)
+        valid &= closing(channels[SPINDLE_SPEED], rate_hz)  # the others are no part of the claim
     else:
         for speed in speeds:
             moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])

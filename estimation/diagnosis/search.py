@@ -1,6 +1,7 @@
 """The search: which effect of the catalogue removes the residual, and whether that is proved."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -43,6 +44,7 @@ class Gates:
         akin: Whether an effect may be added beside one that looks alike: where a model must
             predict well rather than be named surely.
         sure: Least confidence of `identified`.
+        balances: Balances that are searched: each is given its share of the chance.
     """
 
     chance: float = 0.02
@@ -56,6 +58,17 @@ class Gates:
     map_floor: float = 0.2
     parameters: int | None = None
     akin: bool = False
+    balances: int = 1
+
+    @property
+    def level(self) -> float:
+        """Largest p-value on surrogates in one balance of several (Bonferroni)."""
+        return self.chance / self.balances
+
+    @property
+    def draws(self) -> int:
+        """Number of surrogates: as asked, and enough to reach the level."""
+        return max(self.surrogates, math.ceil(1.0 / self.level) - 1)
 
 
 @dataclass(frozen=True)
@@ -91,8 +104,8 @@ class Trial:
 
     def stands_out(self, gates: Gates) -> bool:
         """Say whether the gain is above chance and above the floor, in whatever runs."""
-        likely = max(self.p, self.p_twin or 0.0)
-        return likely <= gates.chance and self.worth >= gates.floor
+        likely = self.p <= gates.level and (self.p_twin or 0.0) <= gates.chance
+        return likely and self.worth >= gates.floor
 
 
 @dataclass(frozen=True)
@@ -171,7 +184,7 @@ class Search:
         named = [self._named([found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
         stays = [n.candidate for n in named if n.veto is None]
         terms = [*self.balance.terms, *stays]
-        left = best_map(self.balance, terms, self.gates.surrogates // 2, self.seed)
+        left = best_map(self.balance, terms, self.gates.draws, self.seed)
         return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
 
     def forwards(
@@ -191,7 +204,7 @@ class Search:
         steps: list[Trial] = []
         ranking: list[Trial] = []
         while len(found) < self.gates.most:
-            ranked = self.ranked(found, self.gates.surrogates)
+            ranked = self.ranked(found, self.gates.draws)
             ranking = ranking or ranked
             trial = next(iter(ranked), None)
             if not found and ranked and not ranked[0].passes(self.gates):
@@ -226,6 +239,8 @@ class Search:
             candidate = self.pool[k]
             family = candidate.family
             if family in trials or refused.get(family, 0) > 3 or gains[k] <= 0:
+                continue
+            if candidate.is_limit:
                 continue
             if not self.gates.akin and any(related(candidate, f) for f in found):
                 continue
@@ -297,7 +312,7 @@ class Search:
             return None
         terms = self.balance.terms
         left = self.balance.left(terms)
-        drawn = surrogates(left, self.gates.surrogates, self.seed + 1)
+        drawn = surrogates(left, self.gates.draws, self.seed + 1)
         aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
         blocks = [self.balance.columns(pair) for pair in pairs]
         joined = [np.hstack(parts) for parts in zip(*blocks, strict=True)]
@@ -344,7 +359,9 @@ class Search:
             if rival.family == found[k].family or len(rivals) == 8:
                 continue
             if rival.gain >= 0.8 * self.gates.rival * gain:
-                rivals[rival.family] = self._polished(others, rival.candidates[0])
+                best = self._polished(others, rival.candidates[0])
+                if not best.is_limit:
+                    rivals[rival.family] = self._losses_beside(others, best)
         total = mine.base[:, 0]
         near = {
             family: losses
@@ -364,13 +381,16 @@ class Search:
             flat if better else None,
         )
 
-    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
-        """Return a rival's losses at its own best shape."""
+    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> Candidate:
+        """Return a rival at its own best shape."""
+        if not rival.shape:
+            return rival
+        return self.balance.refined([*self.balance.terms, *others, rival], passes=1)[-1]
+
+    def _losses_beside(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
+        """Return the losses of each run left out with a rival in the winner's place."""
         terms = [*self.balance.terms, *others]
-        best = rival
-        if rival.shape:
-            best = self.balance.refined([*terms, rival], passes=1)[-1]
-        block = self.balance.columns([best])
+        block = self.balance.columns([rival])
         aims = [r[:, None] for r in self.balance.left(terms)]
         base = self.balance.base(terms)
         joint = leave_one_run_out(base, block, [block[0].shape[1]], aims).joint

@@ -5,10 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from estimation.derived import measured_channels
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import DesignError, prepare, targets
 from estimation.diagnosis.diagnose import Story
-from estimation.diagnosis.maps import projection
+from estimation.diagnosis.maps import PROJECTED_LOAD, projection
 from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.twin import coarse
@@ -21,6 +22,10 @@ from rig.simulation.twin import Twin
 
 SEED = 7_000_000
 """Far from the seeds of the twins that prove a finding."""
+
+
+MADE = ("time_s", PROJECTED_LOAD)
+"""Channels that preparing a run makes by itself."""
 
 
 def propose(
@@ -51,6 +56,7 @@ def propose(
         scored = _scored(story, finding, rivals, recordings, twin)
         if scored:
             return _described(finding, rivals, scored)
+        return _in_words(finding, rivals)
     return None
 
 
@@ -85,7 +91,11 @@ def _scored(
         played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
         if not within(played, limits):
             continue
-        wanted = [name for name in known if name not in ("time_s", "projected_load_n_m")]
+        wanted = [name for name in known if _played(name, played[0])]
+        others = [*rivals, *beside(story, finding)]
+        read = {channel for one in others for _, channel in one.channels}
+        if not read <= {*wanted, *MADE}:
+            continue  # a rival reads what a simulated run does not have, such as campaign time
         runs = []
         for run in played:
             try:
@@ -97,6 +107,11 @@ def _scored(
             told = worth(thin, beside(story, finding), rivals, protocol.name, runs, seconds)
             scored.append((protocol, told))
     return sorted(scored, key=lambda pair: -pair[1].net)
+
+
+def _played(name: str, run: Recording) -> bool:
+    """Say whether a simulated run has a channel, or what it is made from."""
+    return name not in MADE and all(source in run for source in measured_channels([name]))
 
 
 def _described(

@@ -138,8 +138,8 @@ def _errors(diagnosis: Diagnosis) -> TextTable:
         "Error on the confirm runs",
         columns,
         rows,
-        "Root mean square over the samples in motion; each run's mean removed, then with the means"
-        " left in."
+        "Root mean square over all valid samples, those at rest too; each run's mean removed, then"
+        " with the means left in."
         " Ratio: 95 % interval of a bootstrap over runs.",
     )
 

@@ -31,6 +31,10 @@ TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
 """Families left out: they know how long a run has lasted, which means nothing for another load."""
 
 
+FLOOR = 0.002
+"""Least share of the linear model's squared error that an effect must remove."""
+
+
 @dataclass(frozen=True)
 class Task:
     """One row of the study.
@@ -201,7 +205,9 @@ def _row(
     tried = [c for c in pool(declared, task.measured, task.instead) if c.family not in TIMELESS]
     wanted = [task.target, *declared.channels, *(ch for c in tried for _, ch in c.channels)]
     runs = _prepared(discover, wanted, declared)
-    gates = Gates(most=task.parameters, parameters=task.parameters, akin=True, surrogates=99)
+    gates = Gates(
+        most=task.parameters, parameters=task.parameters, akin=True, surrogates=99, floor=FLOOR
+    )
     search = Search(lay_out(fitted, runs), tried, gates, sealed.seed)
 
     def found(trial: Trial) -> None:
