@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint site bench blind figures firmware clean
+.PHONY: setup demo test lint site bench blind soak fuzz figures firmware clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -42,6 +42,18 @@ bench: $(VENV)/.developing firmware
 BLIND ?=
 blind: $(VENV)/.installed
 	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md --baselines $(BLIND)
+
+# an hour of virtual time, ten minutes on a pty, injected faults, killed recorders; SOAK="soak --virtual 60"
+# for one part or less of it
+SOAK ?=
+soak: $(VENV)/.developing firmware
+	$(BIN)/python -m benchmarks.reliability $(SOAK)
+
+# resumes where it stopped; FUZZ="--seconds 60 --total 100000" for less
+FUZZ ?=
+fuzz: $(VENV)/.developing firmware
+	$(BIN)/python -m benchmarks.reliability.fuzz $(FUZZ)
+	$(BIN)/python -m benchmarks.reliability fuzz
 
 figures: $(VENV)/.installed
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done

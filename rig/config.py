@@ -34,8 +34,8 @@ class LoggerSection(_Section):
     """What moves the rig and samples it, and where it is found.
 
     Attributes:
-        driver: `teensy` for the 1 kHz logger board, `epos4` for a drive on CANopen whose position
-            loop runs in this computer.
+        driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
+            on CANopen whose position loop runs in this computer.
         url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
             `can:...`.
         options: The driver's own options.
@@ -43,7 +43,7 @@ class LoggerSection(_Section):
             with from the factory if none.
     """
 
-    driver: Literal["teensy", "epos4"] = "teensy"
+    driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
     url: str
     options: dict[str, Any] = Field(default_factory=dict)
     bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)

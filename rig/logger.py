@@ -34,6 +34,10 @@ def open_logger(
         return open_simulated_logger(
             config.simulation, config.logger.url, pace, config.safety.watchdog_s, step_s
         )
+    if config.logger.driver == "teensy-can":
+        from drivers.teensy.can_device import open_can_transport
+
+        return open_can_transport(config.logger.url, **config.logger.options)
     return open_transport(config.logger.url)
 
 

@@ -7,6 +7,7 @@ first, and the disarming is confirmed by the logger itself.
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, suppress
+from time import sleep
 from types import TracebackType
 from typing import Self
 
@@ -24,6 +25,7 @@ from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
 from rig.interrupts import leaving_safely
+from rig.logger import PTY_URL
 from rig.motion import settling
 from rig.reading import Reading, reading_of, with_setpoints
 from rig.safety import board_limits, check_samples, check_setpoints
@@ -39,6 +41,12 @@ UNENDING = 2**62
 
 READ_TIMEOUT_S = 0.2
 """Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
+
+GATHER_S = 0.008
+"""In real time samples gather this long between two readings, s: a block costs as much as one."""
+
+CLOCK_EVERY_S = 0.25
+"""How often a reading follows the one before at once, so that the clock's answer is not kept, s."""
 
 STALL_S = 1.0
 """With no sample for this long, the logger is taken for dead, s."""
@@ -66,6 +74,10 @@ class Session:
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
         self._watch: HostWatch | None = None
+        self._gathers = config.logger.url == PTY_URL or not (
+            config.is_simulated or config.logger.driver == "epos4"
+        )
+        self._read_s = self._clock_due_s = -np.inf
         self.newest_tick_us = 0
         self.companions: list[Companion] = []
         self.clock = ClockFit()
@@ -203,7 +215,17 @@ class Session:
         for _ in self.play(motion.target_angle_rad, motion.load_command_a):
             pass
 
+    def _gather(self) -> None:
+        """Let samples gather where time is real and the board runs by itself."""
+        now_s = self._transport.now_s
+        if now_s >= self._clock_due_s:
+            self._clock_due_s = now_s + CLOCK_EVERY_S
+        elif self._gathers:
+            sleep(max(0.0, self._read_s + GATHER_S - now_s))
+        self._read_s = self._transport.now_s
+
     def _read(self) -> Reading:
+        self._gather()
         self._logger.heartbeat()
         give_up_s = self._transport.now_s + STALL_S
         while True:

@@ -1,5 +1,7 @@
 """The driver of a digital F/T: its calibration is read and put in force, then it streams."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,23 @@ LONGEST_SILENCE_S = 0.1
 GAUGE_LIMIT = 32767
 
 
+@dataclass(frozen=True, slots=True)
+class Assumptions:
+    """What no public source settles about a digital F/T, as it is taken to be.
+
+    Attributes:
+        matrix_by_rows: The calibration's matrix comes row by row, Fx first; else column by column.
+        force_unit: Code of the force unit, in place of the one the sensor tells; 0 for that one.
+        torque_unit: Code of the torque unit, likewise.
+        lock_answers: The sensor answers the function that locks its storage (0x6A).
+    """
+
+    matrix_by_rows: bool = True
+    force_unit: int = 0
+    torque_unit: int = 0
+    lock_answers: bool = True
+
+
 class AtiSerial:
     """One sensor on an RS-485 line.
 
@@ -28,6 +47,7 @@ class AtiSerial:
         transport: The way to it; the device closes it.
         calibration: Which of its 16 calibrations to use, from 1.
         rate_hz: Frames a second it sends.
+        assumed: What is taken for granted about it.
 
     Raises:
         DriverError: There is no such calibration.
@@ -35,12 +55,19 @@ class AtiSerial:
 
     name = "ati-serial"
 
-    def __init__(self, transport: Transport, calibration: int = 1, rate_hz: float = 7000.0) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        calibration: int = 1,
+        rate_hz: float = 7000.0,
+        assumed: Assumptions = Assumptions(),
+    ) -> None:
         if not 1 <= calibration <= 16:
             raise DriverError(f"A digital F/T has calibrations 1 to 16, none {calibration}.")
         self._transport = transport
         self._number = calibration
         self._rate_hz = rate_hz
+        self._assumed = assumed
         self._calibration: protocol.Calibration | None = None
         self._matrix = np.zeros((6, 6))
         self._counters = DeviceCounters()
@@ -81,12 +108,18 @@ class AtiSerial:
         registers = b"".join(
             self._read_registers(first + offset, count) for offset, count in protocol.PIECES
         )
-        found = protocol.decode_calibration(registers)
+        told = protocol.decode_calibration(registers)
+        found = replace(
+            told,
+            matrix=told.matrix if self._assumed.matrix_by_rows else told.matrix.T,
+            force_unit=self._assumed.force_unit or told.force_unit,
+            torque_unit=self._assumed.torque_unit or told.torque_unit,
+        )
         if found.force_unit not in N_PER_UNIT or found.torque_unit not in N_M_PER_UNIT:
             raise DriverError(
                 f"Calibration {self._number} of {found.serial} has unknown units.",
                 f"Their codes are {found.force_unit} and {found.torque_unit}.",
-                "Choose another calibration.",
+                "Choose another calibration, or set `force_unit` and `torque_unit`.",
             )
         slopes = np.repeat(
             [
@@ -111,9 +144,9 @@ class AtiSerial:
         assert self._calibration is not None  # noqa: S101
         self._quieten()
         active = self._calibration.gains + self._calibration.offsets
-        self._ask(protocol.encode(protocol.STORAGE, protocol.UNLOCK))
+        self._set_lock(protocol.UNLOCK)
         self._ask(protocol.write_registers(protocol.ACTIVE_GAINS, active))
-        self._ask(protocol.encode(protocol.STORAGE, protocol.LOCK))
+        self._set_lock(protocol.LOCK)
         self._frames.restart()
         self._errors_at_start = self._counters.crc_errors
         self._transport.write(protocol.encode(protocol.STREAM, protocol.START_STREAM))
@@ -145,6 +178,14 @@ class AtiSerial:
             _flags(gauges, bad),
             self._counters.crc_errors - self._errors_at_start,
         )
+
+    def _set_lock(self, state: bytes) -> None:
+        message = protocol.encode(protocol.STORAGE, state)
+        if self._assumed.lock_answers:
+            self._ask(message)
+            return
+        self._transport.write(message)
+        self._transport.read(QUIET_S)  # an answer all the same is let go
 
     def status(self) -> int:
         """Return the status register; only while it does not stream."""
@@ -217,7 +258,14 @@ def _flags(gauges: NDArray[np.int64], bad: NDArray[np.bool_]) -> NDArray[np.uint
 
 
 def open_ati_serial(
-    url: str, calibration: int = 1, rate_hz: float = 7000.0, baud_rate: int = 1_250_000
+    url: str,
+    calibration: int = 1,
+    rate_hz: float = 7000.0,
+    baud_rate: int = 1_250_000,
+    matrix_by_rows: bool = True,
+    force_unit: int = 0,
+    torque_unit: int = 0,
+    lock_answers: bool = True,
 ) -> AtiSerial:
     """Open the sensor on an RS-485 adapter, 8 bits, even parity.
 
@@ -226,11 +274,16 @@ def open_ati_serial(
         calibration: Which of its calibrations to use, from 1.
         rate_hz: Frames a second it sends.
         baud_rate: 1250000 as delivered; 115200 and 19200 can be set.
+        matrix_by_rows: See `Assumptions`; the next three too. Check them with a known weight.
+        force_unit: Code of the force unit where the sensor's own is not to be believed.
+        torque_unit: Code of the torque unit, likewise.
+        lock_answers: Whether it answers the function that locks its storage.
 
     Raises:
         LinkError: The adapter cannot be opened or has no such speed.
     """
-    return AtiSerial(open_line(url, baud_rate, "E"), calibration, rate_hz)
+    assumed = Assumptions(matrix_by_rows, force_unit, torque_unit, lock_answers)
+    return AtiSerial(open_line(url, baud_rate, "E"), calibration, rate_hz, assumed)
 
 
 DRIVER = Driver("ati-serial", "ATI digital F/T over RS-485, Modbus and stream", open_ati_serial)

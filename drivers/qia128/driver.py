@@ -28,6 +28,8 @@ class Qia128:
         rated_load: Load of the calibration's full-scale point, from the certificate.
         unit: Unit of `rated_load`; `1` gives the fraction of full scale.
         rate_hz: Samples a second. 1300 is set; for any other rate, the amplifier is left as it is.
+        serial: Serial number from its label, for one that does not answer the question for it as
+            assumed, with four bytes high byte first: then it is not asked.
     """
 
     name = "qia128"
@@ -38,11 +40,13 @@ class Qia128:
         rated_load: float = 1.0,
         unit: str = "1",
         rate_hz: float = RATE_HZ,
+        serial: str = "",
     ) -> None:
         self._transport = transport
         self._rated_load = rated_load
         self._unit = unit
         self._rate_hz = rate_hz
+        self._serial = serial
         self._counters = DeviceCounters()
         self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
         self._frames = SlidingFrames(protocol.FRAME_SIZE, protocol.frame_checks, self._counters)
@@ -71,7 +75,8 @@ class Qia128:
             DriverError: The calibration's two points are the same.
         """
         self._quieten()
-        serial = self._number(protocol.get_serial(), protocol.GET_SERIAL)
+        asked = "" if self._serial else self._number(protocol.get_serial(), protocol.GET_SERIAL)
+        serial = self._serial or str(asked)
         zero, full = (
             self._number(protocol.get_calibration(point), protocol.GET_CALIBRATION)
             for point in (protocol.ZERO_POINT, protocol.FULL_SCALE_POINT)
@@ -83,7 +88,7 @@ class Qia128:
                 "Calibrate it with FUTEK's software, or give it its certificate's values.",
             )
         self._points = zero, full
-        return DeviceIdentity("QIA128", str(serial), "")
+        return DeviceIdentity("QIA128", serial, "")
 
     def start(self) -> None:
         """Switch the stream on."""
@@ -176,6 +181,7 @@ def open_qia128(
     unit: str = "1",
     rate_hz: float = RATE_HZ,
     baud_rate: int = 320_000,
+    serial: str = "",
 ) -> Qia128:
     """Open the amplifier on a serial adapter.
 
@@ -185,11 +191,12 @@ def open_qia128(
         unit: Unit of `rated_load`.
         rate_hz: Rate it is set to, samples a second.
         baud_rate: Bit rate of its UART; no public source gives it.
+        serial: Serial number from its label, for one that does not tell it as assumed.
 
     Raises:
         LinkError: The adapter cannot be opened.
     """
-    return Qia128(open_line(url, baud_rate), rated_load, unit, rate_hz)
+    return Qia128(open_line(url, baud_rate), rated_load, unit, rate_hz, serial)
 
 
 DRIVER = Driver("qia128", "FUTEK QIA128 digital amplifier, UART", open_qia128)

@@ -168,7 +168,7 @@ TRIP_REPORT_DTYPE = _layout(
     *_HEADER, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
 
-_LAYOUTS: dict[Kind, np.dtype[np.void]] = {
+LAYOUTS: dict[Kind, np.dtype[np.void]] = {
     Kind.SAMPLE: SAMPLE_DTYPE,
     Kind.HELLO_REPLY: HELLO_REPLY_DTYPE,
     Kind.ACK: ACK_DTYPE,
@@ -188,7 +188,7 @@ _LAYOUTS: dict[Kind, np.dtype[np.void]] = {
 def layout_text() -> str:
     """Return the protocol as text, one line a frame kind, the same in the firmware's source."""
     lines = [f"rig teensy protocol {VERSION}", "COBS(payload, CRC-16/CCITT-FALSE u2) 00"]
-    for kind, layout in _LAYOUTS.items():
+    for kind, layout in LAYOUTS.items():
         repeated = f", {MAX_SETPOINTS} x ({_fields(SETPOINT_DTYPE)})"
         lines.append(
             f"{kind} {kind.name}: {_fields(layout)}{repeated if kind is Kind.SETPOINTS else ''}"
@@ -439,12 +439,12 @@ def decode(payload: bytes) -> tuple[Kind, int, np.void]:
     if number not in Kind.__members__.values() or number == Kind.SAMPLE:
         raise FrameError(f"A frame has the unknown kind {number}.")
     kind = Kind(number)
-    body = len(payload) - _LAYOUTS[kind].itemsize
+    body = len(payload) - LAYOUTS[kind].itemsize
     setpoints, rest = divmod(body, SETPOINT_DTYPE.itemsize)
     whole = rest == 0 and 1 <= setpoints <= MAX_SETPOINTS
     if not (whole if kind is Kind.SETPOINTS else body == 0):
         raise FrameError(f"A {kind.name} frame has {len(payload)} bytes.")
-    fields = np.frombuffer(payload, _LAYOUTS[kind], count=1)[0]
+    fields = np.frombuffer(payload, LAYOUTS[kind], count=1)[0]
     return kind, int(fields["sequence"]), fields
 
 

@@ -19,6 +19,7 @@ namespace rig {
 struct Outputs {
     std::int32_t command_e4 = 0;
     std::int32_t load_ma = 0;
+    bool in_force = false;  // whether the current controllers are to be enabled
 };
 
 template <std::size_t TransmitCapacity>
@@ -60,7 +61,8 @@ class Board {
             engaged_ = true;
         }
         Outputs outputs;
-        if (engaged_ || holding()) {
+        outputs.in_force = engaged_ || holding();
+        if (outputs.in_force) {
             outputs.command_e4 = controller_.tick(held_.target, inputs.spindle, inputs.motor);
             outputs.load_ma = held_.load_ma;
         }

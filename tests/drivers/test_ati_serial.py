@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.ati_serial import protocol
-from drivers.ati_serial.driver import AtiSerial
+from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.transport.faulty import FaultyTransport, once
@@ -117,3 +117,29 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     fake.receive(protocol.write_registers(0, (1, 2)))
     function, reason = protocol.decode(fake.transmit())
     assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")
+
+
+def test_what_no_source_settles_can_be_told_otherwise() -> None:
+    fake = AtiSerialFake()
+    told = AtiSerial(SimulatedTransport(fake))
+    told.start()
+    assumed = Assumptions(matrix_by_rows=False, force_unit=4, torque_unit=4, lock_answers=False)
+    other = AtiSerial(SimulatedTransport(fake), assumed=assumed)
+    other.start()
+    began = np.arange(fake._sent, fake._sent + 50)
+    batch = other.read(0.1)
+    matrix = example_calibration().matrix
+    expected = fake.gauges(began)[:20] @ matrix / 1e6 * np.repeat([1e3, 1e-3], 3)
+    got = np.stack(list(batch.columns.values()), axis=1)[:20]
+    assert np.allclose(got, expected)
+
+
+def test_a_sensor_that_does_not_answer_the_lock_still_starts() -> None:
+    class Mute(AtiSerialFake):
+        def transmit(self) -> bytes:
+            data = super().transmit()
+            return b"" if data[1:2] == bytes([protocol.STORAGE]) else data
+
+    device = AtiSerial(SimulatedTransport(Mute()), assumed=Assumptions(lock_answers=False))
+    device.start()
+    assert len(device.read(0.1)) > 100

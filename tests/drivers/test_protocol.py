@@ -22,7 +22,7 @@ def test_the_sample_is_laid_out_as_documented() -> None:
 
 
 def test_no_other_frame_has_the_size_of_a_sample() -> None:
-    layouts = {kind: layout for kind, layout in protocol._LAYOUTS.items() if kind != Kind.SAMPLE}
+    layouts = {kind: layout for kind, layout in protocol.LAYOUTS.items() if kind != Kind.SAMPLE}
     assert protocol.SAMPLE_DTYPE.itemsize not in {item.itemsize for item in layouts.values()}
     assert (protocol.SAMPLE_DTYPE.itemsize - 4) % protocol.SETPOINT_DTYPE.itemsize
 

@@ -163,3 +163,15 @@ def test_a_reading_at_the_end_of_the_range_is_flagged() -> None:
     batch = device.read(0.1)
     assert len(batch)
     assert (batch.flags == 1).all()
+
+
+def test_a_serial_number_from_the_label_is_not_asked_for() -> None:
+    class Deaf(Qia128Fake):
+        def receive(self, data: bytes) -> None:
+            if data != protocol.get_serial():
+                super().receive(data)
+
+    with pytest.raises(LinkTimeoutError):
+        Qia128(SimulatedTransport(Deaf())).identify()
+    device = Qia128(SimulatedTransport(Deaf()), serial="A-17")
+    assert device.identify().serial == "A-17"

@@ -234,7 +234,7 @@ def test_a_build_of_other_sources_is_told(library: Path, monkeypatch: pytest.Mon
 
 
 def test_flashing_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(UsageError, match="teensy41 or teensy35"):
+    with pytest.raises(UsageError, match="teensy41"):
         firmware.flash("uno")
     monkeypatch.setattr(firmware.shutil, "which", lambda tool: None)
     with pytest.raises(UsageError, match="platformio"):

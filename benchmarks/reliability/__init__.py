@@ -1,0 +1,1 @@
+"""How reliable the rig is: soak, injected faults, killed recorders, fuzzed decoders; one table."""

@@ -1,0 +1,210 @@
+"""Measure how reliable the rig is and write the table.
+
+`python -m benchmarks.reliability [soak pty faults kills fuzz] [--virtual S] [--real S]
+[--faults N] [--kills N]`: the parts named, all if none. Each part's figures are kept in
+`build/reliability.json`, and the table is written from all that are there; parts that were never
+measured say so.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.reliability import faults, fuzz, kills, soak
+from estimation.files import write_text_atomic
+from rig.reports.provenance import Provenance
+
+STATE = Path("build/reliability.json")
+TABLE = Path("docs/results/reliability.md")
+PARTS = ("soak", "pty", "faults", "kills", "fuzz")
+SAFE_S, WATCHDOG_S = 0.020, 0.052
+
+
+def main() -> int:
+    """Measure the parts asked for and write the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.reliability", description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--virtual", type=float, default=3600.0, help="virtual seconds")
+    parser.add_argument("--real", type=float, default=600.0, help="real seconds on a pty")
+    parser.add_argument("--faults", type=int, default=1000, help="faults injected")
+    parser.add_argument("--kills", type=int, default=200, help="recorders killed")
+    options = parser.parse_intermixed_args()
+    unknown = set(options.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"there is no part {', '.join(sorted(unknown))}")
+    for part in options.parts or PARTS:
+        if part != "fuzz":  # its own command measures it; here it is only told
+            sys.stderr.write(f"{part} ...\n")
+            _keep(part, _MEASURES[part](options))
+    write_text_atomic(TABLE, _table(_kept()))
+    sys.stderr.write(f"Written: {TABLE}\n")
+    return 0
+
+
+def _kept() -> dict[str, Any]:
+    """Return the figures of every part that was ever measured."""
+    figures: dict[str, Any] = json.loads(STATE.read_text()) if STATE.is_file() else {}
+    return figures
+
+
+def _keep(part: str, figures: dict[str, Any]) -> None:
+    STATE.parent.mkdir(exist_ok=True)
+    write_text_atomic(STATE, json.dumps({**_kept(), part: figures}, indent=1) + "\n")
+
+
+def _faults(options: argparse.Namespace) -> dict[str, Any]:
+    outcomes = list(faults.inject(options.faults))
+    silence = ("host killed", "cable cut")
+    safe = [o for o in outcomes if o.safe_after_s is not None and o.kind not in silence]
+    silent = [o for o in outcomes if o.kind in silence]
+    return {
+        "count": len(outcomes),
+        "kinds": len({o.kind for o in outcomes}),
+        "detected": sum(o.detected for o in outcomes),
+        "named": sum(o.named for o in outcomes),
+        "mis_stamped": sum(o.mis_stamped for o in outcomes),
+        "crashes": sum(bool(o.crash) for o in outcomes),
+        "trips": len(safe),
+        "slowest_safe_s": max(o.safe_after_s or 0.0 for o in safe),
+        "silences": len(silent),
+        "slowest_silent_s": max(
+            np.inf if o.safe_after_s is None else o.safe_after_s for o in silent
+        ),
+        "missed": sorted({f"{o.kind} {o.crash}".strip() for o in outcomes if not o.named}),
+    }
+
+
+def _kills(options: argparse.Namespace) -> dict[str, Any]:
+    killed = kills.kill_many(options.kills)
+    lost_s = [one.lost_s for one in killed]
+    return {
+        "count": len(killed),
+        "most_lost_s": max(lost_s),
+        "median_lost_s": float(np.median(lost_s)),
+    }
+
+
+_MEASURES = {
+    "soak": lambda o: asdict(soak.soak("simulated", o.virtual, "firmware core, virtual time")),
+    "pty": lambda o: asdict(soak.soak("pty", o.real, "firmware process on a pty, real time")),
+    "faults": _faults,
+    "kills": _kills,
+}
+
+
+def _table(figures: dict[str, Any]) -> str:
+    rows = []
+    for part in ("soak", "pty"):
+        rows += _soak_rows(figures.get(part), part)
+    rows += _fault_rows(figures.get("faults")) + _kill_rows(figures.get("kills"))
+    tallies = fuzz.load(fuzz.STATE)
+    rows += _fuzz_rows(tallies)
+    wanted = fuzz.plan(fuzz.TOTAL)
+    lines = [
+        "# Reliability",
+        "",
+        "Written by `make soak` and `make fuzz`. The machine was shared with other work; a missed"
+        " goal is said as missed.",
+        "",
+        "| figure | measured | goal | met |",
+        "|---|---|---|---|",
+        *(f"| {a} | {b} | {c} | {d} |" for a, b, c, d in rows),
+        "",
+        "## Fuzzed decoders",
+        "",
+        "An accepted input is held against an oracle: another implementation of the checksum, or"
+        " the encoder. A refusal is an error of the project's own.",
+        "",
+        "| decoder | inputs | planned | accepted | refused | slowest ms | failures |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, t in tallies.items():
+        counts = f"{t.inputs} | {wanted[name]} | {t.accepted} | {t.refused}"
+        lines.append(f"| {name} | {counts} | {1e3 * t.slowest_s:.0f} | {len(t.failures)} |")
+    return "\n".join([*lines, "", Provenance.now(seed=0).line(), ""])
+
+
+def _row(what: str, measured: str, goal: str, met: bool) -> tuple[str, str, str, str]:
+    return what, measured, goal, "yes" if met else "**no**"
+
+
+def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str, str]]:
+    if s is None:
+        return [(part, "not measured", "", "**no**")]
+    goal_s = 3600 if part == "soak" else 600
+    rows = [
+        _row(
+            f"{s['where']}: samples lost",
+            f"{s['lost']} of {s['samples']} in {s['duration_s']:.0f} s; link troubles:"
+            f" {s['troubles']}",
+            f"0 in {goal_s} s",
+            s["lost"] == 0 and s["duration_s"] >= 0.99 * goal_s,
+        )
+    ]
+    if part == "soak":
+        speed = s["duration_s"] / s["elapsed_s"]
+        return [*rows, (f"{s['where']}: speed", f"{speed:.0f} times real time", "", "")]
+    p50, p99, p999, top = s["latency_ms"]
+    told = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
+    share = f"{100 * s['processor_ratio']:.1f} % of a core"
+    return [
+        *rows,
+        (f"{s['where']}: latency p50 / p99 / p99.9 / max", told, "", ""),
+        _row(f"{s['where']}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
+    ]
+
+
+def _fault_rows(f: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
+    if f is None:
+        return [("injected faults", "not measured", "", "**no**")]
+    total = f["count"]
+    missed = f"; not named: {'; '.join(f['missed'])}" if f["missed"] else ""
+    return [
+        _row(
+            f"{total} faults of {f['kinds']} kinds: detected, named",
+            f"{f['detected']}, {f['named']}{missed}",
+            "all",
+            f["detected"] == f["named"] == total >= 1000,
+        ),
+        _row("samples mis-stamped", str(f["mis_stamped"]), "0", f["mis_stamped"] == 0),
+        _row("crashes", str(f["crashes"]), "0", f["crashes"] == 0),
+        _row(
+            f"{f['trips']} trips: slowest way to the safe state, after the time a fault may last",
+            f"{1e3 * f['slowest_safe_s']:.1f} ms",
+            "20 ms",
+            f["slowest_safe_s"] <= SAFE_S,
+        ),
+        _row(
+            f"{f['silences']} dead hosts and cut cables: slowest",
+            f"{1e3 * f['slowest_silent_s']:.1f} ms",
+            "the watchdog's 50 ms and a tick or two",
+            f["slowest_silent_s"] <= WATCHDOG_S,
+        ),
+    ]
+
+
+def _kill_rows(k: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
+    if k is None:
+        return [("killed recorders", "not measured", "", "**no**")]
+    told = f"most {k['most_lost_s']:.3f} s, median {k['median_lost_s']:.3f} s"
+    met = k["most_lost_s"] <= 0.25 and k["count"] >= 200
+    what = f"{k['count']} recorders killed: lost, all files repaired, nothing earlier changed"
+    return [_row(what, told, "0.25 s in 200", met)]
+
+
+def _fuzz_rows(tallies: dict[str, fuzz.Tally]) -> list[tuple[str, str, str, str]]:
+    done = sum(t.inputs for t in tallies.values())
+    bad = sum(len(t.failures) for t in tallies.values())
+    least = min(t.inputs for t in tallies.values())
+    told = f"{done} inputs, at least {least} each, {bad} failures"
+    met = done >= fuzz.TOTAL and least >= fuzz.LEAST and not bad
+    return [_row("fuzzed decoders", told, "10 million, 100,000 each, 0 failures", met)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

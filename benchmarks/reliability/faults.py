@@ -1,0 +1,273 @@
+"""Faults of every kind in random order: is each detected and named, and how fast is the rig safe.
+
+The board is the logger's fake, which answers with the firmware's bytes; its inputs are a script, so
+that every sample says by its counts at which tick it was taken. Everything is in virtual time.
+"""
+
+import random
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import DriverError
+from drivers.registry import fakes
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.guard import (
+    COLUMNS,
+    CURRENT,
+    DISTAL,
+    ENGAGED,
+    JAW,
+    MOTOR,
+    PROXIMAL,
+    SPINDLE,
+    Drive,
+    run_ticks,
+)
+from drivers.teensy.protocol import MISSING, STATUS_ARMED, Trip
+from drivers.transport.faulty import Fault, Faults, FaultyTransport
+from drivers.transport.simulated import SimulatedTransport
+from rig.config import Config, load_config
+from rig.errors import RigError
+from rig.session import Session
+
+STEP_S = 0.005
+MOTOR_STEP = 3
+HOLD = np.full(1500, -1.0)
+NO_LOAD = np.zeros(1500)
+
+SAFETY = {
+    "watchdog_s": 0.05,
+    "stall_s": 0.1,
+    "stale_s": 0.1,
+    "saturated_s": 0.02,
+    "heat_a2_s": 0.02,
+    "continuous_current_a": 0.3,
+    "jaw_open_rad": -1.0,
+    "jaw_closed_rad": 1.0,
+}
+"""Times short enough to wait for, a thousand times over."""
+
+ASIDE = {
+    "stalled": {"safety": {"heat_a2_s": 0.5}},
+    "sensor saturated": {"limits": {"proximal_torque_n_m": 2.0}},
+}
+"""Where another watch would rightly be faster: it is widened, so that the one meant is tried."""
+
+SENSOR_FAULTS: dict[str, tuple[Trip, int, int | None, float]] = {
+    "over-current": (Trip.OVER_CURRENT, CURRENT, 700, 0.0),
+    "torque at the spindle": (Trip.PROXIMAL_TORQUE, PROXIMAL, 16000, 0.0),
+    "torque at the jaw": (Trip.DISTAL_TORQUE, DISTAL, -11000, 0.0),
+    "spindle travel": (Trip.SPINDLE_TRAVEL, SPINDLE, 5000, 0.0),
+    "jaw travel": (Trip.JAW_TRAVEL, JAW, 800, 0.0),
+    "over-speed": (Trip.OVER_SPEED, MOTOR, 700, 0.002),
+    "overheated": (Trip.OVERHEATED, CURRENT, 540, 0.0993),
+    "stalled": (Trip.STALLED, MOTOR, None, 0.1),
+    "sensor saturated": (Trip.SENSOR_SATURATED, PROXIMAL, None, 0.02),
+    "sensor stale": (Trip.SENSOR_STALE, DISTAL, 17, 0.1),
+    "sensor missing": (Trip.SENSOR_MISSING, SPINDLE, MISSING, 0.0),
+}
+"""Trip expected, input struck, its count (or how it moves, see `ScriptedRig`), time allowed, s."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one fault.
+
+    Attributes:
+        kind: What was injected.
+        detected: Whether the program noticed.
+        named: Whether it said what it was: the trip's own code, or an error or counter of the link.
+        mis_stamped: Samples whose counts are of another tick than their time stamp says.
+        safe_after_s: Virtual time from the fault, less the time it is allowed to last, to the safe
+            state; None where the rig rightly goes on.
+        crash: An error that is none of the project's own; empty for none.
+    """
+
+    kind: str
+    detected: bool
+    named: bool
+    mis_stamped: int
+    safe_after_s: float | None = None
+    crash: str = ""
+
+
+class ScriptedRig:
+    """Implements `drivers.teensy.fake.Bench`: the motor counts ticks, sensors make noise.
+
+    Args:
+        kind: The sensor fault that strikes; none if not one of `SENSOR_FAULTS`.
+        after_ticks: How long after the first setpoint.
+    """
+
+    def __init__(self, kind: str, after_ticks: int) -> None:
+        self._fault = SENSOR_FAULTS.get(kind)
+        self._kind = kind
+        self._after_ticks = after_ticks
+        self._tick = 0
+        self.struck_at: int | None = None
+        """Tick at which the fault struck."""
+
+    def advance(
+        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
+    ) -> NDArray[np.int32]:
+        """Run the script; see `drivers.teensy.fake.Bench.advance`."""
+        tick = self._tick + np.arange(ticks)
+        if self.struck_at is None and self._fault and drive.guard[ENGAGED]:
+            self.struck_at = self._tick + self._after_ticks
+        rows = np.zeros((ticks, COLUMNS), np.int32)
+        rows[:, MOTOR] = MOTOR_STEP * tick
+        rows[:, SPINDLE] = 1304
+        for column in (PROXIMAL, DISTAL, CURRENT):
+            rows[:, column] = tick * (7 + column) % 23 - 11
+        if self._fault and self.struck_at is not None:
+            self._strike(rows, tick >= self.struck_at, tick)
+        self._tick += ticks
+        run_ticks(rows, target, load_ma, *drive.arrays)
+        return rows
+
+    def _strike(
+        self, rows: NDArray[np.int32], struck: NDArray[np.bool_], tick: NDArray[np.int64]
+    ) -> None:
+        assert self._fault is not None
+        assert self.struck_at is not None
+        _, column, value, _ = self._fault
+        since = (tick - self.struck_at)[struck]
+        if self._kind == "stalled":
+            rows[struck, MOTOR] = MOTOR_STEP * self.struck_at
+            rows[struck, CURRENT] = 560 + since % 5
+        elif self._kind == "over-speed":
+            rows[struck, MOTOR] += 700 * (since + 1).astype(np.int32)
+        elif self._kind == "sensor saturated":
+            rows[struck, column] = 32767
+        else:
+            rows[struck, column] = value
+
+
+def inject(count: int, seed: int = 0) -> Iterator[Outcome]:
+    """Yield the outcome of each of `count` faults, every kind, in random order."""
+    generator = random.Random(seed)
+    kinds = [*SENSOR_FAULTS, "host killed", "cable cut", *_LINK_FAULTS]
+    order = [kinds[k % len(kinds)] for k in range(count)]
+    generator.shuffle(order)
+    config = load_config().changed(
+        safety=SAFETY, limits={"proximal_torque_n_m": 0.6, "distal_torque_n_m": 0.4}
+    )
+    for kind in order:
+        try:
+            if kind in _LINK_FAULTS:
+                yield _link_fault(kind, generator.randrange(2**32))
+            else:
+                yield _safety_fault(kind, generator.randrange(1, 200), config)
+        except Exception as error:
+            yield Outcome(kind, False, False, 0, None, f"{type(error).__name__}: {error}")
+
+
+_DEVICES = tuple(fakes())
+_LINK_FAULTS = tuple(f"{fault.value} on the link of {d}" for d in _DEVICES for fault in Fault)
+
+
+def _link_fault(kind: str, seed: int) -> Outcome:
+    """Let a fault strike a device's link: counted, or said, and nothing made up."""
+    word, name = kind.split(" on the link of ")
+    fault = Fault(word)
+    faults = Faults(seed=seed)
+    device = fakes()[name](faults)
+    device.start()
+    rate_hz = device.channels[0].rate_hz
+    for _ in range(30):
+        device.read(max(0.1, 2 / rate_hz))
+    before = sum(count for counter, count in device.counters.items() if counter != "frames")
+    faults.inject(fault, 4, duration_s=max(0.3, 10 / rate_hz))
+    said = False
+    numbers: list[int] = []
+    mis_stamped = 0
+    for _ in range(40):
+        try:
+            batch = device.read(max(0.1, 2 / rate_hz))
+        except DriverError as error:
+            said = bool(error.what)
+            continue
+        mis_stamped += int(np.count_nonzero(np.diff(batch.sequence) <= 0))
+        mis_stamped += int(np.count_nonzero(np.diff(batch.time_s) < 0))
+        if len(batch) and numbers and batch.sequence[0] <= numbers[-1]:
+            mis_stamped += 1
+        numbers += batch.sequence[-1:].tolist()
+    after = sum(count for counter, count in device.counters.items() if counter != "frames")
+    detected = after > before or said
+    device.close()
+    return Outcome(kind, detected, detected, mis_stamped)
+
+
+def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
+    """Let a fault strike an armed rig: it must trip with its own code and be safe in time."""
+    config = config.changed(**ASIDE.get(kind, {}))
+    bench = ScriptedRig(kind, after_ticks)
+    board = TeensyFake(bench)
+    faults = Faults()
+    link = FaultyTransport(SimulatedTransport(board, step_s=STEP_S), faults)
+    ticks: list[NDArray[np.int64]] = []
+    motors: list[NDArray[np.int64]] = []
+    said = ""
+    ways_out = ExitStack()
+    try:
+        with ways_out:
+            session = ways_out.enter_context(Session(config, link))
+            for _ in session.rest(0.05):
+                pass
+            for reading in session.play(HOLD, NO_LOAD):
+                struck = bench.struck_at
+                before = np.inf if struck is None else 1000 * struck
+                of_script = reading.tick_us < before
+                ticks.append(reading.tick_us[of_script])
+                motors.append(reading.counts["motor"][of_script].astype(np.int64))
+                if reading.setpoint.max() < after_ticks:
+                    continue
+                if kind == "cable cut":
+                    faults.inject(Fault.DISCONNECT)
+                elif kind == "host killed":
+                    ways_out.pop_all()  # a killed process runs none of its ways out
+                    break
+    except (RigError, DriverError) as error:
+        said = str(error) + str(error.__context__ or "")
+    if kind in ("host killed", "cable cut"):
+        return _after_silence(kind, board, said, ticks, motors, config)
+    trip, _, _, allowed_s = SENSOR_FAULTS[kind]
+    report = TeensyLogger(SimulatedTransport(board)).trip()
+    assert bench.struck_at is not None
+    safe_after_s = report.tick_us * 1e-6 - bench.struck_at * 1e-3 - allowed_s
+    named = report.code is trip and f"code {int(trip)}" in said
+    return Outcome(kind, bool(said), named, _mis_stamped(ticks, motors), safe_after_s)
+
+
+def _after_silence(
+    kind: str,
+    board: TeensyFake,
+    said: str,
+    ticks: list[NDArray[np.int64]],
+    motors: list[NDArray[np.int64]],
+    config: Config,
+) -> Outcome:
+    board.advance(200)
+    board.transmit()
+    logger = TeensyLogger(SimulatedTransport(board))
+    report = logger.trip()
+    logger.identify()
+    logger.start()
+    armed = bool(logger.read(0.1).samples["status"][-1] & STATUS_ARMED)
+    told = kind == "host killed" or "did not confirm" in said
+    named = report.code is Trip.HOST_SILENT and told
+    safe = None if armed else report.late_us * 1e-6
+    return Outcome(kind, not armed, named, _mis_stamped(ticks, motors), safe)
+
+
+def _mis_stamped(ticks: list[NDArray[np.int64]], motors: list[NDArray[np.int64]]) -> int:
+    """Return how many samples were taken at another tick than their stamp says."""
+    if not ticks:
+        return 0
+    expected = MOTOR_STEP * (np.concatenate(ticks) // 1000)
+    return int(np.count_nonzero(np.concatenate(motors) != expected))

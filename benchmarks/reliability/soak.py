@@ -1,0 +1,79 @@
+"""An hour of virtual time with the firmware core in the loop; real time on a pseudo-terminal."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rig.config import load_config
+from rig.logger import open_logger
+from rig.session import Session
+
+PERIOD_S = 4.0
+BLOCK_S = 60.0
+
+
+@dataclass(frozen=True)
+class Soak:
+    """What a soak came to.
+
+    Attributes:
+        where: What the session ran on.
+        duration_s: Time of the rig, s.
+        samples: Samples read.
+        lost: Samples lost.
+        troubles: Counters of the link that are not 0, in words.
+        elapsed_s: Real time, s.
+        processor_ratio: Processor time of this process over real time.
+        latency_ms: Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being
+            read and converted; None where time is virtual.
+    """
+
+    where: str
+    duration_s: float
+    samples: int
+    lost: int
+    troubles: str
+    elapsed_s: float
+    processor_ratio: float
+    latency_ms: tuple[float, ...] | None
+
+
+def soak(config_name: str, duration_s: float, where: str) -> Soak:
+    """Play slow grasps for a while, a block of a minute after another."""
+    config = load_config(Path(config_name))
+    real = config_name == "pty"
+    if real:  # what is measured is what gets lost, also when a shared machine is late
+        config = config.changed(safety={"watchdog_s": 1.0})
+    late_ms: list[np.ndarray] = []
+    samples = 0
+    with Session(config, open_logger(config)) as session:
+        next(session.rest(0.5))
+        session.settle()
+        began_s, busy_s = time.monotonic(), time.process_time()
+        start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
+        phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
+        for _ in range(max(1, blocks)):
+            for reading in session.play(
+                start + 0.3 * (1 - np.cos(phase)), np.full(phase.size, 0.2)
+            ):
+                samples += len(reading)
+                if real:  # the process stamps by the clock this program reads, in 32 bits
+                    now_us = time.monotonic_ns() // 1000
+                    ticks = reading.counts["tick_us"].astype(np.int64)
+                    late_ms.append(((now_us - ticks) % 2**32) / 1000)
+        elapsed_s = time.monotonic() - began_s
+        busy_s = time.process_time() - busy_s
+        lost, counters = reading.lost, session.counters
+    told = {name: count for name, count in counters.items() if count and name != "frames"}
+    return Soak(
+        where,
+        samples / 1000,
+        samples,
+        lost,
+        ", ".join(f"{count} {name}" for name, count in told.items()) or "none",
+        elapsed_s,
+        busy_s / elapsed_s,
+        tuple(np.percentile(np.concatenate(late_ms), [50, 99, 99.9, 100])) if real else None,
+    )

@@ -1,0 +1,46 @@
+// An ESCON 24/2 at a board: what code asks for a current, and what current a reading tells. The twin
+// of drivers/escon/scaling.py. No Arduino here, so that it runs on any host.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace rig {
+
+// A line through two points, as ESCON Studio takes it: input in V or duty, current in A.
+struct EsconLine {
+    double x1;
+    double y1;
+    double x2;
+    double y2;
+
+    double current(double x) const { return y1 + (x - x1) * (y2 - y1) / (x2 - x1); }
+    double input(double current_a) const { return x1 + (current_a - y1) * (x2 - x1) / (y2 - y1); }
+};
+
+struct EsconWiring {
+    EsconLine set_value;
+    double set_full;  // V of the DAC's full scale; 1 for a duty
+    EsconLine read_back;
+    double adc_full_v;
+    double limit_a;
+    int output_bits = 12;
+    int adc_bits = 12;
+
+    // Never beyond the limit, whatever was commanded.
+    std::int32_t code(double current_a) const {
+        const double within = current_a > limit_a ? limit_a : current_a < -limit_a ? -limit_a : current_a;
+        const double asked = std::isfinite(within) ? within : 0.0;
+        const double top = static_cast<double>((1 << output_bits) - 1);
+        return static_cast<std::int32_t>(std::floor(set_value.input(asked) / set_full * top + 0.5));
+    }
+
+    // Actual current in counts of 1 mA, as the logger's frames carry it.
+    std::int32_t milliampere(std::int32_t reading) const {
+        const double top = static_cast<double>((1 << adc_bits) - 1);
+        return static_cast<std::int32_t>(
+            std::floor(1000 * read_back.current(reading * adc_full_v / top) + 0.5));
+    }
+};
+
+}  // namespace rig

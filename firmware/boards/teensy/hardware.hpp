@@ -1,0 +1,104 @@
+// The Teensy 4.1 as `rig::App` wants its hardware. Nothing has run on a board yet: it is compiled, and
+// tried on a host against tests/arduino, which stands for the parts of the Arduino core used here.
+#pragma once
+
+#include <Arduino.h>
+#include <QuadEncoder.h>
+
+#include "../../core/app.hpp"
+#include "wiring.hpp"
+
+namespace rig {
+
+class TeensyHardware {
+  public:
+    // The sampling timer interrupts everything; what it shares is touched with interrupts off.
+    class Lock {
+      public:
+        Lock() { noInterrupts(); }
+        ~Lock() { interrupts(); }
+        Lock(const Lock&) = delete;
+        Lock& operator=(const Lock&) = delete;
+    };
+
+    // Motors off first, whatever else fails.
+    void begin() {
+        for (int pin : {wiring::kDriveEnablePin, wiring::kLoadEnablePin}) {
+            pinMode(pin, OUTPUT);
+            digitalWrite(pin, LOW);
+        }
+        analogWriteResolution(wiring::kPwmBits);
+        for (int pin : {wiring::kDriveSetPin, wiring::kLoadSetPin}) {
+            analogWriteFrequency(pin, wiring::kPwmHz);
+        }
+        drive(Outputs());
+        for (int pin : {wiring::kDriveReadyPin, wiring::kLoadReadyPin}) pinMode(pin, INPUT_PULLUP);
+        analogReadResolution(wiring::kAdcBits);
+        analogReadAveraging(4);
+        for (QuadEncoder* encoder : {&motor_, &spindle_, &jaw_}) {
+            encoder->setInitConfig();
+            encoder->init();
+        }
+        Serial.begin(115200);  // the rate has no effect on USB
+    }
+
+    std::uint32_t now_us() { return micros(); }
+
+    Inputs sample() {
+        Inputs counts;
+        counts.motor = motor_.read();
+        counts.spindle = spindle_.read();
+        counts.jaw = jaw_.read();
+        counts.proximal = torque(wiring::kProximalPin);
+        counts.distal = torque(wiring::kDistalPin);
+        counts.current = drive_ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
+                                       : kMissing;
+        counts.fsr = analogRead(wiring::kFsrPin);
+        return counts;
+    }
+
+    void drive(const Outputs& outputs) {
+        const double drive_a = 1e-4 * outputs.command_e4 * wiring::kDriveFullScaleA;
+        analogWrite(wiring::kDriveSetPin, wiring::kDrive.code(drive_a));
+        analogWrite(wiring::kLoadSetPin, wiring::kLoad.code(1e-3 * outputs.load_ma));
+        digitalWrite(wiring::kDriveEnablePin, outputs.in_force ? HIGH : LOW);
+        digitalWrite(wiring::kLoadEnablePin, outputs.in_force ? HIGH : LOW);
+        enabled_ticks_ = outputs.in_force ? enabled_ticks_ + 1 : 0;
+    }
+
+    std::size_t read(std::uint8_t* out, std::size_t room) {
+        std::size_t count = 0;
+        while (count < room && Serial.available() > 0) {
+            out[count++] = static_cast<std::uint8_t>(Serial.read());
+        }
+        return count;
+    }
+
+    // Only what fits: a write that waits for the host would stop the main loop.
+    std::size_t write(const std::uint8_t* data, std::size_t size) {
+        const int fits = Serial.availableForWrite();
+        const std::size_t room = fits > 0 ? static_cast<std::size_t>(fits) : 0;
+        const std::size_t count = Serial.write(data, size < room ? size : room);
+        Serial.send_now();
+        return count;
+    }
+
+  private:
+    static std::int32_t torque(int pin) {
+        // spread over the 16 bits of a sample, so that the ends of the converter are those of the field
+        const std::int32_t reading = analogRead(pin) - wiring::kTorqueZero;
+        return reading >= wiring::kTorqueZero - 1 ? INT16_MAX : reading * 16;
+    }
+
+    // A controller that has a fault after it was enabled tells no current.
+    bool drive_ready() const {
+        return enabled_ticks_ < wiring::kReadyAfterTicks || digitalRead(wiring::kDriveReadyPin) == HIGH;
+    }
+
+    QuadEncoder motor_{1, wiring::kMotorA, wiring::kMotorB};
+    QuadEncoder spindle_{2, wiring::kSpindleA, wiring::kSpindleB};
+    QuadEncoder jaw_{3, wiring::kJawA, wiring::kJawB};
+    std::uint32_t enabled_ticks_ = 0;
+};
+
+}  // namespace rig

@@ -1,0 +1,33 @@
+// What is wired to which pin of the Teensy 4.1, and the scalings set in ESCON Studio. Nothing here is
+// known from outside: change it to your rig and flash.
+#pragma once
+
+#include "../escon.hpp"
+
+namespace rig::wiring {
+
+constexpr char kSerial[] = "TEENSY41-0001";
+
+// Three of the four hardware decoders. 3.3 V logic: an AMT102 (5 V) needs a level shifter.
+constexpr int kMotorA = 0, kMotorB = 1;
+constexpr int kSpindleA = 2, kSpindleB = 3;
+constexpr int kJawA = 5, kJawB = 7;
+
+constexpr int kProximalPin = 14, kDistalPin = 15, kFsrPin = 16;  // A0, A1, A2
+constexpr int kDriveCurrentPin = 17;                             // A3
+constexpr int kAdcBits = 12;
+constexpr int kTorqueZero = 2048;  // counts of a cell's amplifier at mid-scale
+
+// This board has no DAC: set values are PWM, 10 to 90 % duty.
+constexpr int kDriveSetPin = 22, kLoadSetPin = 23;
+constexpr int kDriveEnablePin = 24, kLoadEnablePin = 25;
+constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
+constexpr float kPwmHz = 5000.0F;
+constexpr int kPwmBits = 12;
+constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens
+constexpr std::uint32_t kReadyAfterTicks = 20;  // enable acts within 8 ms
+
+constexpr EsconWiring kDrive{{0.1, -2.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
+constexpr EsconWiring kLoad{{0.1, -2.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
+
+}  // namespace rig::wiring

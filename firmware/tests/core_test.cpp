@@ -1,0 +1,184 @@
+// The core and the Teensy's layer on a host, under the sanitizers. What fake and core answer alike is
+// held by tests/drivers/test_firmware_twin.py; here is what is only in C++, and the published vectors.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <limits>
+#include <vector>
+
+#include "../boards/teensy/main.cpp"
+#include "../core/can_segments.hpp"
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes frame_of(const Bytes& payload) {
+    Bytes body = payload;
+    const std::uint16_t crc = rig::crc16(payload.data(), payload.size());
+    body.push_back(static_cast<std::uint8_t>(crc & 0xFF));
+    body.push_back(static_cast<std::uint8_t>(crc >> 8));
+    Bytes wire(rig::kMaxWire + 1);
+    std::size_t length = rig::cobs_encode(body.data(), body.size(), wire.data());
+    wire[length++] = 0;
+    wire.resize(length);
+    return wire;
+}
+
+rig::Limits widest() {
+    rig::Limits limits;
+    constexpr std::int32_t top = std::numeric_limits<std::int32_t>::max();
+    for (std::int32_t* size : {&limits.max_current, &limits.max_load_ma, &limits.max_proximal,
+                               &limits.max_distal, &limits.max_spindle, &limits.max_jaw,
+                               &limits.max_motor_step, &limits.continuous_current, &limits.i2t,
+                               &limits.stall_current, &limits.stall_ticks, &limits.saturated_ticks,
+                               &limits.stale_ticks}) {
+        *size = top;
+    }
+    limits.min_spindle = limits.min_jaw = -top - 1;
+    limits.watchdog_us = 250000;
+    return limits;
+}
+
+}  // namespace
+
+TEST_CASE("published check values") {
+    const std::uint8_t digits[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
+    CHECK(rig::crc16(digits, 9) == 0x29B1);
+    const std::uint8_t data[] = {0x11, 0x00, 0x00, 0x22, 0x33};
+    std::uint8_t out[8];
+    REQUIRE(rig::cobs_encode(data, 5, out) == 6);
+    CHECK(Bytes(out, out + 6) == Bytes{0x02, 0x11, 0x01, 0x03, 0x22, 0x33});
+    CHECK(rig::crc32("123456789", 9) == 0xCBF43926U);
+}
+
+TEST_CASE("no gain that is not finite reaches a set-point") {
+    rig::Gains gains{20, 0.1, 4, 0.3, 2700};
+    CHECK(gains.valid());
+    for (double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e7}) {
+        rig::Gains wrong = gains;
+        wrong.kd = bad;
+        CHECK_FALSE(wrong.valid());
+    }
+}
+
+TEST_CASE("the watchdog counts over the wrap of the clock") {
+    rig::Watchdog watchdog;
+    watchdog.heard();
+    CHECK(watchdog.silent_us(0xFFFFFF00U) == 0);
+    CHECK(watchdog.silent_us(0x00000100U) == 0x200);
+}
+
+TEST_CASE("heat is the current squared above the continuous one") {
+    rig::Limits limits = widest();
+    limits.continuous_current = 100;
+    limits.i2t = 30;  // counts^2 s
+    rig::Guard guard;
+    guard.arm(limits);
+    rig::Inputs inputs;
+    inputs.current = 200;  // 30000 counts^2 above: 1 s of it is 30000 counts^2 s
+    int ticks = 1;
+    while (guard.check(inputs).code == rig::kNoTrip) ++ticks;
+    CHECK(ticks == 2);
+}
+
+TEST_CASE("a missing reading trips before anything is computed from it") {
+    rig::Guard guard;
+    guard.arm(widest());
+    rig::Inputs inputs;
+    inputs.spindle = rig::kMissing;
+    const rig::Crossing crossing = guard.check(inputs);
+    CHECK(crossing.code == rig::kSensorMissing);
+    CHECK(crossing.channel == 1);
+}
+
+TEST_CASE("frames survive being cut into CAN pieces") {
+    const Bytes wire = frame_of(Bytes(42, 7));
+    rig::CanSplitter splitter;
+    rig::CanJoiner joiner;
+    Bytes joined;
+    int pieces = 0;
+    for (std::uint8_t byte : wire) {
+        splitter.take(byte, [&](const std::uint8_t* data, std::size_t size) {
+            ++pieces;
+            joiner.take(data, size, [&](const std::uint8_t* bytes, std::size_t count) {
+                joined.insert(joined.end(), bytes, bytes + count);
+            });
+        });
+    }
+    CHECK(pieces == 7);
+    CHECK(joined == wire);
+}
+
+TEST_CASE("any bytes do no harm") {
+    rig::Board<4096> any("T");
+    std::uint32_t random = 1;
+    for (int round = 0; round < 200000; ++round) {
+        random = random * 1664525U + 1013904223U;
+        const auto byte = static_cast<std::uint8_t>(random >> 24 & (random & 1 ? 0xFF : 0x1F));
+        any.receive(&byte, 1);
+        if (round % 500 == 0) any.tick(static_cast<std::uint32_t>(round), rig::Inputs());
+    }
+}
+
+TEST_CASE("a Teensy starts with both motors off and 0 A asked for") {
+    setup();
+    CHECK(board.levels[rig::wiring::kDriveEnablePin] == LOW);
+    CHECK(board.levels[rig::wiring::kLoadEnablePin] == LOW);
+    CHECK(board.duties[rig::wiring::kDriveSetPin] == 2048);
+    REQUIRE((timer.function != nullptr));
+    timer.function();
+    CHECK(board.duties[rig::wiring::kDriveSetPin] == 2048);
+}
+
+TEST_CASE("a Teensy answers a hello, with interrupts off only while it touches the board") {
+    setup();
+    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 1, 0})) Serial.in.push_back(byte);
+    loop();
+    loop();
+    CHECK(board.locked == 0);
+    CHECK(Serial.out.size() > rig::kSerialSize);
+    Serial.out.clear();
+    Serial.room = 5;  // a host that does not read
+    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 2, 0})) Serial.in.push_back(byte);
+    loop();
+    CHECK(Serial.out.size() == 5);
+    Serial.room = 512;
+    loop();
+    CHECK(Serial.out.size() > rig::kSerialSize);
+}
+
+TEST_CASE("an enabled controller that is not ready tells no current") {
+    rig::TeensyHardware teensy;
+    teensy.begin();
+    board.analog[rig::wiring::kDriveCurrentPin] = 2048;
+    board.levels[rig::wiring::kDriveReadyPin] = LOW;
+    CHECK(teensy.sample().current != rig::kMissing);
+    rig::Outputs outputs;
+    outputs.in_force = true;
+    for (std::uint32_t tick = 0; tick < rig::wiring::kReadyAfterTicks; ++tick) teensy.drive(outputs);
+    CHECK(board.levels[rig::wiring::kDriveEnablePin] == HIGH);
+    CHECK(teensy.sample().current == rig::kMissing);
+    board.levels[rig::wiring::kDriveReadyPin] = HIGH;
+    CHECK(teensy.sample().current != rig::kMissing);
+    CHECK(teensy.sample().motor == 1000);
+    CHECK(teensy.sample().jaw == 3000);
+}
+
+TEST_CASE("a torque converter at its ends is a saturated field") {
+    rig::TeensyHardware teensy;
+    teensy.begin();
+    board.analog[rig::wiring::kProximalPin] = 4095;
+    board.analog[rig::wiring::kDistalPin] = 0;
+    CHECK(teensy.sample().proximal == INT16_MAX);
+    CHECK(teensy.sample().distal == INT16_MIN);
+}
+
+TEST_CASE("no command goes beyond the limit of the current controller") {
+    const rig::EsconWiring& wiring = rig::wiring::kDrive;
+    for (double current : {-1e9, -2.0, 0.0, 2.0, 1e9, std::nan("")}) {
+        CHECK(wiring.code(current) >= 409);
+        CHECK(wiring.code(current) <= 3686);
+    }
+    CHECK(wiring.code(std::nan("")) == wiring.code(0.0));
+}

@@ -1,0 +1,70 @@
+"""A small share of `make soak` and `make fuzz`, and that the two go on where they stopped."""
+
+import random
+
+import pytest
+
+from benchmarks.reliability import fuzz
+from benchmarks.reliability.faults import SENSOR_FAULTS, inject
+from benchmarks.reliability.targets import TARGETS
+from drivers.registry import fakes
+from drivers.transport.faulty import Fault
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_a_decoder_refuses_or_reads_right_whatever_comes(target: fuzz.Target) -> None:
+    tally = fuzz.Tally()
+    fuzz.run_block(target, 10**6, tally, size=150)
+    assert tally.failures == []
+    assert tally.inputs == 150
+    good = [target.run(seed) for seed in target.seeds()]
+    assert all(good), "an unharmed input is not accepted"
+
+
+def test_a_wrong_value_that_is_accepted_is_a_failure() -> None:
+    def believes(data: bytes) -> bool:
+        assert not data, "wrong"
+        return True
+
+    tally = fuzz.Tally()
+    fuzz.run_block(fuzz.Target("credulous", lambda: [b"x"], believes, 1), 0, tally, size=50)
+    assert 0 < len(tally.failures) <= fuzz.KEPT_FAILURES
+    assert "wrong" in tally.failures[0][2]
+
+
+def test_the_plan_gives_every_decoder_enough_and_all_of_it() -> None:
+    plan = fuzz.plan(fuzz.TOTAL)
+    assert sum(plan.values()) >= 10_000_000
+    assert min(plan.values()) >= 100_000
+
+
+def test_a_tally_is_gone_on_with(tmp_path) -> None:
+    path = tmp_path / "fuzz.json"
+    tallies = fuzz.load(path)
+    tallies[TARGETS[0].name].inputs = 3000
+    tallies[TARGETS[0].name].failures.append((1, "00", "x"))
+    fuzz.save(path, tallies)
+    again = fuzz.load(path)[TARGETS[0].name]
+    assert (again.inputs, list(again.failures[0])) == (3000, [1, "00", "x"])
+
+
+def test_a_block_is_made_from_its_number_alone() -> None:
+    first, second = (
+        [fuzz.mutated(random.Random("a:1"), [b"seed"]) for _ in range(2)] for _ in range(2)
+    )
+    assert first == second
+
+
+def test_faults_of_every_kind_are_detected_named_and_end_safe_in_time() -> None:
+    kinds = len(SENSOR_FAULTS) + 2 + len(Fault) * len(fakes())
+    outcomes = list(inject(kinds, seed=5))
+    assert len({outcome.kind for outcome in outcomes}) == kinds
+    for outcome in outcomes:
+        assert outcome.crash == ""
+        assert outcome.detected, outcome
+        assert outcome.named, outcome
+        assert outcome.mis_stamped == 0, outcome
+        silence = outcome.kind in ("host killed", "cable cut")
+        if outcome.safe_after_s is not None:
+            assert outcome.safe_after_s <= (0.052 if silence else 0.020), outcome
+    assert sum(outcome.safe_after_s is not None for outcome in outcomes) == len(SENSOR_FAULTS) + 2
