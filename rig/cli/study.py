@@ -132,7 +132,8 @@ def pique(
     from estimation.files import write_text_atomic
     from rig.reports import pique as shown
     from rig.reports.table import to_rich
-    from rig.studies.pique import open_paths, run_study
+    from rig.studies.arm_search import open_paths
+    from rig.studies.pique import run_study
 
     with progress() as bar:
         task = bar.add_task("paths", total=None)
