@@ -153,6 +153,44 @@ def pique(
         emit_json(study)
 
 
+@study_app.command()
+def payload(
+    data: Annotated[
+        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
+    ],
+    on: Annotated[list[str], typer.Option(help="A run to look for an added mass on.")],
+    model: Annotated[str, typer.Option(help="Run without the mass, to fit a model on.")] = "two18",
+    height_m: Annotated[
+        float, typer.Option(min=0.01, help="Height of the mass above the remote centre, m.")
+    ] = 0.535,
+    height_error_m: Annotated[
+        float, typer.Option(min=0.0, help="Standard error of that height, m.")
+    ] = 0.01,
+    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Find a mass added to an arm's insertion axis from its joints' torque."""
+    from estimation.files import write_text_atomic
+    from rig.reports.table import to_markdown, to_rich
+    from rig.studies.arm_search import open_paths
+    from rig.studies.payload import find_payload, table
+
+    with progress() as bar:
+        task = bar.add_task("paths", total=None)
+        fitted, *runs = open_paths(data, [model, *on])
+        found = find_payload(
+            fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
+        )
+    screen = console()
+    screen.print(to_rich(table(found)))
+    if out is not None:
+        text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
+        write_text_atomic(out, f"{text}\n{found.provenance.line()}\n")
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(found)
+
+
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.studies.oneill import Source

@@ -126,7 +126,8 @@ class Prepared:
         largest = np.abs(self.torque).max(axis=0)
         weights = np.divide(1.0, largest, out=np.zeros_like(largest), where=largest > 0)
         weights[self.joints :] *= GRIPPER_SHARE
-        return weights
+        scaled: FloatArray = weights
+        return scaled
 
     def of(self, kept: Sequence[str]) -> list[Block]:
         """Return the blocks of the base and of some effects."""
