@@ -154,6 +154,34 @@ def pique(
 
 
 @study_app.command()
+def wrench(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
+    from estimation.files import write_text_atomic
+    from rig.reports import pique_wrench as shown
+    from rig.reports.table import to_rich
+    from rig.studies.pique_wrench import run_wrench_study
+
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_wrench_study(seeds, workers, lambda: bar.advance(task))
+    screen = console()
+    for note in shown.NOTES:
+        screen.print(note, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@study_app.command()
 def payload(
     data: Annotated[
         Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
