@@ -182,6 +182,35 @@ def wrench(
 
 
 @study_app.command()
+def delsol(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
+    from estimation.files import write_text_atomic
+    from rig.reports.table import to_markdown, to_rich
+    from rig.simulation.hydraulic_arm import HYDRAULIC
+    from rig.studies.delsol import run_delsol, tables
+
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_delsol(seeds, lambda: bar.advance(task))
+    screen = console()
+    note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
+    screen.print(note, markup=False)
+    for table in tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        title = "# External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
+        parts = [title, note, *(to_markdown(table).rstrip() for table in tables(study))]
+        write_text_atomic(out, "\n\n".join([*parts, study.provenance.line()]) + "\n")
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@study_app.command()
 def payload(
     data: Annotated[
         Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
