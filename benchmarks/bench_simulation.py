@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.ratio import Ratio, best_of
-from drivers.teensy import control
+from drivers.teensy.guard import Drive
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect
@@ -23,9 +23,9 @@ def measure() -> list[Ratio]:
 
     def seconds(effects: list[HiddenEffect], plant: PlantParameters | None = None) -> float:
         bench = SimulatedBench(plant, effects=effects)
-        state, gains = control.new_state(), np.array(REFERENCE_GAINS)
-        bench.advance(ticks, target, load_ma, True, state, gains)  # compiles
-        return best_of(lambda: bench.advance(ticks, target, load_ma, True, state, gains), 5)
+        drive = Drive.armed(REFERENCE_GAINS)
+        bench.advance(ticks, target, load_ma, drive)  # compiles
+        return best_of(lambda: bench.advance(ticks, target, load_ma, drive), 5)
 
     plain_s = seconds([])
     loaded_s = seconds([HiddenEffect(name) for name in DEAREST])

@@ -29,6 +29,8 @@ from estimation.recording import FloatArray
 MINIMUM_RUNS = 3
 MINIMUM_POINTS = 60
 HYSTERESIS_BINS = 10
+WORTH = 0.05
+"""A higher degree must lower the error on runs left out by more than this share to be taken."""
 BISECTIONS = 60
 """Halvings of the voltage range in the inverse: more than a double has bits."""
 
@@ -207,7 +209,8 @@ def fit_fsr(
     Args:
         runs: The runs, in the order they were made.
         degree: Degree of the polynomial. If None, the lowest one whose error on runs left out is
-            not told apart from the least by one standard error of the runs' differences.
+            not told apart from the least by one standard error of the runs' differences, or is
+            within 5 % of it.
         force_at_zero_n: Force at 0 V, held fixed; fitted if None.
         rail_v: Upper end of the amplifier's range.
         max_degree: Greatest degree to try.
@@ -346,7 +349,9 @@ def _lowest_as_good(errors: dict[int, FloatArray]) -> int:
     best = min(errors, key=lambda d: float(errors[d].mean()))
     for degree in sorted(errors):
         worse = errors[degree] - errors[best]
-        if worse.mean() <= worse.std(ddof=1) / np.sqrt(worse.size):
+        is_told_apart = worse.mean() > worse.std(ddof=1) / np.sqrt(worse.size)
+        is_worth_it = np.sqrt(errors[degree].mean()) > (1 + WORTH) * np.sqrt(errors[best].mean())
+        if not (is_told_apart and is_worth_it):
             return degree
     return best
 

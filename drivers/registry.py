@@ -5,7 +5,7 @@ demonstrations load it.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -23,6 +23,20 @@ class UnknownDriverError(DriverError):
 
 
 @dataclass(frozen=True, slots=True)
+class CanUse:
+    """What a device takes of a CAN bus.
+
+    Attributes:
+        identifiers: Every 11-bit identifier it sends or listens to, by the options it is opened
+            with.
+        bit_rate: Bit rate it comes with from the factory, bit/s.
+    """
+
+    identifiers: Callable[[Mapping[str, Any]], frozenset[int]]
+    bit_rate: int
+
+
+@dataclass(frozen=True, slots=True)
 class Driver:
     """A driver as it is registered.
 
@@ -30,11 +44,13 @@ class Driver:
         name: Short name, as written in a configuration.
         description: One line on the device.
         open: Opens the device by URL; its keyword arguments, all with defaults, are its options.
+        can: What the device takes of a CAN bus; None where it is not on one.
     """
 
     name: str
     description: str
     open: Callable[..., Device]
+    can: CanUse | None = None
 
     @property
     def options(self) -> dict[str, Any]:

@@ -6,11 +6,13 @@ when asked, so a campaign may be larger than memory: iterate over it and keep on
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.derived import CAMPAIGN_TIME
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording
 
@@ -140,6 +142,19 @@ class Campaign:
         wanted = set(names)
         return Campaign(tuple(run for run in self.runs if run.name in wanted))
 
+    def timed(self) -> "Campaign":
+        """Return the campaign with the channel `campaign_time_s`, if every run's start is known.
+
+        Walks the campaign once. A run that has the channel keeps it.
+        """
+        starts = [recording.started_at_ns for recording in self]
+        known = [start for start in starts if start is not None]
+        if not known or len(known) < len(starts):
+            return self
+        return Campaign(
+            tuple(replace(r, load=partial(_timed, r.load, min(known))) for r in self.runs)
+        )
+
     def clock(self) -> Clock:
         """Place all runs on one clock.
 
@@ -257,3 +272,21 @@ class Campaign:
 
 def _split(campaign: Campaign, name: str, test: set[str]) -> Split:
     return Split(name, campaign.select(set(campaign.names) - test), campaign.select(test))
+
+
+def with_campaign_time(recording: Recording, began_ns: int) -> Recording:
+    """Return a run with the channel `campaign_time_s`, if its start is known and it has none yet.
+
+    Args:
+        recording: The run.
+        began_ns: Start of the campaign's first run, ns since the Unix epoch.
+    """
+    if recording.started_at_ns is None or CAMPAIGN_TIME in recording:
+        return recording
+    start_s = (recording.started_at_ns - began_ns) * 1e-9
+    since = start_s + recording.time_s - recording.time_s[0]
+    return recording.with_columns(**{CAMPAIGN_TIME: since})
+
+
+def _timed(load: Callable[[], Recording], began_ns: int) -> Recording:
+    return with_campaign_time(load(), began_ns)

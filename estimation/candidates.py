@@ -1,6 +1,6 @@
 """What a search may add to a balance: every effect of the catalogue that may enter it."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from estimation.derived import measured_channels
 from estimation.effects import catalogue
@@ -8,7 +8,12 @@ from estimation.effects.roles import entries
 from estimation.model import Term
 
 
-def candidates(balance: str, available: Collection[str]) -> list[Term]:
+def candidates(
+    balance: str,
+    available: Collection[str],
+    instead: Mapping[str, str] | None = None,
+    at_rest: bool = False,
+) -> list[Term]:
     """Return the terms that may be added to a balance, without values.
 
     An effect comes once for each way its roles may be played, such as a delay of either of two
@@ -17,11 +22,16 @@ def candidates(balance: str, available: Collection[str]) -> list[Term]:
     Args:
         balance: Balance id, such as `motor` or `joint.3`.
         available: Measured channels of the recordings.
+        instead: Channel to the one that plays its roles here, such as a commanded current for the
+            measured one.
+        at_rest: Whether samples at rest count, so that effects that tell what acts there may enter.
     """
     there = set(available)
-    return [
-        Term(effect, entry.sign, entry.channels)
+    played = instead or {}
+    terms = [
+        Term(effect, entry.sign, {r: played.get(c, c) for r, c in entry.channels.items()})
         for effect in catalogue().values()
+        if at_rest or not effect.at_rest
         for entry in entries(effect, balance)
-        if set(measured_channels(entry.channels.values())) <= there
     ]
+    return [t for t in terms if set(measured_channels(t.channels.values())) <= there]

@@ -12,6 +12,7 @@ from estimation.errors import EstimationError
 UNIT_BY_SUFFIX: dict[str, str] = {
     "n_m_s_rad": "N m s/rad",
     "n_m_rad": "N m/rad",
+    "n_m_s": "N m/s",
     "rad_s2": "rad/s^2",
     "m_s2": "m/s^2",
     "rad_s": "rad/s",
@@ -78,6 +79,7 @@ def _channel(name: str, description: str) -> tuple[str, Channel]:
 CHANNELS: dict[str, Channel] = dict(
     [
         _channel("time_s", "device clock, starts near zero in each run"),
+        _channel("campaign_time_s", "time since the campaign's first run began, derived"),
         _channel("motor_angle_rad", "drive motor shaft, before the gearhead"),
         _channel("spindle_angle_rad", "instrument spindle, after the gearhead"),
         _channel("jaw_angle_rad", "jaw, from the encoder of the load motor"),

@@ -48,7 +48,7 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
         fitted = fit(declared, split.train, bootstrap=0)
         for recording in split.test:
             run = balance_channels(fitted, recording)
-            places = settled_places(run, fitted.low_pass, moving_only=fitted.has_friction)
+            places = settled_places(run, fitted.low_pass, samples=fitted.samples)
             error = run[fitted.target] - estimate(fitted, run)
             errors[recording.name] = error[places]
     whole = np.concatenate(list(errors.values()))

@@ -1,10 +1,12 @@
 """Channels that are computed: speeds, accelerations, the twist of the gearbox.
 
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
-and second derivative of `X_angle_rad`; `X_travel_rad` is how far that angle has come since its
-lowest value of the last `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal;
-`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
-`motor_load_n_m` is the spindle's torque projected from the current. Offline they come from a
+and second derivative of `X_angle_rad`, `X_rate_n_m_s` is the first of `X_n_m`; `X_travel_rad` is
+how far that angle has come since its lowest value of the last `TRAVEL_WINDOW_S`, the state of
+hysteresis after a reversal; `gearbox_differential_rad` is the motor's angle behind the gear ratio
+less the spindle's; `motor_load_n_m` is the spindle's torque projected from the current;
+`campaign_time_s` is the time since the campaign's first run began, put beside the measured channels
+by `Campaign.timed`, and live the time since the first sample. Offline they come from a
 zero-phase filter and a noise-robust derivative, live from a causal filter and backward differences:
 the same names, two sources.
 """
@@ -25,7 +27,7 @@ from estimation.filters import (
     holoborodko_derivative,
 )
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPEED, in_motion
+from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -41,10 +43,16 @@ LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 """Regression of proximal torque on current and direction while moving, 49 runs of the public data
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
 
+CAMPAIGN_TIME = "campaign_time_s"
+"""Time since the campaign's first run began; a clock, so no filter touches it."""
+
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
+RATE = "_rate_n_m_s"
 
 TRAVEL_WINDOW_S = 0.5
 """How far back a travel looks, s. Longer memory could tell which run it is in."""
+
+CLOCKS = ("time_s", CAMPAIGN_TIME)
 
 Operator = Callable[[FloatArray], FloatArray]
 
@@ -73,6 +81,8 @@ def _differentiated(name: str) -> tuple[str, int]:
     for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
         if name.endswith(suffix):
             return name.removesuffix(suffix) + "_angle_rad", times
+    if name.endswith(RATE):
+        return name.removesuffix(RATE) + "_n_m", 1
     return name, 0
 
 
@@ -115,7 +125,7 @@ def _travel(values: FloatArray, window: int) -> FloatArray:
 
 
 def settled_places(
-    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
 ) -> NDArray[np.intp]:
     """Return the places of every n-th sample that is valid and away from the ends of its run.
 
@@ -125,22 +135,27 @@ def settled_places(
         channels: Filtered channels of one whole run.
         low_pass: The filter they went through.
         step: Keep every n-th sample.
-        moving_only: Leave out samples at rest too, where the motor's speed is among the channels.
+        samples: Which samples; whether one moves is told by the speeds among the channels.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
     inner[:edge] = False
     inner[max(len(inner) - edge, 0) :] = False
-    if moving_only and SPEED in channels:
-        inner &= in_motion(channels[SPEED], inner, channels.sample_rate_hz)
+    if samples == "motion":
+        valid = inner.copy()
+        for speed, slowest in SLOWEST_RAD_S.items():
+            if speed in channels:
+                inner &= in_motion(channels[speed], valid, channels.sample_rate_hz, slowest)
+    if samples == "closing":
+        inner &= closing(channels[SPINDLE_SPEED], channels.sample_rate_hz)
     return np.flatnonzero(inner)[::step]
 
 
 def settled(
-    channels: Recording, low_pass: LowPass, step: int = 1, moving_only: bool = False
+    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
 ) -> Recording:
     """Return the samples of `settled_places` alone; an effect with memory needs the whole run."""
-    return channels.at(settled_places(channels, low_pass, step, moving_only))
+    return channels.at(settled_places(channels, low_pass, step, samples))
 
 
 def zero_phase_channels(
@@ -157,7 +172,8 @@ def zero_phase_channels(
         MissingChannelError: A measured channel is not in the recording.
         FilterError: The run cannot be filtered.
     """
-    wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
+    names = list(dict.fromkeys(names))
+    wanted = [name for name in names if name not in CLOCKS]
     measured = {name: recording[name] for name in measured_channels(wanted)}
     filtered = filter_recording(replace(recording, columns=measured), low_pass)
     period_s = 1.0 / recording.sample_rate_hz
@@ -173,7 +189,10 @@ def zero_phase_channels(
         window = _window(recording.sample_rate_hz)
         return np.asarray(_travel(filled(values), window)[ticks])
 
-    return replace(filtered, columns=_derive(filtered.columns, wanted, derivative, travel))
+    columns = _derive(filtered.columns, wanted, derivative, travel)
+    if CAMPAIGN_TIME in names:
+        columns[CAMPAIGN_TIME] = recording[CAMPAIGN_TIME]
+    return replace(filtered, columns=columns)
 
 
 def _window(sample_rate_hz: float) -> int:
@@ -196,9 +215,10 @@ class CausalChannels:
         self, names: Iterable[str], sample_rate_hz: float, low_pass: LowPass = PAPER
     ) -> None:
         self.names = tuple(dict.fromkeys(names))
-        self.measured = measured_channels(self.names)
+        self.measured = measured_channels(name for name in self.names if name not in CLOCKS)
         self._rate_hz = sample_rate_hz
         self._filter = CausalFilter(sample_rate_hz, low_pass)
+        self._first_time_s: float | None = None
         self._last_time_s: float | None = None
         self._last_row: FloatArray = np.empty(0)
         travels = any(name.endswith(TRAVEL) for name in self.names)
@@ -211,6 +231,7 @@ class CausalChannels:
         Args:
             time_s: Device time, shape (n,), increasing across batches.
             measured: Measured channels in SI units, each of shape (n,); others are ignored.
+                Campaign time may be among them; else it counts from the first sample.
 
         Returns:
             Channel name to values, each of shape (n,); NaN where a needed value is not finite.
@@ -223,6 +244,11 @@ class CausalChannels:
         for part in self._unbroken(time, good):
             for name, values in self._advance(time[part], rows[part]).items():
                 channels[name][part] = values
+        if CAMPAIGN_TIME in self.names and time.size:
+            if self._first_time_s is None:
+                self._first_time_s = float(time[0])
+            since = np.atleast_1d(measured.get(CAMPAIGN_TIME, time - self._first_time_s))
+            channels[CAMPAIGN_TIME] = np.asarray(since, np.float64)
         return channels
 
     def _unbroken(self, time: FloatArray, good: np.ndarray) -> list[np.ndarray]:
@@ -255,7 +281,7 @@ class CausalChannels:
         )
         derived = _derive(
             dict(zip(self.measured, lined.T, strict=True)),
-            [name for name in self.names if name != "time_s"],
+            [name for name in self.names if name not in CLOCKS],
             self._backward,
             lambda values: _travel(values, _window(self._rate_hz)),
         )
@@ -278,5 +304,6 @@ def causal_channels(
     """
     wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
     source = CausalChannels(wanted, recording.sample_rate_hz, low_pass)
-    measured = {name: recording[name] for name in source.measured}
+    clocks = [name for name in wanted if name == CAMPAIGN_TIME]
+    measured = {name: recording[name] for name in (*source.measured, *clocks)}
     return replace(recording, columns=source.step(recording.time_s, measured))

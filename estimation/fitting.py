@@ -5,7 +5,7 @@ Where offsets of the runs are a nuisance, each run's mean is removed from the ta
 column, and the model's own offset becomes the mean over the runs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from estimation.campaign import Campaign
-from estimation.derived import settled_places
+from estimation.derived import CAMPAIGN_TIME, settled_places
 from estimation.effects import Parameter, Remembering
 from estimation.errors import EstimationError
 from estimation.model import (
@@ -131,10 +131,11 @@ def fit(
 def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]:
     """Read the runs and find every n-th valid sample of them."""
     runs = []
-    for recording in campaign.evidence:
+    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+    for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
-        places = settled_places(whole, model.low_pass, step, model.has_friction)
+        places = settled_places(whole, model.low_pass, step, model.samples)
         if places.size:
             runs.append(_Run(whole, places, whole.at(places)))
     if not runs:
@@ -232,15 +233,43 @@ def _search_shape(problem: _Problem) -> list[float]:
         except FitError:  # a shape at which columns fall together, such as a width far too wide
             return 1.0
 
+    grids = [[_scaled(p, float(x)) for x in p.grid()] for p in parameters]
     for _ in range(2 if len(parameters) > 1 else 1):
-        for k, parameter in enumerate(parameters):
-            grid = [_scaled(parameter, float(x)) for x in parameter.grid()]
+        for k, grid in enumerate(grids):
             tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
-    best = optimize.minimize(
-        error, point, method="Powell", bounds=bounds, options={"xtol": 1e-4, "ftol": 1e-10}
-    )
-    return values(best.x if best.fun <= error(point) else point)
+    reach = [grid[1] - grid[0] for grid in grids]
+    return values(_descended(error, point, reach, bounds))
+
+
+def _descended(
+    error: Callable[[Sequence[float] | FloatArray], float],
+    point: list[float],
+    reach: Sequence[float],
+    bounds: Sequence[tuple[float, float]],
+    most: int = 20,
+) -> list[float]:
+    """Return the lowest point near where the grid left off.
+
+    A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
+    each descent goes one step of the grid at most either way; it starts anew from where it ends
+    while that gains, since a valley of two shapes bends.
+    """
+    left = error(point)
+    for _ in range(most):
+        near = [
+            (max(low, x - step), min(high, x + step))
+            for x, step, (low, high) in zip(point, reach, bounds, strict=True)
+        ]
+        best = optimize.minimize(
+            error, point, method="Powell", bounds=near, options={"xtol": 1e-4, "ftol": 1e-10}
+        )
+        gained, left = left - best.fun, min(left, best.fun)
+        if gained > 0:
+            point = [float(x) for x in best.x]
+        if gained <= 1e-5 * left:
+            break
+    return point
 
 
 def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:
@@ -368,4 +397,13 @@ def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
         rmse=float(np.sqrt(centred / samples)),
         rmse_with_means=float(np.sqrt(squares / samples)),
         seed=seed,
+        run_spread=_run_spread(fitted, errors),
     )
+
+
+def _run_spread(fitted: Model, errors: Sequence[FloatArray]) -> float | None:
+    """Return how much runs differ: the standard deviation of the logarithm of their errors."""
+    powers = np.array([e.var() if fitted.run_offsets else np.mean(e**2) for e in errors])
+    if len(powers) < 2 or not np.all(powers > 0):
+        return None
+    return float(np.std(0.5 * np.log(powers), ddof=1))

@@ -18,6 +18,7 @@ from estimation.effects import Effect, Parameter
 from estimation.errors import EstimationError
 from estimation.filters import PAPER, LowPass
 from estimation.recording import FloatArray, Recording
+from estimation.rest import SPINDLE_SPEED, Samples
 from estimation.units import evaluate
 
 BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw")
@@ -82,6 +83,10 @@ class Term:
         )
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to other processes: a view of a mapping does not."""
+        return Term, (self.effect, self.sign, dict(self.channels), dict(self.values))
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters of the effect: the amplitudes, then the shape."""
@@ -130,6 +135,8 @@ class Evidence:
         rmse: Root mean square error with each run's mean error removed, in the target's unit.
         rmse_with_means: The same with the means left in.
         seed: Seed of the bootstrap behind the spreads.
+        run_spread: Standard deviation over runs of the logarithm of a run's error, None where a
+            single run was fitted or the file does not tell.
     """
 
     runs: tuple[str, ...]
@@ -137,6 +144,7 @@ class Evidence:
     rmse: float
     rmse_with_means: float
     seed: int
+    run_spread: float | None = None
 
 
 @dataclass(frozen=True)
@@ -153,6 +161,7 @@ class Model:
         run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
             zero drifts. Not where the runs differ by what is to be estimated, such as a load that
             is held within a run.
+        counted: Which samples count, or None for what suits the effects; see `samples`.
         evidence: What it was fitted on, or None for a declared model.
     """
 
@@ -163,6 +172,7 @@ class Model:
     description: str = ""
     low_pass: LowPass = PAPER
     run_offsets: bool = True
+    counted: Samples | None = None
     evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
@@ -185,9 +195,15 @@ class Model:
         return tuple(dict.fromkeys(names))
 
     @property
-    def has_friction(self) -> bool:
-        """Whether friction is among the effects: then the model says nothing of a rig at rest."""
-        return any(term.effect.id.startswith("friction.") for term in self.terms)
+    def samples(self) -> Samples:
+        """Which samples the model is fitted and judged on.
+
+        Unless declared: friction says nothing of a rig at rest, where it takes any value.
+        """
+        if self.counted is not None:
+            return self.counted
+        friction = any(term.effect.id.startswith("friction.") for term in self.terms)
+        return "motion" if friction else "all"
 
     @property
     def unit(self) -> str:
@@ -219,7 +235,10 @@ def balance_channels(model: Model, recording: Recording, causal: bool = False) -
         FilterError: The run cannot be filtered.
     """
     source = derived.causal_channels if causal else derived.zero_phase_channels
-    return source(recording, [*model.channels, model.target], model.low_pass)
+    wanted = [*model.channels, model.target]
+    if model.samples == "closing":
+        wanted.append(SPINDLE_SPEED)
+    return source(recording, wanted, model.low_pass)
 
 
 def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> FloatArray:

@@ -18,13 +18,14 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 from estimation.effects import effect
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term, nearest
+from estimation.rest import Samples
 
 SCHEMA = "rig.model/1"
 
@@ -87,6 +88,7 @@ def parse(text: str, where: str = "model") -> Model:
                 processing.take("order", int, LowPass().order),
             ),
             run_offsets=processing.take("run_offsets", bool, True),
+            counted=_counted(processing),
             evidence=_evidence(evidence) if evidence.content else None,
         )
         for table in (top, processing, evidence):
@@ -123,6 +125,8 @@ def to_toml(model: Model) -> str:
         f"order = {_value(model.low_pass.order)}",
         f"run_offsets = {_value(model.run_offsets)}",
     ]
+    if model.counted is not None:
+        lines.append(f"samples = {_value(model.counted)}")
     for term in model.terms:
         lines += ["", "[[effects]]", f"id = {_value(term.effect.id)}", f"sign = {term.sign}"]
         lines += [f"channels.{role} = {_value(name)}" for role, name in term.channels.items()]
@@ -139,6 +143,8 @@ def to_toml(model: Model) -> str:
             f"{key} = {_value(getattr(model.evidence, key))}"
             for key in ("runs", "samples", "rmse", "rmse_with_means", "seed")
         ]
+        if model.evidence.run_spread is not None:
+            lines.append(f"run_spread = {_value(model.evidence.run_spread)}")
     return "\n".join(lines) + "\n"
 
 
@@ -245,6 +251,20 @@ def _pair(table: _Table) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
+def _counted(processing: _Table) -> Samples | None:
+    """Return which samples count, or None where the file leaves that to the effects."""
+    if "samples" not in processing.content:
+        return None
+    name = processing.take("samples", str)
+    for known in get_args(Samples):
+        if name == known:
+            return cast(Samples, known)
+    raise ModelFileError(
+        f"{processing.where}: samples = {name!r} is none of {', '.join(get_args(Samples))}.",
+        fix=nearest(name, get_args(Samples)),
+    )
+
+
 def _evidence(table: _Table) -> Evidence:
     return Evidence(
         runs=tuple(str(name) for name in table.take("runs", list)),
@@ -252,4 +272,5 @@ def _evidence(table: _Table) -> Evidence:
         rmse=table.number("rmse"),
         rmse_with_means=table.number("rmse_with_means"),
         seed=table.take("seed", int),
+        run_spread=table.number("run_spread") if "run_spread" in table.content else None,
     )

@@ -16,13 +16,8 @@ from estimation.derived import GEARBOX, zero_phase_channels
 from estimation.errors import EstimationError
 from estimation.filters import PAPER, LowPass
 from estimation.recording import FloatArray, Recording
+from estimation.rest import closing
 from estimation.scores import Score, score
-
-CLOSING_SPEED_RAD_S = 0.25
-"""Filtered spindle speed from which a sample counts as closing, rad/s."""
-
-TRIM_S = 1.0
-"""Length dropped at the start and at the end of each run, s."""
 
 AUTHORS_SKIP = 1 / 8
 """The authors' linear fit leaves out this first part of the closing samples."""
@@ -56,16 +51,8 @@ def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PA
 
 
 def is_closing(run: Recording) -> NDArray[np.bool_]:
-    """Say which samples of a processed run the paper keeps, shape (n,).
-
-    Kept are samples whose filtered spindle speed is at least `CLOSING_SPEED_RAD_S` in the closing
-    direction, without the run's first and last `TRIM_S`.
-    """
-    trim = round(TRIM_S * run.sample_rate_hz)
-    kept = run[SPEED] >= CLOSING_SPEED_RAD_S
-    kept[:trim] = False
-    kept[max(len(kept) - trim, 0) :] = False
-    return kept
+    """Say which samples of a processed run the paper keeps, shape (n,)."""
+    return closing(run[SPEED], run.sample_rate_hz)
 
 
 def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:

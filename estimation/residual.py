@@ -129,7 +129,7 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
             recording, [*model.channels, model.target, *there], model.low_pass
         )
         step = max(1, int(recording.sample_rate_hz / rate_hz))
-        places = settled_places(channels, model.low_pass, step, model.has_friction)
+        places = settled_places(channels, model.low_pass, step, model.samples)
         estimated = estimate(model, channels)[places]
         run = channels.at(places)
         found.append(RunResidual(run, estimated, run[model.target] - estimated))

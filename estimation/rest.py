@@ -1,9 +1,11 @@
-"""Which samples are at rest, where friction holds any torque and a model of motion says nothing.
+"""Which samples are in motion or closing: where friction sticks a model of motion says nothing.
 
 At rest friction takes whatever value holds the balance. Such samples are few and their errors are
 large: on a simulated rig a twentieth of the samples held more than half of the squared error, and
 pulled the torque constant 15 % from its true value. They are left out of fits and of residuals.
 """
+
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +16,54 @@ from estimation.recording import FloatArray
 SPEED = "motor_velocity_rad_s"
 """The cleanest speed there is."""
 
-REST_SHARE, REST_RAD_S, REST_REACH_S = 0.05, 0.7, 0.02
-"""At rest is: slower than this share of the run's 95th percentile of speed or than this speed of
-the motor, and what is this near to it. The share grows with what the filter smears at a reversal.
-"""
+SPINDLE_SPEED = "spindle_velocity_rad_s"
+
+Samples = Literal["all", "motion", "closing"]
+"""Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
+
+SLOWEST_RAD_S = {SPEED: 0.7, SPINDLE_SPEED: 0.02}
+"""Speeds that friction goes with, and below which each is at rest. While the gearbox winds up the
+motor turns and the spindle stands: a balance is at rest when the speed of its own friction is."""
+
+CLOSING_RAD_S, TRIM_S = 0.25, 1.0
+"""Filtered spindle speed from which a sample counts as closing, and what is left out at the start
+and at the end of each run (O'Neill et al. 2018, section II.C)."""
+
+REST_SHARE, REST_REACH_S = 0.05, 0.02
+"""At rest is also: slower than this share of the run's 95th percentile of speed, and what is this
+near to rest. The share grows with what the filter smears at a reversal."""
 
 
 def in_motion(
-    speed: FloatArray, valid: NDArray[np.bool_], sample_rate_hz: float
+    speed: FloatArray,
+    valid: NDArray[np.bool_],
+    sample_rate_hz: float,
+    slowest_rad_s: float = SLOWEST_RAD_S[SPEED],
 ) -> NDArray[np.bool_]:
     """Return which samples of a run are away from rest, shape (n,).
 
     Args:
-        speed: Filtered speed of the motor, rad/s, shape (n,).
+        speed: Filtered speed, rad/s, shape (n,).
         valid: Samples whose speed can be trusted, shape (n,).
         sample_rate_hz: Rate of the samples.
+        slowest_rad_s: Speed below which it is at rest; the motor's unless stated.
     """
     size = np.abs(speed)
     usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
-    rest = (size < max(REST_RAD_S, REST_SHARE * usual)).astype(np.uint8)
+    rest = (size < max(slowest_rad_s, REST_SHARE * usual)).astype(np.uint8)
     reach = 2 * round(REST_REACH_S * sample_rate_hz) + 1
     return np.asarray(ndimage.maximum_filter1d(rest, reach) == 0)
+
+
+def closing(spindle_speed: FloatArray, sample_rate_hz: float) -> NDArray[np.bool_]:
+    """Return which samples of a whole run close the jaw, away from the run's ends, shape (n,).
+
+    Args:
+        spindle_speed: Filtered speed, rad/s, shape (n,).
+        sample_rate_hz: Rate of the samples.
+    """
+    trim = round(TRIM_S * sample_rate_hz)
+    kept = spindle_speed >= CLOSING_RAD_S
+    kept[:trim] = False
+    kept[max(len(kept) - trim, 0) :] = False
+    return kept

@@ -3,7 +3,7 @@
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -19,6 +19,11 @@ SIMULATED = SHIPPED / "simulated.toml"
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Torque = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+Current = Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
+Angle = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 
 
 class _Section(BaseModel):
@@ -26,13 +31,39 @@ class _Section(BaseModel):
 
 
 class LoggerSection(_Section):
-    """Where the logger is found.
+    """What moves the rig and samples it, and where it is found.
 
     Attributes:
-        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...` or `socket://host:port`.
+        driver: `teensy` for the 1 kHz logger board, `epos4` for a drive on CANopen whose position
+            loop runs in this computer.
+        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
+            `can:...`.
+        options: The driver's own options.
+        bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
+            with from the factory if none.
     """
 
+    driver: Literal["teensy", "epos4"] = "teensy"
     url: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
+
+
+class DeviceSection(_Section):
+    """A further device whose channels are recorded beside the logger's.
+
+    Attributes:
+        driver: Name of its driver; `rig devices` lists them.
+        url: Where it is; `sim://` for its fake.
+        options: The driver's own options.
+        bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
+            from the factory if none.
+    """
+
+    driver: str
+    url: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
 
 
 class ControllerSection(_Section):
@@ -52,19 +83,56 @@ class ControllerSection(_Section):
 class LimitsSection(_Section):
     """Limits checked at every sample, on the absolute value; a crossing ends in the safe state."""
 
-    proximal_torque_n_m: Positive
-    distal_torque_n_m: Positive
-    motor_current_a: Positive
-    load_command_a: Positive
-    spindle_angle_rad: Positive
+    proximal_torque_n_m: Torque
+    distal_torque_n_m: Torque
+    motor_current_a: Current
+    load_command_a: float = Field(ge=0, le=60)
+    spindle_angle_rad: Angle
+
+
+class SafetySection(_Section):
+    """What is watched besides the limits, by the board first and by this computer again; on always.
+
+    A time or a heat of 0 switches its watch off.
+
+    Attributes:
+        safe_state: What the drive motor does once something tripped: `release`, no current; or
+            `hold`, stay where it stands with a low command, where encoder and current are sound.
+        hold_command_ratio: Largest command while holding, of full scale.
+        continuous_current_a: Motor current that warms the motor no further.
+        heat_a2_s: Heat above it the motor can take: integral of current squared less that squared.
+        stall_current_a: Current above which a motor that stands still is stalled.
+        stall_motor_angle_rad: Motor shaft angle within which it stands still.
+        stall_s: How long it may be stalled.
+        motor_speed_rad_s: Fastest motor shaft.
+        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; none if unset.
+        jaw_open_rad: Jaw angle below which it must not open; none if unset.
+        saturated_s: How long a torque or current sensor may be at the end of its range.
+        stale_s: How long its reading may not change at all.
+        watchdog_s: How long this computer may be silent.
+    """
+
+    safe_state: Literal["release", "hold"] = "release"
+    hold_command_ratio: float = Field(default=0.05, ge=0, le=0.5)
+    continuous_current_a: Current = 0.5
+    heat_a2_s: float = Field(default=0.5, ge=0, le=2000)
+    stall_current_a: Current = 0.55
+    stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
+    stall_s: float = Field(default=1.0, ge=0, le=600)
+    motor_speed_rad_s: float = Field(default=900.0, gt=0, le=20000)
+    jaw_closed_rad: Number | None = None
+    jaw_open_rad: Number | None = None
+    saturated_s: float = Field(default=0.02, ge=0, le=60)
+    stale_s: float = Field(default=0.5, ge=0, le=60)
+    watchdog_s: float = Field(default=0.25, ge=0.005, le=1)
 
 
 class DriftSection(_Section):
-    """Largest change of a sensor's zero over a run that passes."""
+    """Largest change of a sensor's zero over a run that passes; without a limit none is judged."""
 
-    proximal_torque_n_m: Positive
-    distal_torque_n_m: Positive
-    motor_current_a: Positive
+    proximal_torque_n_m: Torque | None = None
+    distal_torque_n_m: Torque | None = None
+    motor_current_a: Current | None = None
 
 
 class InstrumentSection(_Section):
@@ -106,6 +174,7 @@ class Config(_Section):
         calibration: Calibration set: a TOML file, or a shipped one by name.
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.
+        devices: Further devices by the name their recorded channels go under.
         serials: Serial numbers of the devices on the rig, held against those of the records.
     """
 
@@ -113,19 +182,21 @@ class Config(_Section):
     logger: LoggerSection
     controller: ControllerSection
     limits: LimitsSection
-    drift: DriftSection
+    safety: SafetySection = SafetySection()
+    drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
     calibration: str = "reference"
     calibration_store: str | None = None
     serials: dict[str, str] = Field(default_factory=dict)
-    lever_arm_m: Positive = 0.012
+    devices: dict[Name, DeviceSection] = Field(default_factory=dict)
+    lever_arm_m: Length = 0.012
     model: str | None = None
 
     @property
     def is_simulated(self) -> bool:
         """Whether the logger is the simulated one."""
-        return self.logger.url.startswith("sim:")
+        return is_simulated(self.logger.url)
 
     @property
     def model_path(self) -> Path | None:
@@ -157,6 +228,11 @@ class Config(_Section):
         refuse_errors(self.calibration_verdicts())
         return compose(base, active_lines(self.store, self.instrument.serial).values())
 
+    @property
+    def drift_limits(self) -> dict[str, float]:
+        """The limits of the zeros' drift, of the channels that have one."""
+        return {name: limit for name, limit in self.drift if limit is not None}
+
     def calibration_verdicts(self) -> list[Verdict]:
         """Return what speaks against the store's active lines now; empty without a store."""
         if self.store is None:
@@ -173,17 +249,34 @@ class Config(_Section):
         return Config.model_validate(whole)
 
 
+def is_simulated(url: str) -> bool:
+    """Say whether a URL names a fake."""
+    return url.startswith("sim:")
+
+
+def shipped_configs() -> list[str]:
+    """Return the names of the shipped configurations, sorted."""
+    return sorted(p.stem for p in SHIPPED.glob("*.toml") if not p.stem.endswith(".model"))
+
+
 def load_config(path: Path | None = None) -> Config:
     """Read a configuration; the simulated rig's when no path is given.
+
+    Args:
+        path: A TOML file, or the name of a shipped configuration such as `reference`.
 
     Raises:
         UsageError: The file cannot be read or a key is wrong; names the key and the nearest one.
     """
-    path = path or SIMULATED
+    path = SIMULATED if path is None else _found(path)
     try:
         return Config.model_validate(tomllib.loads(path.read_text()))
-    except OSError as error:
-        raise UsageError(f"The configuration {path} cannot be read.", str(error)) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(
+            f"The configuration {path} cannot be read.",
+            str(error),
+            f"Give a TOML file, or one of: {', '.join(shipped_configs())}.",
+        ) from error
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:
@@ -192,9 +285,15 @@ def load_config(path: Path | None = None) -> Config:
         ) from error
 
 
+def _found(path: Path) -> Path:
+    """Return the shipped configuration of that name, or the path itself."""
+    return SHIPPED / f"{path}.toml" if str(path) in shipped_configs() else path
+
+
 def _keys(model: type[BaseModel]) -> set[str]:
     keys = set(model.model_fields)
     for info in model.model_fields.values():
-        if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
-            keys |= _keys(info.annotation)
+        for kind in (info.annotation, *get_args(info.annotation)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                keys |= _keys(kind)
     return keys

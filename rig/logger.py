@@ -3,21 +3,53 @@
 from drivers.transport import Transport, open_transport
 from rig.config import Config
 
+PTY_URL = "sim://pty"
+"""The firmware as a process, in real time."""
 
-def open_logger(config: Config, pace: float | None = None) -> Transport:
+
+def open_logger(
+    config: Config, pace: float | None = None, step_s: float | None = None
+) -> Transport:
     """Return an open transport to the configured logger.
 
     Args:
         config: The configuration.
         pace: Simulated seconds a real second, None for as fast as possible; a real logger has its
             own pace.
+        step_s: Longest simulated time between looks at the logger's output; its own choice if None.
 
     Raises:
         DriverError: The logger cannot be reached.
     """
+    if config.logger.url == PTY_URL:
+        from rig.simulation.firmware_process import FirmwareProcess
+
+        return FirmwareProcess()
+    if config.logger.driver == "epos4":
+        return _open_canopen_logger(config)
     if config.is_simulated:
         # the plant is compiled code that a session with a real rig does not need
         from rig.simulation.logger import open_simulated_logger
 
-        return open_simulated_logger(config.simulation, config.logger.url, pace)
+        return open_simulated_logger(
+            config.simulation, config.logger.url, pace, config.safety.watchdog_s, step_s
+        )
     return open_transport(config.logger.url)
+
+
+def _open_canopen_logger(config: Config) -> Transport:
+    """Return the link to a logger's logic on an EPOS4."""
+    if config.is_simulated:
+        from rig.simulation.canopen import open_simulated_canopen
+
+        return open_simulated_canopen(config)
+    from drivers.epos4.driver import Epos4
+    from drivers.transport.python_can import open_can
+    from rig.canopen_logger import CanopenLogger
+
+    bus = open_can(config.logger.url)
+    try:
+        return CanopenLogger(Epos4(bus, **config.logger.options), bus)
+    except BaseException:
+        bus.close()
+        raise

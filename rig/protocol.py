@@ -6,6 +6,7 @@ closing-positive.
 """
 
 import itertools
+import json
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -157,17 +158,62 @@ class StepHoldRuns(_Table):
             yield _constant_load("hold", start + rise, load, start)
 
 
+class ChirpRuns(_Table):
+    """Small grasps that become faster and faster, at each load."""
+
+    kind: Literal["chirp"]
+    low_hz: Positive
+    high_hz: Positive
+    loads_a: list[Number] = Field(min_length=1)
+    amplitude_rad: Positive = 0.05
+    duration_s: Positive = 12.0
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.chirp(
+                self.duration_s, start, self.amplitude_rad, self.low_hz, self.high_hz
+            )
+            yield _constant_load("chirp", angle, load, start)
+
+
+class DwellRuns(_Table):
+    """Moves to and fro after rests of different length, at each load."""
+
+    kind: Literal["dwell"]
+    dwells_s: list[Positive] = Field(min_length=2)
+    travel_rad: Positive = 0.4
+    move_s: Positive = 0.8
+    loads_a: list[Number] = Field(min_length=1)
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.dwells(start, self.travel_rad, self.move_s, self.dwells_s)
+            yield _constant_load("dwell", angle, load, start)
+
+
 TABLES: tuple[type[BaseModel], ...] = (
     SineRuns,
     FourierRuns,
     SpeedStaircaseRuns,
     LoadStaircaseRuns,
     StepHoldRuns,
+    ChirpRuns,
+    DwellRuns,
 )
 """Every kind of `[[runs]]` table."""
 
 RunTable = Annotated[
-    SineRuns | FourierRuns | SpeedStaircaseRuns | LoadStaircaseRuns | StepHoldRuns,
+    SineRuns
+    | FourierRuns
+    | SpeedStaircaseRuns
+    | LoadStaircaseRuns
+    | StepHoldRuns
+    | ChirpRuns
+    | DwellRuns,
     Field(discriminator="kind"),
 ]
 
@@ -198,6 +244,17 @@ class Protocol(BaseModel):
             )
             for index, plan in enumerate(plan for table in self.runs for plan in table.plans())
         ]
+
+
+def protocol_toml(protocol: Protocol) -> str:
+    """Return a protocol as the text of a file that `load_protocol` reads; defaults are left out."""
+    lines = [f"{key} = {json.dumps(getattr(protocol, key))}" for key in ("name", "description")]
+    for table in protocol.runs:
+        lines += ["", "[[runs]]"]
+        told = table.model_dump(exclude_unset=True)
+        # TOML writes strings, numbers and lists of numbers as JSON does
+        lines += [f"{key} = {json.dumps(value, allow_nan=False)}" for key, value in told.items()]
+    return "\n".join(lines) + "\n"
 
 
 def _constant_load(

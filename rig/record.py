@@ -12,10 +12,16 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from calibration.zero import Drift, SensorZero, drift_verdicts
+from drivers.clock import ClockLine
 from estimation.files import write_text_atomic
 from rig import __version__
+from rig.companions import Beside
 from rig.config import Config
 from rig.errors import UsageError
 from rig.log.container import Attached
@@ -198,15 +204,22 @@ def _record_run(
     with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
         for reading in itertools.chain([first], readings):
             run = _of_run(reading, motion)
+            beside = {c.stream().topic: c.take() for c in session.companions}
             if len(run):
                 _write_reading(log, run, run_start_us, epoch_ns)
+                line = session.clock.line
+                for topic, block in beside.items():
+                    _write_beside(log, topic, block, line, run_start_us, epoch_ns)
                 samples += len(run)
                 if on_progress:
                     on_progress(plan.name, samples, expected)
             log.poll()
         after = session.take_zeros(REST_S)
         drift = drift_verdicts(
-            before, after, session.calibrations, session.config.drift.model_dump()
+            before,
+            after,
+            session.calibrations,
+            session.config.drift_limits,
         )
         lost = session.counters["lost"] - lost_before
         result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
@@ -242,6 +255,7 @@ def _new_log(
             "rig_version": __version__,
             "firmware_version": session.identity.firmware_version,
             "logger_serial": session.identity.serial,
+            **_clock_residuals(session),
         },
     )
     settings = json.dumps(config.model_dump(), indent=1).encode()
@@ -251,6 +265,7 @@ def _new_log(
     ]
     _set_aside(path)
     streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
+    streams += [companion.stream() for companion in session.companions]
     return LogWriter(path, info, streams, attachments=attachments)
 
 
@@ -266,6 +281,27 @@ def _write_reading(log: LogWriter, reading: Reading, run_start_us: int, epoch_ns
     )
     counts = {field.name: reading.counts[field.name] for field in COUNTS_STREAM.fields}
     log.write(COUNTS, counts, log_time_ns)
+
+
+def _write_beside(
+    log: LogWriter, topic: str, block: Beside, line: ClockLine, run_start_us: int, epoch_ns: int
+) -> None:
+    """Write what a further device measured meanwhile, on the logger's clock."""
+    tick_s = line.to_device(block.host_s)
+    time_s = tick_s - run_start_us * 1e-6
+    of_run = time_s >= 0  # what came before the run began is not of it
+    rows: dict[str, NDArray[Any]] = dict(block.columns)
+    rows |= {"sequence": block.sequence, "flags": block.flags, "time_s": time_s}
+    log_time_ns = epoch_ns + np.round(tick_s * 1e9).astype(np.int64)
+    log.write(topic, {name: values[of_run] for name, values in rows.items()}, log_time_ns[of_run])
+
+
+def _clock_residuals(session: Session) -> dict[str, str]:
+    """Return how well each device's clock is known, as a log keeps it, s."""
+    lines = {companion.name: companion.line for companion in session.companions}
+    told = {name: f"{line.residual_s:.3g}" for name, line in lines.items() if line is not None}
+    told["logger"] = f"{session.clock.line.residual_s:.3g}"
+    return {f"clock_residual_s_{name}": text for name, text in told.items()}
 
 
 def _end_of_run(

@@ -5,10 +5,9 @@ trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM), the 
 first, and the disarming is confirmed by the logger itself.
 """
 
-import signal
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
-from types import FrameType, TracebackType
+from contextlib import ExitStack, suppress
+from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -17,15 +16,18 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
-from drivers.errors import DriverError
+from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity
+from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Trip
 from drivers.transport.transport import Transport
+from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
+from rig.interrupts import leaving_safely
 from rig.motion import settling
 from rig.reading import Reading, reading_of, with_setpoints
-from rig.safety import board_limits, check_board, check_samples, check_setpoints
+from rig.safety import board_limits, check_samples, check_setpoints
+from rig.trips import HostWatch, trip_error, tripped
 
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
@@ -60,16 +62,23 @@ class Session:
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
         self._spindle_angle_rad = 0.0
+        self._watch: HostWatch | None = None
         self.newest_tick_us = 0
+        self.companions: list[Companion] = []
         self.clock = ClockFit()
         """The logger's clock against this computer's; its line states the residual of the fit."""
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
+            ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
+            self.companions = open_companions(self.config)
+            for companion in self.companions:
+                ways_out.callback(companion.device.close)
             ways_out.callback(self._stop_streaming)
-            ways_out.enter_context(_sigterm_as_interrupt())
+            for companion in self.companions:
+                companion.begin(self._transport.now_s)
             self._logger.start()
             self._ways_out = ways_out.pop_all()
         return self
@@ -98,6 +107,7 @@ class Session:
         Raises:
             DriverError: The logger did not confirm; cut the power by hand.
         """
+        self._watch = None
         self._logger.disarm()
 
     def rest(self, duration_s: float) -> Iterator[Reading]:
@@ -143,16 +153,17 @@ class Session:
         targets = self._to_counts("target_angle_rad", target_angle_rad)
         loads_ma = self._to_counts("load_command_a", load_command_a)
         lead = round(LEAD_S * TICKS_A_SECOND)
-        self._logger.arm(self.config.controller.gains(), board_limits(limits, self.calibrations))
+        board = board_limits(self.config, self.calibrations)
+        self._watch = HostWatch(board)
+        self._logger.arm(self.config.controller.gains(), board)
         queued = played = 0
         newest_sequence: int | None = None
         while played < targets.size:
             while queued < min(played + lead, targets.size):
                 block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
-                self._logger.queue(targets[block], loads_ma[block])
+                self._queue(targets[block], loads_ma[block])
                 queued = block.stop
             reading = self._read()
-            check_board(reading)
             reading = with_setpoints(reading, played, targets.size, newest_sequence)
             played = max(played, int(reading.setpoint.max()) + 1)
             newest_sequence = int(reading.counts["sequence"][-1]) if played else None
@@ -178,17 +189,45 @@ class Session:
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
+        for companion in self.companions:
+            companion.poll(self._transport.now_s)
         if self._first_tick_us is None:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
         self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
         try:
+            self._require_no_trip(reading)
             check_samples(self.config.limits, reading)
+            crossing = self._watch.check(reading) if self._watch else None
+            if crossing is not None:
+                raise trip_error(crossing, self.calibrations, "This computer is disarming the rig.")
         except SafetyTripError:
             self.safe()
             raise
         return reading
+
+    def _queue(self, targets: NDArray[np.int32], loads_ma: NDArray[np.int32]) -> None:
+        """Queue setpoints; a board that has tripped since it was read says over what."""
+        try:
+            self._logger.queue(targets, loads_ma)
+        except CommandRefusedError as error:
+            report = self._logger.trip()
+            if report.code is Trip.NONE:
+                raise
+            state = "It is in its safe state, until armed again."
+            raise trip_error(report, self.calibrations, state) from error
+
+    def _require_no_trip(self, reading: Reading) -> None:
+        """Look for what the board itself tripped over.
+
+        Raises:
+            SafetyTripError: It did and is in its safe state; says over what, and how late.
+        """
+        trip = tripped(reading)
+        if self._watch is not None and trip is not None:
+            state = "It holds the spindle with a low command" if trip[1] else "It is released"
+            raise trip_error(self._logger.trip(), self.calibrations, f"{state}, until armed again.")
 
     def _follow_clock(self) -> None:
         exchange = self._logger.last_exchange
@@ -217,21 +256,3 @@ class Session:
         """Let go of the link; whether the rig was disarmed has been settled before."""
         with suppress(DriverError):
             self._logger.close()
-
-
-@contextmanager
-def _sigterm_as_interrupt() -> Iterator[None]:
-    """Turn SIGTERM into KeyboardInterrupt, so that it takes the same way out as Ctrl-C."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    try:
-        previous = signal.signal(signal.SIGTERM, interrupt)
-    except ValueError:  # not in the main thread, where signals never arrive
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)

@@ -4,6 +4,7 @@ Angles are closing-positive. A trajectory starts and ends at rest where its kind
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -65,6 +66,29 @@ def steps(levels: Sequence[float], hold_s: float, ramp_s: float) -> FloatArray:
     for previous, level in itertools.pairwise(levels):
         parts += [previous + (level - previous) * ramp, hold * level]
     return np.concatenate(parts)
+
+
+def chirp(
+    duration_s: float, start_rad: float, amplitude_rad: float, low_hz: float, high_hz: float
+) -> FloatArray:
+    """Return a raised cosine whose frequency climbs exponentially, open at `start_rad`, rad."""
+    t = times(duration_s)
+    rate = math.log(high_hz / low_hz) / duration_s
+    phase: FloatArray = 2.0 * np.pi * low_hz * np.expm1(rate * t) / rate
+    angle: FloatArray = start_rad + amplitude_rad * (1.0 - np.cos(phase))
+    return angle
+
+
+def dwells(
+    start_rad: float, travel_rad: float, move_s: float, dwells_s: Sequence[float]
+) -> FloatArray:
+    """Return smooth moves to and fro with a rest of each length before a move, rad."""
+    there = minimum_jerk(0.0, travel_rad, move_s)
+    parts = []
+    for k, dwell_s in enumerate(dwells_s):
+        move = there if k % 2 == 0 else there[::-1]
+        parts += [np.full(round(dwell_s * SAMPLE_RATE_HZ), move[0]), move]
+    return start_rad + np.concatenate(parts)
 
 
 def minimum_jerk(start: float, stop: float, duration_s: float) -> FloatArray:

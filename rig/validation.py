@@ -5,6 +5,8 @@ from collections.abc import Iterable
 
 from pydantic import ValidationError
 
+from estimation.channels import UnknownUnitError, unit_of
+
 
 def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
     """Return one sentence a problem: the key's path, the message, the nearest known key.
@@ -20,5 +22,15 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
         if problem["type"] == "extra_forbidden":
             near = difflib.get_close_matches(str(problem["loc"][-1]), list(known), n=1)
             message = "there is no such key" + (f"; did you mean {near[0]!r}?" if near else "")
+        elif problem["loc"] and isinstance(problem["input"], (int, float)):
+            message += f", given {problem['input']}{_unit(str(problem['loc'][-1]))}"
         sentences.append(f"{path}: {message}.")
     return " ".join(sentences)
+
+
+def _unit(key: str) -> str:
+    """Return the unit a key's name ends in, with a space before it; nothing where it has none."""
+    try:
+        return f" {unit_of(key)}"
+    except UnknownUnitError:
+        return ""

@@ -1,12 +1,19 @@
 """Fixtures every room's tests share."""
 
 import os
+import shutil
+import subprocess
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+# before numpy is loaded: threads of a BLAS wait for one another when tests run side by side
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
+
+from drivers.teensy.firmware_fake import firmware_library
 
 # compiled code is slow the first time, and a deadline is a wall clock in disguise
 settings.register_profile("no deadline", deadline=None)
@@ -22,6 +29,22 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data at {folder} (set RIG_DATA to its folder)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def library() -> Path:
+    """The firmware library, built from the present source; skipped where that cannot be."""
+    if shutil.which("make") is None or shutil.which("g++") is None:
+        found = firmware_library()
+        if found is None:
+            pytest.skip(
+                "the firmware library is not built and there is no g++ and make to build it"
+            )
+        return found
+    subprocess.run(["make", "-C", str(ROOT / "firmware")], check=True, capture_output=True)
+    found = firmware_library()
+    assert found is not None
+    return found
 
 
 @pytest.fixture(autouse=True)

@@ -64,6 +64,8 @@ def with_devices(blocks: Iterator[SampleBlock]) -> Iterator[SampleBlock]:
             devices=(
                 DeviceStatus("teensy", "armed", "simulated, SIM-0001"),
                 DeviceStatus("load motor", "ok"),
+                DeviceStatus("calibration", "ok", "reference+store, 3 records, oldest 12 days"),
+                DeviceStatus("recording", "on", "live.mcap, 5200 samples, 1 marks"),
             ),
             limits=(
                 LimitStatus("motor current", float(block.columns["motor_current_a"][-1]), 0.6, "A"),
@@ -84,7 +86,14 @@ def draw() -> str:
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,
         color_system="truecolor",
     )  # fmt: skip
-    console.print(View(state.snapshot(), "rig live, synthetic recording", lever_m=0.012))
+    view = View(
+        state.snapshot(),
+        "rig live, synthetic recording",
+        lever_m=0.012,
+        footer="t tare  m mark  r record  q leaves",
+        half_width=0.014,
+    )
+    console.print(view)
     svg = console.export_svg(title="rig live", unique_id="live")
     # the fonts rich names are fetched from the network; any monospaced one will do
     return re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL)

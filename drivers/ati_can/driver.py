@@ -1,5 +1,8 @@
 """The driver of a NETCANOEM: it is asked for every sample, at a steady rate."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +13,7 @@ from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.polling import PollSchedule
-from drivers.registry import Driver
+from drivers.registry import CanUse, Driver
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 
@@ -269,4 +272,14 @@ def open_ati_can(
         raise LinkError(f"No NETCANOEM can be asked so: {error}.") from error
 
 
-DRIVER = Driver("ati-can", "ATI force/torque sensor on CAN (NETCANOEM)", open_ati_can)
+def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:
+    """Return the sixteen identifiers of a base, one an operation."""
+    return frozenset(range(options["base"] << 4, (options["base"] << 4) + 16))
+
+
+DRIVER = Driver(
+    "ati-can",
+    "ATI force/torque sensor on CAN (NETCANOEM)",
+    open_ati_can,
+    CanUse(_identifiers, 250_000),
+)

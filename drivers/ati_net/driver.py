@@ -66,6 +66,14 @@ class AtiNet:
         )
 
     @property
+    def counts_per_unit(self) -> dict[str, float]:
+        """Counts a newton and a newton metre, as the device says; empty before it was asked."""
+        if self._calibration is None:
+            return {}
+        slopes = self._calibration.slopes()
+        return {"counts_per_n": 1.0 / float(slopes[0]), "counts_per_n_m": 1.0 / float(slopes[3])}
+
+    @property
     def counters(self) -> dict[str, int]:
         """What happened on the network."""
         return self._counters.as_dict()

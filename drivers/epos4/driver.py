@@ -4,8 +4,8 @@ Nothing runs in the background. While the host reads, it sends its heartbeat; wh
 drive notices and takes its power stage out of force by itself.
 """
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from drivers.errors import (
     ProtocolMismatchError,
 )
 from drivers.polling import PollSchedule
-from drivers.registry import Driver
+from drivers.registry import CanUse, Driver
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 
@@ -542,4 +542,17 @@ def open_epos4(
         raise
 
 
-DRIVER = Driver("epos4", "maxon EPOS4 motor controller, CANopen, cyclic torque", open_epos4)
+def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:
+    """Return network management, SYNC, and what a node sends and takes, as it is set up here."""
+    of_a_node = (0x080, 0x180, 0x200, 0x580, 0x600, 0x700)
+    return frozenset(
+        {0x000, 0x080, 0x700 + HOST_NODE, *(b + options["node_id"] for b in of_a_node)}
+    )
+
+
+DRIVER = Driver(
+    "epos4",
+    "maxon EPOS4 motor controller, CANopen, cyclic torque",
+    open_epos4,
+    CanUse(_identifiers, 1_000_000),
+)

@@ -18,13 +18,21 @@ from drivers.errors import (
 from drivers.link import FramedLink, LinkCounters
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity
-from drivers.teensy.protocol import SAMPLE_DTYPE, Ack, Identity, Kind, Limits, Result
+from drivers.teensy.protocol import (
+    SAMPLE_DTYPE,
+    Ack,
+    Identity,
+    Kind,
+    Limits,
+    Result,
+    TripReport,
+)
 from drivers.transport.transport import Transport
 
 _REASONS: dict[int, tuple[str, str]] = {
-    Result.UNKNOWN_KIND: ("It does not know the command.", "Flash the matching firmware."),
-    Result.WRONG_SIZE: ("The command has the wrong size.", "Flash the matching firmware."),
-    Result.WRONG_VERSION: ("It speaks another frame version.", "Flash the matching firmware."),
+    Result.UNKNOWN_KIND: ("It does not know the command.", "Run: rig firmware flash"),
+    Result.WRONG_SIZE: ("The command has the wrong size.", "Run: rig firmware flash"),
+    Result.WRONG_VERSION: ("It speaks another frame version.", "Run: rig firmware flash"),
     Result.BAD_VALUE: (
         "A value is not finite, out of its range, or beyond the limits it was armed with.",
         "Check gains, limits and setpoints.",
@@ -239,6 +247,11 @@ class TeensyLogger:
             raise self._unconfirmed("It answered that it is still armed.")
         self._may_be_armed = False
 
+    def trip(self) -> TripReport:
+        """Ask what the board tripped over first since it was armed."""
+        question = protocol.encode_command(Kind.TRIP, self._number())
+        return protocol.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
+
     def close(self) -> None:
         """Disarm where the board may be armed, and let go of the link.
 
@@ -256,7 +269,7 @@ class TeensyLogger:
             f"The board at {self._link.transport.url} speaks {theirs}, this program"
             f" protocol {protocol.PROTOCOL_HASH:08x}.",
             why,
-            "Flash the firmware of this program's version.",
+            "Run: rig firmware flash",
         )
 
     def _unconfirmed(self, why: str) -> DisarmUnconfirmedError:

@@ -16,16 +16,37 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
-from drivers.teensy.control import LIMIT, VELOCITY_FILTER, new_state
-from drivers.teensy.limits import first_breach
+from drivers.teensy.control import LIMIT, VELOCITY_FILTER
+from drivers.teensy.guard import (
+    CURRENT,
+    ENGAGED,
+    FSR,
+    LOAD_MA,
+    NO_CHANNEL,
+    PROXIMAL,
+    SILENT_US,
+    STATE,
+    STATUS,
+    TARGET,
+    TICKS,
+    TRIP_CHANNEL,
+    TRIP_CODE,
+    TRIP_LATE_US,
+    TRIP_LIMIT,
+    TRIP_TICK,
+    TRIP_VALUE,
+    Drive,
+)
 from drivers.teensy.protocol import (
     SAMPLE_DTYPE,
     STATUS_ARMED,
+    STATUS_HOLDING,
     STATUS_LIMIT_TRIPPED,
     STATUS_QUEUE_DRY,
     STATUS_SATURATED,
     STATUS_WATCHDOG_TRIPPED,
     TICK_US,
+    TRIP_SHIFT,
     Ack,
     Kind,
     Limits,
@@ -40,8 +61,7 @@ TRANSMIT_CAPACITY = 65536
 """Bytes the board holds for a host that does not read."""
 SAMPLE_WIRE = SAMPLE_DTYPE.itemsize + 4
 """Bytes of a sample frame on the wire."""
-MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
-_LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
+_LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED | 0xFF << TRIP_SHIFT
 _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
 
@@ -54,27 +74,19 @@ class Bench(Protocol):
         ticks: int,
         target: NDArray[np.int32],
         load_ma: NDArray[np.int32],
-        armed: bool,
-        control_state: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        limits: NDArray[np.int32],
+        drive: Drive,
     ) -> NDArray[np.int32]:
-        """Run closed-loop ticks and return the counts, shape (ticks, 9), int32.
+        """Run closed-loop ticks and return the counts, shape (ticks, 11), int32.
 
-        Within a tick: the inputs are sampled, `drivers.teensy.control.control_tick` computes the
-        command from them, the row is written, the physics moves 1 ms. Not armed, command and load
-        are 0 and the controller does not run; and so they are from the first tick on whose inputs
-        are `drivers.teensy.limits.beyond_limits`, that tick included. The result does not depend on
-        how ticks are divided between calls.
+        Within a tick: the inputs are sampled into a row, `drivers.teensy.guard.drive_tick` holds
+        the limits and writes what the motors get behind them, the physics moves 1 ms. The result
+        does not depend on how ticks are divided between calls.
 
         Args:
             ticks: Number of ticks.
             target: Target of the spindle, counts, shape (ticks,).
             load_ma: Current of the load motor, mA, shape (ticks,).
-            armed: Whether the controller and the load motor are in force.
-            control_state: State of the controller, shape (4,), changed in place.
-            gains: Gains of the controller, shape (5,).
-            limits: Limits, shape (6,), see `drivers.teensy.limits`.
+            drive: The board's state, gains and limits, changed in place.
         """
         ...
 
@@ -87,6 +99,7 @@ class TeensyFake:
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         protocol_hash: Protocol the board claims to speak.
+        build_hash: Build the board claims to be.
     """
 
     def __init__(
@@ -95,10 +108,12 @@ class TeensyFake:
         serial: str = "SIM-0001",
         start_tick_us: int = 0,
         protocol_hash: int = protocol.PROTOCOL_HASH,
+        build_hash: int = 0,
     ) -> None:
         self._bench = bench
         self._serial = serial
         self._protocol_hash = protocol_hash
+        self._build_hash = build_hash
         self._next_tick_us = start_tick_us
         self._stream = FrameStream(0)  # no command is frequent
         self._out = bytearray()
@@ -109,10 +124,9 @@ class TeensyFake:
         self._host_heard = False
         self._last_host_us = 0
         self._now_us = 0
-        self._status = 0
-        self._gains = np.zeros(5)
-        self._limits = Limits.widest().as_array()
-        self._control_state = new_state()
+        self._drive = Drive()
+        self._drive.guard[TRIP_CHANNEL] = NO_CHANNEL
+        self._trip_us = 0
         self._targets = np.empty(0, np.int32)
         self._loads = np.empty(0, np.int32)
         self._held: tuple[int, int] | None = None
@@ -136,10 +150,21 @@ class TeensyFake:
                 self._host_heard = False
             block = min(ticks, self._ticks_to_watchdog())
             if block == 0:
-                self._trip(STATUS_WATCHDOG_TRIPPED)
-                continue
+                self._drive.guard[SILENT_US] = self._silent_us
+                block = ticks
             self._run_block(block)
             ticks -= block
+
+    @property
+    def in_force(self) -> bool:
+        """Whether the motors are, or may any moment be, given current."""
+        return bool(self._state & (STATUS_ARMED | STATUS_HOLDING))
+
+    def skip(self, ticks: int) -> None:
+        """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
+        self._targets, self._loads = self._targets[ticks:], self._loads[ticks:]
+        self._sequence = (self._sequence + ticks) % 2**32
+        self._next_tick_us = (self._next_tick_us + ticks * TICK_US) % 2**32
 
     # commands
 
@@ -156,9 +181,12 @@ class TeensyFake:
             return
         if kind is Kind.HELLO:
             self._last_command = None
-            self._send(protocol.encode_hello_reply(sequence, self._serial, self._protocol_hash))
+            reply = (self._serial, self._protocol_hash, self._build_hash)
+            self._send(protocol.encode_hello_reply(sequence, *reply))
         elif kind is Kind.PING:
             self._send(protocol.encode_pong(sequence, int(fields["token"]), self._now_us))
+        elif kind is Kind.TRIP:
+            self._send(self._trip_report(sequence))
         elif self._last_command is not None and self._last_command[:2] == (kind, sequence):
             self._acknowledge(kind, sequence, self._last_command[2])
         else:
@@ -166,6 +194,18 @@ class TeensyFake:
             if kind in _ONCE_ONLY:
                 self._last_command = (kind, sequence, result)
             self._acknowledge(kind, sequence, result)
+
+    def _trip_report(self, sequence: int) -> bytes:
+        guard = self._drive.guard.tolist()
+        return protocol.encode_trip_report(
+            sequence,
+            guard[TRIP_CODE],
+            guard[TRIP_CHANNEL],
+            guard[TRIP_VALUE],
+            guard[TRIP_LIMIT],
+            self._trip_us,
+            guard[TRIP_LATE_US],
+        )
 
     def _execute(self, kind: Kind, payload: bytes, fields: np.void) -> Result:
         if kind is Kind.ARM:
@@ -185,26 +225,26 @@ class TeensyFake:
 
     def _arm(self, fields: np.void) -> Result:
         gains = np.array([fields[name] for name in protocol.GAIN_NAMES], np.float64)
-        limits = np.array([fields[name] for name in protocol.LIMIT_NAMES], np.int32)
+        limits = Limits(*(int(fields[name]) for name in protocol.LIMIT_NAMES))
         if not (np.abs(gains) <= MAX_GAIN).all():  # NaN fails too
             return Result.BAD_VALUE
         if not (0 <= gains[VELOCITY_FILTER] <= 1 and 0 <= gains[LIMIT] <= FULL_SCALE_E4):
             return Result.BAD_VALUE
-        if (limits[:4] < 0).any() or limits[4] > limits[5]:
+        if not limits.valid:
             return Result.BAD_VALUE
         self._release()
-        self._gains, self._limits = gains, limits
-        self._control_state[:] = new_state()
-        self._status = STATUS_ARMED
+        self._drive = Drive.armed(gains, limits, engaged=False)
+        self._drive.guard[TRIP_CHANNEL] = NO_CHANNEL
+        self._trip_us = 0
         return Result.OK
 
     def _take_setpoints(self, payload: bytes) -> Result:
-        if not self._status & STATUS_ARMED:
+        if not self._armed:
             return Result.NOT_ARMED
         block = protocol.decode_setpoints(payload)
         targets = block["target"].astype(np.int32)
         loads = block["load_ma"].astype(np.int32)
-        _, max_load_ma, _, _, low, high = self._limits.tolist()
+        _, max_load_ma, _, _, low, high = self._drive.limits[:6].tolist()
         if (np.abs(loads) > max_load_ma).any() or (targets < low).any() or (targets > high).any():
             return Result.BAD_VALUE
         if len(block) > self._queue_free():
@@ -217,7 +257,7 @@ class TeensyFake:
         return protocol.QUEUE_CAPACITY - len(self._targets)
 
     def _acknowledge(self, command: int, sequence: int, result: Result) -> None:
-        ack = Ack(sequence, command, result, self._status, self._queue_free())
+        ack = Ack(sequence, command, result, self._state, self._queue_free())
         self._send(protocol.encode_ack(ack))
 
     def _send(self, payload: bytes) -> None:
@@ -229,43 +269,52 @@ class TeensyFake:
 
     # time
 
+    @property
+    def _state(self) -> int:
+        return int(self._drive.guard[STATE])
+
+    @property
+    def _armed(self) -> bool:
+        return bool(self._state & STATUS_ARMED)
+
+    @property
+    def _silent_us(self) -> int:
+        return (self._next_tick_us - self._last_host_us) % 2**32
+
     def _ticks_to_watchdog(self) -> int:
         """Return how many ticks may run before the one on which the watchdog trips."""
-        if not self._status & STATUS_ARMED:
+        if not self._armed:
             return 2**31
-        silent_us = (self._next_tick_us - self._last_host_us) % 2**32
-        return max(0, (protocol.WATCHDOG_US - silent_us) // TICK_US + 1)
-
-    def _trip(self, cause: int) -> None:
-        self._release()
-        self._status |= cause
+        patience_us = Limits(*self._drive.limits.tolist()).watchdog_us
+        return max(0, (patience_us - self._silent_us) // TICK_US + 1)
 
     def _release(self) -> None:
         """Take the motors out of force and forget what was to be done; the latches stay."""
-        self._status &= _LATCHED
+        self._drive.guard[STATE] &= _LATCHED
+        self._forget()
+
+    def _forget(self) -> None:
         self._targets = self._targets[:0]
         self._loads = self._loads[:0]
         self._held = None
 
     def _run_block(self, ticks: int) -> None:
-        """Run ticks in which no command comes and the watchdog does not trip."""
-        armed = bool(self._status & STATUS_ARMED)
-        engaged = armed and (self._held is not None or len(self._targets) > 0)
+        """Run ticks in which no command comes and the watchdog trips on the first if at all."""
+        guard = self._drive.guard
+        engaged = self._armed and (self._held is not None or len(self._targets) > 0)
+        guard[ENGAGED] = engaged
+        tripped, first_tick = int(guard[TRIP_CODE]), int(guard[TICKS])
         targets, loads, fed = self._play(ticks) if engaged else (*np.zeros((2, ticks), np.int32), 0)
-        counts = self._bench.advance(
-            ticks, targets, loads, engaged, self._control_state, self._gains, self._limits
-        )
-        breach = first_breach(self._limits, counts) if armed else ticks
-        status = np.full(ticks, self._status, np.uint16)
-        if armed:
-            status[fed:] |= STATUS_QUEUE_DRY
-        if breach < ticks:
-            self._trip(STATUS_LIMIT_TRIPPED)
-            status[breach:] = self._status
-        followed = counts[:, SPINDLE].copy()
-        if engaged:
-            followed[:breach] = targets[:breach]
-        self._log(counts, followed, status)
+        counts = self._bench.advance(ticks, targets, loads, self._drive)
+        if guard[TRIP_CODE] != tripped:
+            since_us = TICK_US * (int(guard[TRIP_TICK]) - first_tick)
+            self._trip_us = (self._next_tick_us + since_us) % 2**32
+        if not self._armed:
+            self._forget()
+        status = counts[:, STATUS].astype(np.uint16)
+        dry = (status[fed:] & STATUS_ARMED) != 0
+        status[fed:][dry] |= STATUS_QUEUE_DRY
+        self._log(counts, status)
 
     def _play(self, ticks: int) -> tuple[NDArray[np.int32], NDArray[np.int32], int]:
         """Take the next setpoints from the queue, the last one held where it runs dry."""
@@ -281,9 +330,7 @@ class TeensyFake:
 
     # samples
 
-    def _log(
-        self, counts: NDArray[np.int32], target: NDArray[np.int32], status: NDArray[np.uint16]
-    ) -> None:
+    def _log(self, counts: NDArray[np.int32], status: NDArray[np.uint16]) -> None:
         """Let the clock go on and queue the samples of a block."""
         ticks = len(counts)
         ticks_us = (self._next_tick_us + TICK_US * np.arange(ticks, dtype=np.int64)) % 2**32
@@ -298,8 +345,8 @@ class TeensyFake:
         samples["status"] = status[:fitting] | _saturation(counts[:fitting])
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]
-        samples["target"] = target[:fitting]
-        within = np.clip(counts[:fitting], _LOWEST, _HIGHEST)
+        samples["target"] = counts[:fitting, TARGET]
+        within = np.clip(counts[:fitting, : LOAD_MA + 1], _LOWEST, _HIGHEST)
         for column, name in enumerate(_COLUMNS):
             samples[name] = within[:, column]
         samples["dropped"] = self._dropped

@@ -79,6 +79,11 @@ class FirmwareBoard:
         self._tick_address = ctypes.cast(self._functions.rig_board_tick, ctypes.c_void_p).value or 0
         self._out = ctypes.create_string_buffer(_TRANSMIT_SIZE)
 
+    @property
+    def build_hash(self) -> int:
+        """CRC-32 of the sources the core was built from."""
+        return int(self._functions.rig_board_build_hash())
+
     def receive(self, data: bytes) -> None:
         """Take bytes from the host and carry out the commands they complete."""
         self._functions.rig_board_receive(self._handle, data, len(data))
@@ -103,6 +108,8 @@ def _load(path: Path) -> ctypes.CDLL:
     functions.rig_board_destroy.restype = None
     functions.rig_board_receive.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t]
     functions.rig_board_receive.restype = None
+    functions.rig_board_build_hash.argtypes = []
+    functions.rig_board_build_hash.restype = ctypes.c_uint32
     functions.rig_board_transmit.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t]
     functions.rig_board_transmit.restype = ctypes.c_size_t
     return functions

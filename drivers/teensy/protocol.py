@@ -24,7 +24,11 @@ MAX_SETPOINTS = 100
 QUEUE_CAPACITY = 2000
 """Setpoints the board holds: two seconds of motion."""
 WATCHDOG_US = 250_000
-"""Board time without a valid host frame after which an armed board makes itself safe."""
+"""Board time without a valid host frame after which an armed board makes itself safe, where the
+host does not ask for another."""
+MIN_WATCHDOG_US, MAX_WATCHDOG_US = 5_000, 1_000_000
+MISSING = -(2**31)
+"""Count of a sensor that gave nothing: a whole number's NaN."""
 
 
 class Kind(IntEnum):
@@ -34,6 +38,7 @@ class Kind(IntEnum):
     HELLO_REPLY = 2
     ACK = 3
     PONG = 4
+    TRIP_REPORT = 5
     HELLO = 16
     ARM = 17
     START = 18
@@ -41,6 +46,7 @@ class Kind(IntEnum):
     STOP = 20
     DISARM = 21
     PING = 22
+    TRIP = 23
 
 
 STATUS_ARMED = 1
@@ -48,7 +54,37 @@ STATUS_SATURATED = 2
 STATUS_QUEUE_DRY = 4
 STATUS_WATCHDOG_TRIPPED = 8
 STATUS_LIMIT_TRIPPED = 16
+STATUS_HOLDING = 32
 """Bits of the board's state, in every sample and every acknowledgement. A trip stays until arm."""
+TRIP_SHIFT = 8
+"""The high byte of the state is the `Trip` that came first, until arm."""
+
+
+class Trip(IntEnum):
+    """Why a board made itself safe."""
+
+    NONE = 0
+    HOST_SILENT = 1
+    OVER_CURRENT = 2
+    PROXIMAL_TORQUE = 3
+    DISTAL_TORQUE = 4
+    SPINDLE_TRAVEL = 5
+    JAW_TRAVEL = 6
+    OVER_SPEED = 7
+    OVERHEATED = 8
+    STALLED = 9
+    SENSOR_SATURATED = 10
+    SENSOR_STALE = 11
+    SENSOR_MISSING = 12
+
+
+class SafeState(IntEnum):
+    """What a board does with the motor once it has tripped."""
+
+    RELEASE = 0
+    """No current."""
+    HOLD = 1
+    """Hold the spindle where it stands, with a low command; released by a second trip."""
 
 
 class Result(IntEnum):
@@ -96,7 +132,9 @@ SAMPLE_DTYPE = _layout(
 the spindle count itself while nothing is asked.
 """
 HEADER_DTYPE = _layout(*_HEADER)
-HELLO_REPLY_DTYPE = _layout(*_HEADER, "protocol_hash u4", "firmware_version u4", "serial S24")
+HELLO_REPLY_DTYPE = _layout(
+    *_HEADER, "protocol_hash u4", "firmware_version u4", "build_hash u4", "serial S24"
+)
 ACK_DTYPE = _layout(*_HEADER, "command u1", "result u1", "status u2", "queue_free u2")
 PONG_DTYPE = _layout(*_HEADER, "token u8", "tick_us u4")
 LIMIT_NAMES = (
@@ -106,6 +144,19 @@ LIMIT_NAMES = (
     "max_distal",
     "min_spindle",
     "max_spindle",
+    "min_jaw",
+    "max_jaw",
+    "max_motor_step",
+    "continuous_current",
+    "i2t",
+    "stall_current",
+    "stall_motion",
+    "stall_ticks",
+    "saturated_ticks",
+    "stale_ticks",
+    "watchdog_us",
+    "safe_state",
+    "hold_command_e4",
 )
 GAIN_NAMES = ("kp", "ki", "kd", "velocity_filter", "limit")
 ARM_DTYPE = _layout(
@@ -113,12 +164,16 @@ ARM_DTYPE = _layout(
 )
 SETPOINT_DTYPE = _layout("target i4", "load_ma i2")
 PING_DTYPE = _layout(*_HEADER, "token u8")
+TRIP_REPORT_DTYPE = _layout(
+    *_HEADER, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
+)
 
 _LAYOUTS: dict[Kind, np.dtype[np.void]] = {
     Kind.SAMPLE: SAMPLE_DTYPE,
     Kind.HELLO_REPLY: HELLO_REPLY_DTYPE,
     Kind.ACK: ACK_DTYPE,
     Kind.PONG: PONG_DTYPE,
+    Kind.TRIP_REPORT: TRIP_REPORT_DTYPE,
     Kind.HELLO: HEADER_DTYPE,
     Kind.ARM: ARM_DTYPE,
     Kind.START: HEADER_DTYPE,
@@ -126,6 +181,7 @@ _LAYOUTS: dict[Kind, np.dtype[np.void]] = {
     Kind.STOP: HEADER_DTYPE,
     Kind.DISARM: HEADER_DTYPE,
     Kind.PING: PING_DTYPE,
+    Kind.TRIP: HEADER_DTYPE,
 }
 
 
@@ -139,8 +195,10 @@ def layout_text() -> str:
         )
     lines.append(
         f"status: {STATUS_ARMED} ARMED, {STATUS_SATURATED} SATURATED, {STATUS_QUEUE_DRY} QUEUE_DRY,"
-        f" {STATUS_WATCHDOG_TRIPPED} WATCHDOG_TRIPPED, {STATUS_LIMIT_TRIPPED} LIMIT_TRIPPED"
+        f" {STATUS_WATCHDOG_TRIPPED} WATCHDOG_TRIPPED, {STATUS_LIMIT_TRIPPED} LIMIT_TRIPPED,"
+        f" {STATUS_HOLDING} HOLDING, trip << {TRIP_SHIFT}"
     )
+    lines.append("trip: " + ", ".join(f"{trip.value} {trip.name}" for trip in Trip))
     lines.append("result: " + ", ".join(f"{result.value} {result.name}" for result in Result))
     return "".join(f"{line}\n" for line in lines)
 
@@ -152,13 +210,19 @@ def _fields(layout: np.dtype[np.void]) -> str:
 
 PROTOCOL_HASH = zlib.crc32(layout_text().encode())
 """CRC-32 of `layout_text`; the board's hello carries its own."""
-FIRMWARE_VERSION = 0x000100
+FIRMWARE_VERSION = 0x000200
 """Version of the firmware that goes with this program: major, minor, patch, one byte each."""
+
+
+TOP = 2**31 - 1
+"""A limit that nothing crosses."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """What the board holds against every sample while armed, in counts; beyond it, it is safe.
+
+    What has a default is not held unless it is given.
 
     Attributes:
         max_current: Largest size of the measured current, counts of 1 mA.
@@ -167,6 +231,21 @@ class Limits:
         max_distal: Largest size of the distal torque, counts.
         min_spindle: Lowest spindle count, for the sample and for a setpoint.
         max_spindle: Highest spindle count.
+        min_jaw: Lowest jaw count.
+        max_jaw: Highest jaw count.
+        max_motor_step: Fastest motor, counts a tick, in three ticks on end.
+        continuous_current: Current that warms the motor no further, counts.
+        i2t: Heat above it that the motor can take, counts^2 s: the integral of the measured current
+            squared less the continuous one squared, never below 0.
+        stall_current: Current, counts, above which a motor that does not move is stalled.
+        stall_motion: Motor counts within which it does not move.
+        stall_ticks: How long it may be stalled.
+        saturated_ticks: How long a torque or current count may be at the end of its range.
+        stale_ticks: How long a torque or current count may stay the same.
+        watchdog_us: How long the host may be silent, 5 ms to 1 s.
+        safe_state: `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor;
+            any other crossing releases whatever is asked for.
+        hold_command_e4: Largest command while holding, 1e-4 of full scale.
     """
 
     max_current: int
@@ -175,16 +254,67 @@ class Limits:
     max_distal: int
     min_spindle: int
     max_spindle: int
+    min_jaw: int = -TOP - 1
+    max_jaw: int = TOP
+    max_motor_step: int = TOP
+    continuous_current: int = TOP
+    i2t: int = TOP
+    stall_current: int = TOP
+    stall_motion: int = 0
+    stall_ticks: int = TOP
+    saturated_ticks: int = TOP
+    stale_ticks: int = TOP
+    watchdog_us: int = WATCHDOG_US
+    safe_state: int = SafeState.RELEASE
+    hold_command_e4: int = 0
 
     @classmethod
     def widest(cls) -> "Limits":
         """Return limits that nothing can cross: for a board that moves nothing real."""
-        top = 2**31 - 1
-        return cls(top, top, top, top, -top - 1, top)
+        return cls(TOP, TOP, TOP, TOP, -TOP - 1, TOP)
 
-    def as_array(self) -> NDArray[np.int32]:
-        """Return the limits in the order of the wire, shape (6,)."""
-        return np.array(astuple(self), np.int32)
+    @property
+    def valid(self) -> bool:
+        """Whether a board takes them: the twin of `Limits::valid` in the firmware."""
+        sizes = (
+            *(self.max_current, self.max_load_ma, self.max_proximal, self.max_distal),
+            *(self.max_motor_step, self.continuous_current, self.i2t),
+            *(self.stall_current, self.stall_motion),
+        )
+        return (
+            min(sizes) >= 0
+            and min(self.stall_ticks, self.saturated_ticks, self.stale_ticks) >= 1
+            and self.min_spindle <= self.max_spindle
+            and self.min_jaw <= self.max_jaw
+            and MIN_WATCHDOG_US <= self.watchdog_us <= MAX_WATCHDOG_US
+            and self.safe_state in (SafeState.RELEASE, SafeState.HOLD)
+            and 0 <= self.hold_command_e4 <= 10_000
+        )
+
+    def as_array(self) -> NDArray[np.int64]:
+        """Return the limits in the order of the wire, shape (19,)."""
+        return np.array(astuple(self), np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class TripReport:
+    """What a board tripped over first since it was armed.
+
+    Attributes:
+        code: What it was.
+        channel: Name of the count that crossed; empty where it was none.
+        value: That count; for the host's silence its length, us; for heat, counts^2 s.
+        limit: What it was held against.
+        tick_us: Board clock at the trip.
+        late_us: How long the crossing had lasted by then.
+    """
+
+    code: Trip
+    channel: str
+    value: int
+    limit: int
+    tick_us: int
+    late_us: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +324,8 @@ class Identity:
     serial: str
     firmware_version: str
     protocol_hash: int
+    build_hash: int = 0
+    """CRC-32 of the sources the firmware was built from; 0 where it was not built."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +378,9 @@ def encode_ping(sequence: int, token: int) -> bytes:
     return np.array((VERSION, Kind.PING, sequence, token), PING_DTYPE).tobytes()
 
 
-def encode_hello_reply(sequence: int, serial: str, protocol_hash: int = PROTOCOL_HASH) -> bytes:
+def encode_hello_reply(
+    sequence: int, serial: str, protocol_hash: int = PROTOCOL_HASH, build_hash: int = 0
+) -> bytes:
     """Return the payload of the answer to a hello."""
     fields = (
         VERSION,
@@ -254,6 +388,7 @@ def encode_hello_reply(sequence: int, serial: str, protocol_hash: int = PROTOCOL
         sequence,
         protocol_hash,
         FIRMWARE_VERSION,
+        build_hash,
         serial.encode()[:24],
     )
     return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
@@ -271,6 +406,16 @@ def encode_ack(ack: Ack) -> bytes:
         ack.queue_free,
     )
     return np.array(fields, ACK_DTYPE).tobytes()
+
+
+def encode_trip_report(
+    sequence: int, code: int, channel: int, value: int, limit: int, tick_us: int, late_us: int
+) -> bytes:
+    """Return the payload of the answer to a question for the trip; values are cut to 32 bits."""
+    whole = [max(MISSING, min(number, TOP)) for number in (value, limit)]
+    late_us = min(late_us, 2**32 - 1)
+    fields = (VERSION, Kind.TRIP_REPORT, sequence, code, channel, *whole, tick_us, late_us)
+    return np.array(fields, TRIP_REPORT_DTYPE).tobytes()
 
 
 def encode_pong(sequence: int, token: int, tick_us: int) -> bytes:
@@ -314,6 +459,7 @@ def decode_identity(fields: np.void) -> Identity:
         serial=bytes(fields["serial"]).decode("ascii", "replace"),
         firmware_version=version_text(int(fields["firmware_version"])),
         protocol_hash=int(fields["protocol_hash"]),
+        build_hash=int(fields["build_hash"]),
     )
 
 
@@ -325,4 +471,27 @@ def decode_ack(fields: np.void) -> Ack:
         result=int(fields["result"]),
         status=int(fields["status"]),
         queue_free=int(fields["queue_free"]),
+    )
+
+
+INPUT_NAMES = ("motor", "spindle", "jaw", "proximal", "distal", "current")
+"""Fields of a sample a trip can name, in the order of its channel number."""
+
+
+def decode_trip_report(fields: np.void) -> TripReport:
+    """Return what a board says it tripped over.
+
+    Raises:
+        FrameError: It gives a reason this program does not know.
+    """
+    code, channel = int(fields["code"]), int(fields["channel"])
+    if code not in Trip.__members__.values():
+        raise FrameError(f"A board tripped for the unknown reason {code}.")
+    return TripReport(
+        code=Trip(code),
+        channel=INPUT_NAMES[channel] if channel < len(INPUT_NAMES) else "",
+        value=int(fields["value"]),
+        limit=int(fields["limit"]),
+        tick_us=int(fields["tick_us"]),
+        late_us=int(fields["late_us"]),
     )

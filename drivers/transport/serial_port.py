@@ -186,7 +186,8 @@ def find_usb_port(url: str) -> str:
     if len(matching) == 1:
         return str(matching[0].device)
     what = f"{'Several devices have' if matching else 'No device has'} the identity {url}."
-    raise PortNotFoundError(what, _present(ports), "Name one of them.")
+    fix = "Give its serial number too: usb:VID:PID:SERIAL." if matching else "Plug it in."
+    raise PortNotFoundError(what, _present(ports), f"{fix} See: rig devices")
 
 
 def port_holders(path: str) -> list[str]:

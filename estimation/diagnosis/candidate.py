@@ -1,6 +1,7 @@
 """Candidates: each effect of the catalogue at each point of its shape's grid, set in a balance."""
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -97,9 +98,24 @@ class Candidate:
         """The term of a model, without values."""
         return Term(self.effect, self.sign, dict(self.channels))
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether a shape stands where the effect turns into a simpler one.
+
+        Presliding over a way that no run covers is a spring; friction whose direction takes more
+        speed than any run has is viscous.
+        """
+        return any(
+            not p.linear and value > step(p, p.upper, -0.5)
+            for p, value in zip(self.effect.shape, self.shape, strict=True)
+        )
+
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""
         inputs = {role: channels[name] for role, name in self.channels}
+        for role in self.effect.projected_roles:
+            name = projected(dict(self.channels)[role])
+            inputs[role] = channels.get(name, inputs[role])
         return self.sign * self.effect.columns(inputs, self.shape)
 
     def moved(self, k: int, steps: float) -> "Candidate":
@@ -108,6 +124,11 @@ class Candidate:
         values = list(self.shape)
         values[k] = step(bound, values[k], steps)
         return replace(self, shape=tuple(values))
+
+
+def projected(channel: str) -> str:
+    """Return the name under which a channel's projection on the other sensors goes."""
+    return f"projected {channel}"
 
 
 def step(bound: Parameter, value: float, steps: float) -> float:
@@ -121,17 +142,20 @@ def step(bound: Parameter, value: float, steps: float) -> float:
     return float(min(max(moved, bound.lower), bound.upper))
 
 
-def pool(model: Model, measured: Collection[str]) -> list[Candidate]:
+def pool(
+    model: Model, measured: Collection[str], instead: Mapping[str, str] | None = None
+) -> list[Candidate]:
     """Return every effect the declared model lacks, at every point of its grid.
 
     Args:
         model: The declared model.
         measured: Channels that every run has.
+        instead: Channel to the one that plays its roles.
     """
     declared = {(t.effect.id, *sorted(t.channels.items())) for t in model.terms}
     return [
         Candidate.of(term, shape)
-        for term in candidates(model.balance, measured)
+        for term in candidates(model.balance, measured, instead, model.counted is not None)
         if term.effect.family in FAMILIES and term.effect.family != UNKNOWN
         if (term.effect.id, *sorted(term.channels.items())) not in declared
         for shape in grid(term.effect)
@@ -141,7 +165,7 @@ def pool(model: Model, measured: Collection[str]) -> list[Candidate]:
 def grid(kind: Effect) -> Iterator[tuple[float, ...]]:
     """Walk the grid of an effect's shape; one empty point for an effect without shape."""
     points = [[float(x) for x in p.grid()] for p in kind.shape]
-    if len(points) > 1:
+    if math.prod(map(len, points)) > MOST_TOGETHER and len(points) > 1:
         most = max(3, int(MOST_TOGETHER ** (1 / len(points))))
         points = [_spread(values, most) for values in points]
     return itertools.product(*points)

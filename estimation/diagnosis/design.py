@@ -1,33 +1,30 @@
-"""Columns of a run on a common footing: one filter, one decimation, the mean removed.
+"""Columns of a run on a common footing: one filter, the same instants, the mean removed.
 
-Every raw channel goes through the model's zero-phase filter; derivatives and the effects' columns
-are made from the filtered channels at the full rate, from the run's first sample, so that states
-have their history. Then target and columns go through one more common filter while they are
-decimated: a non-linear function of a filtered signal is not the filtered function, and unequal
-smoothing looks like a delay.
+Every raw channel goes through the model's zero-phase filter, and derivatives are made from it at
+the full rate. Target and columns are then taken at the same instants, as many as the filter leaves
+something to tell: a column without memory is worked out at these alone, one with memory over the
+whole run. A regression needs no more than that both sides are seen at the same instants.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, signal
+from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPEED, in_motion
+from estimation.rest import SLOWEST_RAD_S, SPEED, SPINDLE_SPEED, closing, in_motion
 
 WITH_FRICTION = ("motor", "cable", "grasp")
 """Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
 at rest tell nothing of a model of motion: they are left out of search, fit and error."""
-
-TAPS = 8
-"""Length of the decimating filter, in decimated samples."""
 
 Mapper = Callable[..., Iterable[Any]]
 """`map`, or the `map` of a `concurrent.futures.Executor`."""
@@ -44,9 +41,9 @@ class Run:
     Attributes:
         name: Name of the run.
         channels: Channel name to values at the full rate, shape (n,).
-        valid: Samples without a flag and away from the ends, shape (n,).
+        valid: Samples without a flag and away from the ends, of those the model counts, shape (n,).
         moving: Samples that are not at rest, where friction is in the balance, shape (n,).
-        down: Samples that become one.
+        down: One in so many samples is regressed on.
     """
 
     name: str
@@ -57,22 +54,26 @@ class Run:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Samples at the full rate that errors are told over: valid and in motion, shape (n,)."""
+        """Samples at the full rate that fits and decisions count: valid, in motion, shape (n,)."""
         return self.valid & self.moving
 
-    @property
+    @cached_property
     def kept(self) -> NDArray[np.intp]:
-        """Decimated samples in motion that no flagged sample reaches."""
-        reach = TAPS // 2 * self.down
-        bad = ndimage.maximum_filter1d((~self.valid).astype(np.uint8), 2 * reach + 1)
-        return np.flatnonzero((bad[:: self.down] == 0) & self.moving[:: self.down])
+        """Places of the samples that are regressed on: every `down`-th one that is used."""
+        at = np.arange(0, len(self.valid), self.down)
+        return at[self.used[at]]
+
+    @cached_property
+    def sampled(self) -> Mapping[str, FloatArray]:
+        """The channels at these places, each of shape (n,)."""
+        return {name: values[self.kept] for name, values in self.channels.items()}
 
     def thin(self, columns: FloatArray) -> FloatArray:
-        """Filter and decimate columns of shape (n, k), drop flagged samples."""
-        return np.asarray(decimate(columns, self.down)[self.kept])
+        """Return columns of shape (samples, k) at the places that are regressed on."""
+        return np.asarray(columns[self.kept])
 
     def centred(self, columns: FloatArray) -> FloatArray:
-        """Filter, decimate and remove the mean of columns of shape (n, k)."""
+        """Return the same with the mean removed."""
         thin = self.thin(columns)
         return np.asarray(thin - thin.mean(axis=0))
 
@@ -86,18 +87,25 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
         FilterError: The run cannot be filtered.
     """
     low_pass = model.low_pass
-    resting = model.balance in WITH_FRICTION and "motor_angle_rad" in recording
-    wanted = list(dict.fromkeys([*names, *([SPEED] if resting else [])]))
+    speeds = _friction_speeds(model, recording)
+    wanted = list(dict.fromkeys([*names, *speeds]))
     filtered = zero_phase_channels(recording, wanted, low_pass)
     rate_hz = recording.sample_rate_hz
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
-    valid = filtered.valid.copy()
+    # the filter smears what is flagged as it smears the ends
+    spoilt = ndimage.maximum_filter1d((~filtered.valid).astype(np.uint8), 2 * edge + 1)
+    valid = spoilt == 0
     valid[:edge] = False
     valid[max(len(valid) - edge, 0) :] = False
     down = max(1, int(rate_hz / (2 * low_pass.cutoff_hz)))
     channels = {name: np.array(filtered[name]) for name in {*wanted, "time_s"}}
     channels["time_s"] = channels["time_s"] - channels["time_s"][0]
-    moving = in_motion(channels[SPEED], valid, rate_hz) if resting else np.ones(len(valid), bool)
+    moving = np.ones(len(valid), bool)
+    if model.counted == "closing":
+        valid &= closing(channels[SPINDLE_SPEED], rate_hz)  # the others are no part of the claim
+    else:
+        for speed in speeds:
+            moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
     run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
@@ -108,23 +116,34 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     return run
 
 
-def decimate(columns: FloatArray, down: int) -> FloatArray:
-    """Filter columns of shape (n, k) without lag and keep every `down`-th sample."""
-    if down == 1:
-        return columns
-    taps = signal.firwin(TAPS * down + 1, 0.8 / down)
-    half = TAPS // 2
-    thin: FloatArray = signal.upfirdn(taps, columns, 1, down, axis=0)
-    return thin[half : half + -(-len(columns) // down)]
+def _friction_speeds(model: Model, recording: Recording) -> list[str]:
+    """Return the speeds that tell which samples count; none where all do."""
+    if model.counted == "closing":
+        return [SPINDLE_SPEED]
+    if model.counted == "all" or model.balance not in WITH_FRICTION:
+        return []
+    own = [channel for channel in model.channels if channel in SLOWEST_RAD_S]
+    return own or ([SPEED] if "motor_angle_rad" in recording else [])
 
 
 def _run_columns(run: Run, wanted: Sequence[Candidate], means: bool) -> FloatArray:
-    """Return the thinned columns of candidates on one run, side by side."""
-    blocks = []
-    for chunk in _chunks(wanted, 32):  # bounds the memory at the full rate
-        columns = np.column_stack([c.columns(run.channels) for c in chunk])
-        blocks.append(run.centred(columns) if means else run.thin(columns))
-    return np.hstack(blocks)
+    """Return the columns of candidates on one run, side by side, at its places."""
+    whole = np.empty((len(run.kept), sum(len(c.effect.amplitudes) for c in wanted)))
+    at = 0
+    for candidate in wanted:
+        columns = columns_at(run, candidate)
+        whole[:, at : at + columns.shape[1]] = columns
+        at += columns.shape[1]
+    if means:
+        whole -= whole.mean(axis=0)
+    return whole
+
+
+def columns_at(run: Run, candidate: Candidate) -> FloatArray:
+    """Return a candidate's columns at the places of a run, shape (n, amplitudes)."""
+    if candidate.effect.start():
+        return run.thin(candidate.columns(run.channels))
+    return candidate.columns(run.sampled)
 
 
 def tables(
@@ -145,12 +164,8 @@ def tables(
 
 
 def targets(runs: Sequence[Run], model: Model) -> list[FloatArray]:
-    """Return the thinned target of every run, shape (n,), its mean removed where that is due."""
+    """Return the target at each run's places, shape (n,), its mean removed where that is due."""
     columns = [run.channels[model.target][:, None] for run in runs]
     if model.run_offsets:
         return [run.centred(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
     return [run.thin(c)[:, 0] for run, c in zip(runs, columns, strict=True)]
-
-
-def _chunks(items: Sequence[Candidate], size: int) -> Iterator[Sequence[Candidate]]:
-    return (items[k : k + size] for k in range(0, len(items), size))

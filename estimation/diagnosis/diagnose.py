@@ -4,14 +4,18 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, with_campaign_time
+from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, prepare
-from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, squares
+from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, samples_of, squares
+from estimation.diagnosis.instruments import instruments
+from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
 from estimation.diagnosis.search import Discovery, Gates, Named, Search
@@ -23,8 +27,14 @@ from estimation.fitting import fit
 from estimation.model import Estimate, Model
 from estimation.recording import FloatArray, Recording
 
+Maker = Callable[[Model, Sequence[Recording]], Twin]
+"""Fitted model and discovery runs to their simulated twin."""
+
 Stage = Callable[[str], None]
 """Told what begins, in words."""
+
+Added = Mapping[str, FloatArray]
+"""Run to what a finding changes in the estimate at its valid samples, shape (n,)."""
 
 SAME_CAUSE = 0.9
 """Two balances show one cause when what it adds to them correlates at least this well."""
@@ -86,7 +96,7 @@ def diagnose(
     *,
     gates: Gates | None = None,
     executor: Executor | None = None,
-    twins: Mapping[str, Callable[[Model, Sequence[Recording]], Twin]] | None = None,
+    twins: Mapping[str, Maker] | None = None,
     on_stage: Stage = lambda _: None,
     on_open: Callable[[], None] = lambda: None,
 ) -> tuple[Diagnosis, dict[str, Story]]:
@@ -109,9 +119,14 @@ def diagnose(
         EstimationError: No balance could be decided; the first one's reason.
     """
     began = time.monotonic()
-    gates = gates or Gates()
+    gates = replace(gates or Gates(), balances=len(models))
     stories: dict[str, Story] = {}
     failed: dict[str, EstimationError] = {}
+    starts = [recording.started_at_ns for recording in recordings]
+    if starts and None not in starts:
+        first_ns = min(start for start in starts if start is not None)
+        recordings = [with_campaign_time(recording, first_ns) for recording in recordings]
+        twins = {name: partial(_timed, make, first_ns) for name, make in (twins or {}).items()}
     for model in models:
         on_stage(f"searching what the {model.balance} balance lacks")
         try:
@@ -121,10 +136,11 @@ def diagnose(
             failed[model.balance] = error
     if failed and not stories:
         raise next(iter(failed.values()))
+    discovering = [r for r in recordings if r.name in sealed.discover]
     on_stage("opening the confirm runs")
     on_open()
     stories = {name: _confirmed(story, gates) for name, story in stories.items()}
-    findings = _one_cause_one_finding(stories, sealed.seed)
+    findings = _one_cause_one_finding(stories)
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
     }
@@ -136,10 +152,19 @@ def diagnose(
         moved={name: _moved(s) for name, s in stories.items()},
         sealed=sealed,
         undecided={name: str(error) for name, error in failed.items()},
-        notes=tuple(_notes(sealed, twins, stories)),
+        notes=(*audit(discovering), *_notes(sealed, twins, stories)),
         seconds=time.monotonic() - began,
     )
     return diagnosis, stories
+
+
+def _timed(make: Maker, first_ns: int, model: Model, discover: Sequence[Recording]) -> Twin:
+    """Return a twin whose runs have the campaign's time too."""
+    return partial(_timed_runs, make(model, discover), first_ns)
+
+
+def _timed_runs(twin: Twin, first_ns: int, seed: int) -> list[Recording]:
+    return [with_campaign_time(recording, first_ns) for recording in twin(seed)]
 
 
 def _balance(
@@ -148,7 +173,7 @@ def _balance(
     sealed: Sealed,
     gates: Gates,
     executor: Executor | None,
-    maker: Callable[[Model, Sequence[Recording]], Twin] | None,
+    maker: Maker | None,
 ) -> Story:
     """Fit the declared model and search, on the runs that discover; prepare those that confirm."""
     discover = [r for r in recordings if r.name in sealed.discover]
@@ -157,15 +182,16 @@ def _balance(
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
     wanted = [model.target, *model.channels, *needed_channels(measured)]
-    wanted += [channel for c in tried for _, channel in c.channels]
+    wanted += [*instruments(measured), *(channel for c in tried for _, channel in c.channels)]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
-    balance = lay_out(fitted, runs, mapper)
+    told = instrumented(runs, tried, fitted.target)
+    balance = lay_out(fitted, [told(run) for run in runs], mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))
-    whole = projection(balance)
-    balance = replace(balance, runs=[whole(run) for run in runs])
+    loaded = projection(balance)
+    balance = replace(balance, runs=[loaded(run) for run in balance.runs])
     twin = None
     if maker is not None:
         source = maker(fitted, discover)
@@ -181,7 +207,7 @@ def _balance(
         before=before,
         after=before,
         values=(),
-        confirm=tuple(whole(run) for run in held),
+        confirm=tuple(loaded(told(run)) for run in held),
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
         unused=(*rested, *also),
@@ -221,7 +247,7 @@ def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
-    if left is not None and left.p <= gates.chance:
+    if left is not None and left.p <= gates.level:
         worth = left.gain * _share_left(claims, balance)
         # also what a named effect's form leaves of its own cause is no second cause
         if worth >= gates.map_floor and left.agree <= gates.agree:
@@ -287,16 +313,16 @@ def _confirmed(story: Story, gates: Gates) -> Story:
     )
 
 
-def _findings(story: Story) -> list[tuple[Finding, Part]]:
-    """Return the findings of one balance, each with what it adds."""
+def _findings(story: Story) -> list[tuple[Finding, Added]]:
+    """Return the findings of one balance, each with what it changes in the estimate."""
     found = []
     last = story.before
     for k, claim in enumerate(story.claims):
         now = freeze(story.balance, [c.part for c in story.claims[: k + 1]])
         runs = [*story.balance.runs, *story.confirm]
-        old, new = squares(last, runs), squares(now, runs)
+        old, new = squares(last, runs, at_rest=True), squares(now, runs, at_rest=True)
         held = slice(len(story.balance.runs), None)
-        samples = sum(float(r.used.sum()) for r in story.confirm)
+        samples = samples_of(story.confirm).sum()
         named = claim.named if claim.verdict in ("identified", "one_of") else None
         found.append(
             (
@@ -316,7 +342,7 @@ def _findings(story: Story) -> list[tuple[Finding, Part]]:
                     confidence=named.confidence if named else None,
                     parameters=_parameters(story, named.candidate) if named else {},
                 ),
-                claim.part,
+                _added(last, now, story.balance.runs),
             )
         )
         last = now
@@ -333,21 +359,17 @@ def _all(candidate: Candidate) -> tuple[Parameter, ...]:
     return candidate.term.parameters
 
 
-def _one_cause_one_finding(stories: Mapping[str, Story], seed: int) -> list[Finding]:
+def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     """Report a cause seen in several balances once, where it explains the largest share."""
-    found = [
-        (finding, _added(stories[name], part))
-        for name, story in stories.items()
-        for finding, part in _findings(story)
-    ]
+    found = [pair for story in stories.values() for pair in _findings(story)]
     found.sort(key=lambda pair: pair[0].rmse_after / max(pair[0].rmse_before, 1e-300))
-    kept: list[tuple[Finding, FloatArray]] = []
+    kept: list[tuple[Finding, Added]] = []
     for finding, added in found:
         for k, (first, other) in enumerate(kept):
-            same_unit = stories[first.balance].balance.model.unit
-            if first.balance == finding.balance or added.shape != other.shape:
+            if finding.balance in (first.balance, *first.also_in):
                 continue
-            if _same_cause(added, other, same_unit == stories[finding.balance].balance.model.unit):
+            units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
+            if _same_cause(other, added, units[0] == units[1]):
                 kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
                 break
         else:
@@ -357,21 +379,29 @@ def _one_cause_one_finding(stories: Mapping[str, Story], seed: int) -> list[Find
     return [finding for finding, _ in ranked]
 
 
-def _added(story: Story, part: Part) -> FloatArray:
-    """Return what a part adds to its balance over all discovery runs, run means removed."""
-    parts = [story.after.contribution(run, part) for run in story.balance.runs]
-    return np.concatenate([p - p.mean() for p in parts])
+def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:
+    """Return what a claim changes in the estimate of each run, its mean removed.
+
+    What the declared parameters had taken up of the effect is not part of it, so that one cause has
+    one shape in every balance.
+    """
+    changes = {run.name: last.error(run, True) - now.error(run, True) for run in runs}
+    return {name: change - change.mean() for name, change in changes.items()}
 
 
-def _same_cause(first: FloatArray, second: FloatArray, same_unit: bool) -> bool:
+def _same_cause(first: Added, second: Added, same_unit: bool) -> bool:
     """Say whether two contributions are the same torque: alike in course, sign and size.
 
     Balances of different units are compared by their course alone.
     """
-    size = float(np.linalg.norm(first)), float(np.linalg.norm(second))
+    shared = [n for n in first if n in second and first[n].shape == second[n].shape]
+    if not shared:
+        return False
+    one, other = (np.concatenate([part[n] for n in shared]) for part in (first, second))
+    size = float(np.linalg.norm(one)), float(np.linalg.norm(other))
     if min(size) == 0:
         return False
-    alike = float(first @ second) / (size[0] * size[1])
+    alike = float(one @ other) / (size[0] * size[1])
     if not same_unit:
         return abs(alike) >= SAME_CAUSE
     return alike >= SAME_CAUSE and 1 / TWICE <= size[0] / size[1] <= TWICE
@@ -414,13 +444,13 @@ def _notes(
             notes.append(f"{name}: without a usable sample: {', '.join(story.unused)}.")
         if used < valid:
             notes.append(
-                f"{name}: errors are over samples in motion; at rest ({1 - used / valid:.0%} of the"
-                " confirm samples) friction holds any torque, and no model of motion is tested."
+                f"{name}: reported errors count all samples; {1 - used / valid:.0%} of the confirm"
+                " samples are at rest, where friction holds any torque: no fit, search or decision"
+                " uses them."
             )
     notes += [
         f"{name}: not borne out by the confirm runs: {what}."
         for name, story in stories.items()
         for what in story.refused
     ]
-    notes.append("No noise floor is given: it needs repeated runs of the same motion.")
     return notes

@@ -4,6 +4,7 @@ The unit of evidence is the run. A candidate's gain is the share of squared erro
 runs left out one at a time, the declared parameters refitted together with it each time.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,10 @@ from estimation.recording import FloatArray
 
 RIDGE = 1e-9
 """Pull towards zero, a share of a column's power: settles columns that the fitted runs lack."""
+
+
+FEW = 4
+"""Up to so many columns a block, sums over samples are faster than many small matrix products."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +89,11 @@ def _held_out(
     q = p + size
     grams, rights, powers = [], [], []
     for b, c, y in zip(base, blocks, targets, strict=True):
-        cube = c.reshape(len(c), count, size)
         gram = np.empty((count, q, q))
         gram[:, :p, :p] = b.T @ b
         cross = (b.T @ c).reshape(p, count, size).transpose(1, 0, 2)
         gram[:, :p, p:], gram[:, p:, :p] = cross, cross.transpose(0, 2, 1)
-        gram[:, p:, p:] = np.matmul(cube.transpose(1, 2, 0), cube.transpose(1, 0, 2))
+        gram[:, p:, p:] = _own_products(c, count, size)
         right = np.empty((count, q, y.shape[1]))
         right[:, :p] = b.T @ y
         right[:, p:] = (c.T @ y).reshape(count, size, y.shape[1])
@@ -103,6 +107,17 @@ def _held_out(
         weights = np.linalg.solve(whole - gram + pull, aim - right)
         losses[r] = power + np.einsum("kqs,kqs->ks", weights, gram @ weights - 2 * right)
     return np.maximum(losses, 0.0)
+
+
+def _own_products(c: FloatArray, count: int, size: int) -> FloatArray:
+    """Return each block's columns times one another, shape (count, size, size)."""
+    if size > FEW:
+        cube = c.reshape(len(c), count, size)
+        return np.asarray(np.matmul(cube.transpose(1, 2, 0), cube.transpose(1, 0, 2)))
+    products = np.empty((count, size, size))
+    for i, j in itertools.product(range(size), repeat=2):
+        products[:, i, j] = np.einsum("nk,nk->k", c[:, i::size], c[:, j::size])
+    return products
 
 
 def surrogates(left: Sequence[FloatArray], count: int, seed: int) -> list[FloatArray]:

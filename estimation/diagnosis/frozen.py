@@ -40,29 +40,13 @@ class Frozen:
     weights: FloatArray
     level: float
 
-    def error(self, run: Run) -> FloatArray:
-        """Return target less estimate at the run's used samples, shape (n,)."""
+    def error(self, run: Run, at_rest: bool = False) -> FloatArray:
+        """Return target less estimate at the run's used samples, or all valid ones, shape (n,)."""
         parts = [term.columns(run.channels) for term in self.terms]
         parts += [m.columns(run) for m in self.maps]
         target = run.channels[self.balance.model.target]
         values = target - np.column_stack(parts) @ self.weights - self.level
-        return np.asarray(values[run.used])
-
-    def contribution(self, run: Run, part: Part) -> FloatArray:
-        """Return what one part adds to the estimate at the used samples, shape (n,)."""
-        at = 0
-        for term in self.terms:
-            width = len(term.effect.amplitudes)
-            if term == part.candidate:
-                columns = term.columns(run.channels)
-                return np.asarray((columns @ self.weights[at : at + width])[run.used])
-            at += width
-        for m in self.maps:
-            columns = m.columns(run)
-            if m is part.map:
-                return np.asarray((columns @ self.weights[at : at + columns.shape[1]])[run.used])
-            at += columns.shape[1]
-        return np.zeros(int(run.used.sum()))
+        return np.asarray(values[run.valid if at_rest else run.used])
 
 
 def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
@@ -92,21 +76,36 @@ def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]
     return weights
 
 
-def squares(frozen: Frozen, runs: Sequence[Run]) -> FloatArray:
-    """Return each run's sum of squared errors, its mean removed, shape (runs,)."""
-    errors = [frozen.error(run) for run in runs]
+def squares(frozen: Frozen, runs: Sequence[Run], at_rest: bool = False) -> FloatArray:
+    """Return each run's sum of squared errors, its mean removed, shape (runs,).
+
+    Args:
+        frozen: The model.
+        runs: The runs.
+        at_rest: Count samples at rest too, as reported errors do; what is claimed is decided
+            without them.
+    """
+    errors = [frozen.error(run, at_rest) for run in runs]
     return np.array([float(np.sum((e - e.mean()) ** 2)) for e in errors])
 
 
+def samples_of(runs: Sequence[Run]) -> FloatArray:
+    """Return how many samples each run's reported error is over, shape (runs,)."""
+    return np.array([float(run.valid.sum()) for run in runs])
+
+
 def errors(before: Frozen, after: Frozen, runs: Sequence[Run], seed: int) -> Error:
-    """Open the confirm runs: errors of the declared model and of the one with the findings."""
-    samples = np.array([float(run.used.sum()) for run in runs])
-    first, last = squares(before, runs), squares(after, runs)
+    """Open the confirm runs: errors of the declared model and of the one with the findings.
+
+    They are over all valid samples, those at rest too, before and after alike.
+    """
+    samples = samples_of(runs)
+    first, last = squares(before, runs, at_rest=True), squares(after, runs, at_rest=True)
     weights = resampled(len(runs), 1000, seed)
     ratio = np.sqrt((weights @ last) / np.maximum(weights @ first, np.finfo(float).tiny))
     low, high = np.percentile(ratio, [2.5, 97.5])
     raw = [
-        float(np.sqrt(sum(float(e @ e) for e in map(f.error, runs)) / samples.sum()))
+        float(np.sqrt(sum(float(e @ e) for e in (f.error(r, True) for r in runs)) / samples.sum()))
         for f in (before, after)
     ]
     names = [run.name for run in runs]

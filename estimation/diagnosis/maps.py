@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 
 from estimation.derived import measured_channels
@@ -171,13 +172,18 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
 def play(x: FloatArray, width: float) -> FloatArray:
     """Return the play operator of a signal: it follows when pulled by more than half its width."""
     half = 0.5 * width
-    out = np.empty(len(x))
-    value = float(x[0])
-    for k, now in enumerate(x.tolist()):
-        value = min(max(value, now - half), now + half)
-        out[k] = value
-    offset: FloatArray = (x - out) / max(half, np.finfo(float).tiny)
+    offset: FloatArray = (x - _followed(x, half)) / max(half, np.finfo(float).tiny)
     return offset
+
+
+@numba.njit(cache=True)
+def _followed(x: FloatArray, half: float) -> FloatArray:
+    out = np.empty(len(x))
+    value = x[0]
+    for k in range(len(x)):
+        value = min(max(value, x[k] - half), x[k] + half)
+        out[k] = value
+    return out
 
 
 def projection(balance: Balance) -> Callable[[Run], Run]:

@@ -114,6 +114,7 @@ class Diagnosis:
         notes: Limits of this diagnosis, in words.
         exploratory: Whether the confirm runs had been opened before.
         seconds: How long it took.
+        next_experiment: The experiment that tells rivals apart best, plain JSON types, or None.
     """
 
     findings: tuple[Finding, ...]
@@ -126,6 +127,7 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     exploratory: bool = False
     seconds: float = 0.0
+    next_experiment: Mapping[str, Any] | None = None
 
     @property
     def verdict(self) -> str:
@@ -148,7 +150,7 @@ class Diagnosis:
             "unit": dict(self.unit),
             "noise_floor": dict(self.noise_floor),
             "runs": {"discover": self.sealed.discover, "confirm": self.sealed.confirm},
-            "next_experiment": None,
+            "next_experiment": self.next_experiment,
             "declared_parameters_moved": self.moved,
             "exploratory": self.exploratory,
             "seed": self.sealed.seed,

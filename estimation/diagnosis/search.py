@@ -1,6 +1,7 @@
 """The search: which effect of the catalogue removes the residual, and whether that is proved."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -39,7 +40,11 @@ class Gates:
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        parameters: Named parameters of the whole model at most, or None for no limit.
+        akin: Whether an effect may be added beside one that looks alike: where a model must
+            predict well rather than be named surely.
         sure: Least confidence of `identified`.
+        balances: Balances that are searched: each is given its share of the chance.
     """
 
     chance: float = 0.02
@@ -51,6 +56,19 @@ class Gates:
     veto: float = 0.9
     sure: float = 0.9
     map_floor: float = 0.2
+    parameters: int | None = None
+    akin: bool = False
+    balances: int = 1
+
+    @property
+    def level(self) -> float:
+        """Largest p-value on surrogates in one balance of several (Bonferroni)."""
+        return self.chance / self.balances
+
+    @property
+    def draws(self) -> int:
+        """Number of surrogates: as asked, and enough to reach the level."""
+        return max(self.surrogates, math.ceil(1.0 / self.level) - 1)
 
 
 @dataclass(frozen=True)
@@ -86,8 +104,8 @@ class Trial:
 
     def stands_out(self, gates: Gates) -> bool:
         """Say whether the gain is above chance and above the floor, in whatever runs."""
-        likely = max(self.p, self.p_twin or 0.0)
-        return likely <= gates.chance and self.worth >= gates.floor
+        likely = self.p <= gates.level and (self.p_twin or 0.0) <= gates.chance
+        return likely and self.worth >= gates.floor
 
 
 @dataclass(frozen=True)
@@ -161,12 +179,32 @@ class Search:
 
     def run(self) -> Discovery:
         """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
+        found, trials, steps, ranking = self.forwards()
+        kept = self._backwards(found)
+        named = [self._named([found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
+        stays = [n.candidate for n in named if n.veto is None]
+        terms = [*self.balance.terms, *stays]
+        left = best_map(self.balance, terms, self.gates.draws, self.seed)
+        return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+
+    def forwards(
+        self, on_found: Callable[[Trial], None] = lambda _: None
+    ) -> tuple[list[Candidate], list[Trial], list[Trial], list[Trial]]:
+        """Add effects while the best one passes every gate; the balance's shapes move along.
+
+        Args:
+            on_found: Told each step that passed.
+
+        Returns:
+            The effects found, the step that found each, every step with the one that failed last,
+            and the first step's ranking.
+        """
         found: list[Candidate] = []
         trials: list[Trial] = []
         steps: list[Trial] = []
         ranking: list[Trial] = []
         while len(found) < self.gates.most:
-            ranked = self.ranked(found, self.gates.surrogates)
+            ranked = self.ranked(found, self.gates.draws)
             ranking = ranking or ranked
             trial = next(iter(ranked), None)
             if not found and ranked and not ranked[0].passes(self.gates):
@@ -177,17 +215,13 @@ class Search:
             steps.append(trial)
             if not trial.passes(self.gates):
                 break
+            on_found(trial)
             found += trial.candidates
             trials += [trial] * len(trial.candidates)
             terms = self.balance.refined([*self.balance.terms, *found])
             self.balance = replace(self.balance, terms=terms[: -len(found)])
             found = terms[-len(found) :]
-        kept = self._backwards(found)
-        named = [self._named([found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
-        stays = [n.candidate for n in named if n.veto is None]
-        terms = [*self.balance.terms, *stays]
-        left = best_map(self.balance, terms, self.gates.surrogates // 2, self.seed)
-        return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+        return found, trials, steps, ranking
 
     @property
     def floor(self) -> float:
@@ -206,13 +240,23 @@ class Search:
             family = candidate.family
             if family in trials or refused.get(family, 0) > 3 or gains[k] <= 0:
                 continue
-            if any(related(candidate, f) for f in found):
+            if candidate.is_limit:
+                continue
+            if not self.gates.akin and any(related(candidate, f) for f in found):
+                continue
+            if self._too_large([*found, candidate]):
                 continue
             if not self._signs_hold([*self.balance.terms, *found], [candidate]):
                 refused[family] = refused.get(family, 0) + 1
                 continue
             trials[family] = self._trial((candidate,), losses, k, null)
         return list(trials.values())
+
+    def _too_large(self, found: Sequence[Candidate]) -> bool:
+        """Say whether the model with these effects has more parameters than allowed."""
+        count = sum(len(t.parameters) for t in self.balance.model.terms)
+        count += sum(len(c.term.parameters) for c in found)
+        return self.gates.parameters is not None and count > self.gates.parameters
 
     def _scored(self, terms: Sequence[Candidate], count: int) -> tuple[Losses, FloatArray]:
         """Return losses of the whole pool, and the largest gain on each surrogate."""
@@ -247,8 +291,12 @@ class Search:
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
-        if all(p.lower < 0 and p.upper > 0 for c in added for p in c.effect.amplitudes):
-            return True
+        own = [p for c in added for p in c.effect.amplitudes]
+        if all(p.lower < 0 < p.upper for p in own):
+            weights = self.balance.solve([*terms, *added])[-len(own) :]
+            return all(
+                0.999 * p.lower < w < 0.999 * p.upper for p, w in zip(own, weights, strict=True)
+            )
         together = [*terms, *added]
         before, after = self.balance.loss(terms), self.balance.loss(together)
         columns = np.vstack(self.balance.columns(together))
@@ -264,7 +312,7 @@ class Search:
             return None
         terms = self.balance.terms
         left = self.balance.left(terms)
-        drawn = surrogates(left, self.gates.surrogates, self.seed + 1)
+        drawn = surrogates(left, self.gates.draws, self.seed + 1)
         aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
         blocks = [self.balance.columns(pair) for pair in pairs]
         joined = [np.hstack(parts) for parts in zip(*blocks, strict=True)]
@@ -311,7 +359,9 @@ class Search:
             if rival.family == found[k].family or len(rivals) == 8:
                 continue
             if rival.gain >= 0.8 * self.gates.rival * gain:
-                rivals[rival.family] = self._polished(others, rival.candidates[0])
+                best = self._polished(others, rival.candidates[0])
+                if not best.is_limit:
+                    rivals[rival.family] = self._losses_beside(others, best)
         total = mine.base[:, 0]
         near = {
             family: losses
@@ -331,13 +381,16 @@ class Search:
             flat if better else None,
         )
 
-    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
-        """Return a rival's losses at its own best shape."""
+    def _polished(self, others: Sequence[Candidate], rival: Candidate) -> Candidate:
+        """Return a rival at its own best shape."""
+        if not rival.shape:
+            return rival
+        return self.balance.refined([*self.balance.terms, *others, rival], passes=1)[-1]
+
+    def _losses_beside(self, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
+        """Return the losses of each run left out with a rival in the winner's place."""
         terms = [*self.balance.terms, *others]
-        best = rival
-        if rival.shape:
-            best = self.balance.refined([*terms, rival], passes=1)[-1]
-        block = self.balance.columns([best])
+        block = self.balance.columns([rival])
         aims = [r[:, None] for r in self.balance.left(terms)]
         base = self.balance.base(terms)
         joint = leave_one_run_out(base, block, [block[0].shape[1]], aims).joint

@@ -5,7 +5,7 @@ runs are sorted by what was held constant and every stratum of neighbours gives 
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,24 +49,29 @@ class Sealed:
         return len(self.discover) >= LEAST_TO_NAME
 
 
-def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
+def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()) -> Sealed:
     """Choose the confirm runs, stratified over the conditions.
+
+    Where there are enough new runs beside those of earlier diagnoses, only new ones confirm: a run
+    proves something once.
 
     Args:
         recordings: Runs that count as evidence, three at least.
         seed: Seed of the choice inside each stratum.
+        seen: Names of runs that an earlier diagnosis held.
 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
     """
-    _check_one_rig(recordings)
+    check_one_rig(recordings)
     if len(recordings) < SHARE:
         raise SplitError(
             f"{len(recordings)} runs are too few to diagnose.",
             "Some runs must find an effect, and others, never touched, confirm it.",
             f"Record {SHARE} runs at least; to name an effect, eight.",
         )
-    ordered = sorted(recordings, key=_place)
+    new = [recording for recording in recordings if recording.name not in seen]
+    ordered = sorted(new if len(new) >= SHARE else recordings, key=_place)
     random = np.random.default_rng(seed)
     confirm = set()
     for start in range(0, len(ordered) - SHARE + 1, SHARE):
@@ -75,19 +80,27 @@ def split(recordings: Sequence[Recording], seed: int = 0) -> Sealed:
     data = data_hash(recordings)
     kept = tuple(n for n in names if n not in confirm)
     held = tuple(n for n in names if n in confirm)
-    return Sealed(kept, held, seed, data, _hash(data, *kept, "|", *held))
+    return Sealed(kept, held, seed, data, seal(data, kept, held))
+
+
+def seal(data: str, discover: Sequence[str], confirm: Sequence[str]) -> str:
+    """Return SHA-256 over the data's hash and both lists."""
+    return _hash(data, *discover, "|", *confirm)
 
 
 def data_hash(recordings: Sequence[Recording]) -> str:
     """Return SHA-256 over the runs' names and samples, in the order of their names."""
-    digest = hashlib.sha256()
-    for recording in sorted(recordings, key=lambda r: r.name):
-        digest.update(f"{recording.name}\0{len(recording)}\0".encode())
-        digest.update(recording.time_s.tobytes())
-        digest.update(recording.flags.tobytes())
-        for name in sorted(recording.columns):
-            digest.update(name.encode())
-            digest.update(recording.columns[name].tobytes())
+    ordered = sorted(recordings, key=lambda r: r.name)
+    return _hash(*(part for r in ordered for part in (r.name, samples_hash(r))))
+
+
+def samples_hash(recording: Recording) -> str:
+    """Return SHA-256 over one run's samples, whatever the run is called."""
+    digest = hashlib.sha256(recording.time_s.tobytes())
+    digest.update(recording.flags.tobytes())
+    for name in sorted(recording.columns):
+        digest.update(name.encode())
+        digest.update(recording.columns[name].tobytes())
     return digest.hexdigest()
 
 
@@ -109,7 +122,7 @@ def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
     return (*keys, ("~name", 0, 0.0, recording.name))
 
 
-def _check_one_rig(recordings: Sequence[Recording]) -> None:
+def check_one_rig(recordings: Sequence[Recording]) -> None:
     """Raise when the runs come from different rigs or instruments."""
     for what, found in (
         ("rigs", {r.rig for r in recordings}),

@@ -65,8 +65,11 @@ class Effect(ABC):
         roles: Role of each input, and the channel that plays it unless a model says otherwise.
         amplitudes: Linear parameters, one a column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
+        projected_roles: Roles a search takes as the other sensors tell them, not as measured: those
+            whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
     """
 
     id: ClassVar[str]
@@ -75,8 +78,10 @@ class Effect(ABC):
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
+    projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Let the family be the id where none is stated."""
@@ -143,6 +148,7 @@ class Remembering(Effect):
     One compiled function walks over the samples of a run, and over a single one live. A state
     that moves with time has the role `clock` among its roles, so that it does not depend on the
     rate of the samples; what it forgets with time counts from the first sample it was given.
+    A sample with an input that is not finite gives NaN and leaves the state as it was.
 
     Attributes:
         walk: The compiled function; the columns of its first argument are the roles in order.
@@ -172,10 +178,14 @@ class Remembering(Effect):
         return [float(value) for value in rows[0]]
 
     def _walked(self, now: FloatArray, shape: Sequence[float], state: FloatArray) -> FloatArray:
-        rows = np.empty((len(now), len(self.amplitudes)))
-        type(self).walk(
-            np.ascontiguousarray(now, np.float64), np.array(shape, np.float64), state, rows
-        )
+        good = np.isfinite(now).all(axis=1)
+        seen = np.ascontiguousarray(now if good.all() else now[good], np.float64)
+        walked = np.empty((len(seen), len(self.amplitudes)))
+        type(self).walk(seen, np.array(shape, np.float64), state, walked)
+        if len(seen) == len(now):
+            return walked
+        rows = np.full((len(now), len(self.amplitudes)), np.nan)
+        rows[good] = walked
         return rows
 
 

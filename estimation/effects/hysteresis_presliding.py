@@ -31,10 +31,17 @@ class Presliding(Remembering):
     """
 
     id = "hysteresis.presliding"
-    balances: ClassVar = {"motor": -1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": -1}
+    balances: ClassVar = {
+        "motor": -1,
+        "gearbox": -1,
+        "cable": 1,
+        "stretch": -1,
+        "grasp": -1,
+        "joint": 1,
+    }
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "loss once it slides", lower=0.0),)
-    shape = (Parameter("reach", "travel", "way after which 63 % of it is there", 1e-3, 1e0),)
+    shape = (Parameter("reach", "travel", "way after which 63 % of it is there", 1e-3, 1e1),)
     walk = _walk
     rest = (0.0, 0.0, 0.0)
     confused_with = (

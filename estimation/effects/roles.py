@@ -1,8 +1,10 @@
 """Which channel plays which role of an effect in which balance.
 
-The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder, also for
-the cable, since the jaw's coarse encoder makes a delay that is not there. A load is never the
-balance's own target: noise shared by both sides of a balance looks like an effect.
+The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder. Behind
+the gearbox, for cable and stretch, it comes from the spindle's: what winds up turns the motor and
+not the spindle (on measured data the motor's speed doubles the cable's error), and the jaw's coarse
+encoder makes a delay that is not there. A load is never the balance's own target: noise shared by
+both sides of a balance looks like an effect.
 """
 
 from collections.abc import Mapping
@@ -15,6 +17,12 @@ from estimation.effects.effect import Effect
 JOINTS = range(1, 8)
 """Joints of the arm that may act on one another."""
 
+AXES = ("grasp", "pitch", "yaw")
+"""Axes of a wristed grasper, each with a motor of its own."""
+
+ANGLES = ("position", "travel", "motor_angle", "output_angle", "encoder", "stop", "tilt")
+"""Roles that the angle of an axis plays where it has no other encoder."""
+
 _MOTION = {
     "speed": ("motor_velocity_rad_s",),
     "acceleration": ("motor_acceleration_rad_s2",),
@@ -23,10 +31,15 @@ _MOTION = {
     "motor_angle": ("motor_angle_rad",),
     "output_angle": ("spindle_angle_rad",),
     "current": ("motor_current_a",),
+    "drive": ("motor_current_a",),
+    "temperature": ("motor_temperature_k",),
     "clock": ("time_s",),
     "elapsed": ("time_s", "campaign_time_s"),
+    "campaign_clock": ("campaign_time_s",),
     "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
 }
+
+_BEHIND_THE_GEAR = _MOTION | {"speed": ("spindle_velocity_rad_s",)}
 
 CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": _MOTION
@@ -34,9 +47,10 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "travel": ("motor_angle_rad",),
         "load": (MOTOR_LOAD,),
         "reading": ("motor_current_a", MOTOR_LOAD),
+        "creeping": (MOTOR_LOAD,),
         "other_reading": ("jaw_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
     "gearbox": _MOTION
@@ -44,25 +58,29 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "load": ("proximal_torque_n_m",),
         "travel": ("proximal_torque_n_m",),
         "reading": ("proximal_torque_n_m",),
+        "creeping": ("proximal_torque_n_m",),
         "other_reading": ("motor_current_a", "distal_torque_n_m"),
         "encoder": ("motor_angle_rad", "spindle_angle_rad"),
     },
-    "cable": _MOTION
+    "cable": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "reading": ("distal_torque_n_m",),
+        "creeping": ("distal_torque_n_m",),
         "other_reading": ("motor_current_a",),
         "encoder": ("spindle_angle_rad",),
         "stop": ("jaw_angle_rad",),
         "tilt": ("jaw_angle_rad",),
     },
-    "stretch": _MOTION
+    "stretch": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
         "travel": ("spindle_angle_rad",),
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
+        "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
         "encoder": ("spindle_angle_rad",),
+        "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION
     | {
@@ -70,7 +88,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("motor_current_a",),
         "other_reading": ("spindle_angle_rad",),
         "encoder": ("motor_angle_rad",),
-        "stop": ("spindle_angle_rad",),
+        "stop": ("jaw_angle_rad",),
         "tilt": ("spindle_angle_rad",),
     },
 }
@@ -99,10 +117,36 @@ def _of_joint(joint: int) -> Mapping[str, tuple[str, ...]]:
         "tilt": (f"{own}_angle_rad",),
         "reading": (f"{own}_velocity_rad_s", f"{own}_acceleration_rad_s2"),
         "other_reading": tuple(f"{other}_torque_n_m" for other in others),
+        "other_torque": tuple(f"{other}_torque_n_m" for other in others),
         "other_angle": tuple(f"{other}_angle_rad" for other in others),
         "clock": ("time_s",),
         "elapsed": ("time_s", "campaign_time_s"),
+        "campaign_clock": ("campaign_time_s",),
     }
+
+
+def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
+    """Return the roles in the balance of one axis of a wrist, from its own motor's current."""
+    others = [other for other in AXES if other != axis]
+    current, angle = f"{axis}_current_a", f"{axis}_angle_rad"
+    return _MOTION | {
+        "speed": (f"{axis}_velocity_rad_s",),
+        "acceleration": (f"{axis}_acceleration_rad_s2",),
+        **dict.fromkeys(ANGLES, (angle,)),
+        "current": (current,),
+        "load": (current,),
+        "reading": (current,),
+        "other_reading": tuple(f"{other}_current_a" for other in others),
+        "other_torque": tuple(f"{other}_torque_n_m" for other in others),
+        "other_angle": tuple(f"{other}_angle_rad" for other in others),
+    }
+
+
+def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
+    """Return the roles of a balance."""
+    if kind == "joint":
+        return _of_joint(int(number))
+    return CHANNELS[kind] if kind in CHANNELS else _of_axis(kind)
 
 
 def entries(effect: Effect, balance: str) -> list[Entry]:
@@ -113,8 +157,11 @@ def entries(effect: Effect, balance: str) -> list[Entry]:
         balance: Balance id, such as `motor` or `joint.3`.
     """
     kind, _, number = balance.partition(".")
-    if kind not in effect.balances:
+    sign = effect.balances.get(kind)
+    if sign is None and kind in AXES:  # an axis of the wrist is like the grasp unless stated
+        sign = effect.balances.get("grasp")
+    if sign is None:
         return []
-    known = _of_joint(int(number)) if kind == "joint" else CHANNELS[kind]
+    known = _known(kind, number)
     ways = product(*(known[role] for role in effect.roles))
-    return [Entry(effect.balances[kind], dict(zip(effect.roles, way, strict=True))) for way in ways]
+    return [Entry(sign, dict(zip(effect.roles, way, strict=True))) for way in ways]

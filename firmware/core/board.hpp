@@ -9,7 +9,7 @@
 
 #include "control.hpp"
 #include "framing.hpp"
-#include "limits.hpp"
+#include "guard.hpp"
 #include "protocol.hpp"
 #include "setpoint_queue.hpp"
 #include "watchdog.hpp"
@@ -45,16 +45,22 @@ class Board {
 
     Outputs tick(std::uint32_t tick_us, const Inputs& inputs) {
         now_us_ = tick_us;
-        const bool silent = watchdog_.expired(tick_us);
-        if (armed() && silent) trip(kWatchdogTripped);
-        if (armed() && limits_.crossed_by(inputs)) trip(kLimitTripped);
+        const std::uint32_t silent_us = watchdog_.silent_us(tick_us);
+        const std::int64_t patience_us = guard_.limits().watchdog_us;
+        if (armed() && silent_us > patience_us) {
+            trip({kHostSilent, kNoChannel, silent_us, patience_us, silent_us}, inputs);
+        }
+        if (armed() || holding()) {
+            const Crossing crossing = guard_.check(inputs);
+            if (crossing.code != kNoTrip) trip(crossing, inputs);
+        }
         const bool dry = armed() && queue_.empty();
         if (armed() && !queue_.empty()) {
             held_ = queue_.pop();
             engaged_ = true;
         }
         Outputs outputs;
-        if (engaged_) {
+        if (engaged_ || holding()) {
             outputs.command_e4 = controller_.tick(held_.target, inputs.spindle, inputs.motor);
             outputs.load_ma = held_.load_ma;
         }
@@ -64,15 +70,35 @@ class Board {
 
   private:
     bool armed() const { return (status_ & kArmed) != 0; }
+    bool holding() const { return (status_ & kHolding) != 0; }
 
-    void trip(Status cause) {
+    // Goes to the safe state; the first cause stays.
+    void trip(const Crossing& crossing, const Inputs& inputs) {
+        const bool hold = guard_.limits().safe_state == kHold && armed() &&
+                          (engaged_ || !queue_.empty()) &&
+                          (crossing.code == kHostSilent || crossing.code == kStalled ||
+                           crossing.code == kSensorSaturated || crossing.code == kSensorStale);
         release();
-        status_ = static_cast<std::uint16_t>(status_ | cause);
+        unsigned status = status_;
+        if (first_.code == kNoTrip) {
+            first_ = crossing;
+            first_us_ = now_us_;
+            status |= static_cast<unsigned>(crossing.code) << kTripShift;
+            status |= crossing.code == kHostSilent ? kWatchdogTripped : kLimitTripped;
+        }
+        if (hold) {
+            status |= kHolding;
+            held_.target = inputs.spindle;
+            held_.load_ma = 0;
+            controller_.limit_to(guard_.limits().hold_command_e4);
+            guard_.begin_to_hold();
+        }
+        status_ = static_cast<std::uint16_t>(status);
     }
 
     // Takes the motors out of force and forgets what was to be done; the latches stay.
     void release() {
-        status_ = status_ & (kWatchdogTripped | kLimitTripped);
+        status_ = status_ & (kWatchdogTripped | kLimitTripped | 0xFF << kTripShift);
         queue_.clear();
         engaged_ = false;
     }
@@ -88,12 +114,14 @@ class Board {
         } else if (kind == kHello) {
             has_last_ = false;
             Writer reply = begin(kHelloReply, sequence);
-            reply.u32(kProtocolHash).u32(kFirmwareVersion);
+            reply.u32(kProtocolHash).u32(kFirmwareVersion).u32(kBuildHash);
             for (std::uint8_t character : serial_) reply.u8(character);
             send(reply);
         } else if (kind == kPing) {
             Reader body(payload + kHeaderSize);
             send(begin(kPong, sequence).u64(body.u64()).u32(now_us_));
+        } else if (kind == kTrip) {
+            report_trip(sequence);
         } else if (has_last_ && kind == last_kind_ && sequence == last_sequence_) {
             acknowledge(kind, sequence, last_result_);  // a repeat: its answer was lost
         } else {
@@ -116,6 +144,7 @@ class Board {
             case kStart:
             case kStop:
             case kDisarm:
+            case kTrip:
                 return body == 0 ? kOk : kWrongSize;
             case kArm:
                 return size == kArmSize ? kOk : kWrongSize;
@@ -155,15 +184,12 @@ class Board {
         for (double* gain : {&gains.kp, &gains.ki, &gains.kd, &gains.velocity_filter, &gains.limit}) {
             *gain = reader.f64();
         }
-        Limits limits;
-        for (std::int32_t* limit :
-             {&limits.max_current, &limits.max_load_ma, &limits.max_proximal, &limits.max_distal,
-              &limits.min_spindle, &limits.max_spindle}) {
-            *limit = reader.i32();
-        }
+        const Limits limits = Limits::read(reader);
         if (!gains.valid() || !limits.valid()) return kBadValue;
         release();
-        limits_ = limits;
+        guard_.arm(limits);
+        first_ = Crossing();
+        first_us_ = 0;
         controller_.reset(gains);
         status_ = kArmed;
         return kOk;
@@ -174,7 +200,7 @@ class Board {
         Reader check(body);
         for (std::size_t i = 0; i < count; ++i) {
             const std::int32_t target = check.i32();
-            if (!limits_.allow(target, check.i16())) return kBadValue;
+            if (!guard_.limits().allow(target, check.i16())) return kBadValue;
         }
         if (count > queue_.free()) return kQueueFull;
         Reader reader(body);
@@ -185,6 +211,18 @@ class Board {
             queue_.push(setpoint);
         }
         return kOk;
+    }
+
+    void report_trip(std::uint16_t sequence) {
+        const std::int64_t most_late_us = UINT32_MAX;
+        const std::int64_t late_us = first_.late_us < most_late_us ? first_.late_us : most_late_us;
+        send(begin(kTripReport, sequence)
+                 .u8(first_.code)
+                 .u8(first_.channel)
+                 .i32(clip32(first_.value))
+                 .i32(clip32(first_.limit))
+                 .u32(first_us_)
+                 .u32(static_cast<std::uint32_t>(late_us)));
     }
 
     void acknowledge(std::uint8_t command, std::uint16_t sequence, Result result) {
@@ -203,7 +241,7 @@ class Board {
         sample.u8(kVersion).u8(kSample).u16(static_cast<std::uint16_t>(status));
         sample.u32(sequence_++).u32(tick_us);
         sample.i32(inputs.motor).i32(inputs.spindle).i32(inputs.jaw);
-        sample.i32(engaged_ ? held_.target : inputs.spindle);
+        sample.i32(engaged_ || holding() ? held_.target : inputs.spindle);
         sample.i16(clip16(inputs.proximal)).i16(clip16(inputs.distal)).i16(clip16(inputs.current));
         sample.u16(static_cast<std::uint16_t>(clip(inputs.fsr, 0, 65535)));
         sample.i16(clip16(outputs.command_e4)).i16(clip16(outputs.load_ma));
@@ -221,6 +259,10 @@ class Board {
     static std::int32_t clip(std::int32_t value, std::int32_t low, std::int32_t high) {
         if (value < low) return low;
         return value > high ? high : value;
+    }
+    static std::int32_t clip32(std::int64_t value) {
+        if (value < INT32_MIN) return INT32_MIN;
+        return value > INT32_MAX ? INT32_MAX : static_cast<std::int32_t>(value);
     }
     static std::int16_t clip16(std::int32_t value) {
         return static_cast<std::int16_t>(clip(value, INT16_MIN, INT16_MAX));
@@ -241,8 +283,10 @@ class Board {
     FrameTransmitter<TransmitCapacity> transmitter_;
     SetpointQueue<kQueueCapacity> queue_;
     Controller controller_;
-    Limits limits_;
-    Watchdog watchdog_{kWatchdogUs};
+    Guard guard_;
+    Crossing first_;  // since the board was armed
+    std::uint32_t first_us_ = 0;
+    Watchdog watchdog_;
     Setpoint held_;
     std::uint32_t now_us_ = 0;
     std::uint32_t sequence_ = 0;

@@ -36,6 +36,11 @@ class Controller {
         gains_ = gains;
     }
 
+    // From now on no command is larger, to hold rather than to follow.
+    void limit_to(double command) {
+        if (command < gains_.limit) gains_.limit = command;
+    }
+
     // One tick; returns the command in ticks of 1e-4 of full scale.
     std::int32_t tick(std::int32_t target, std::int32_t spindle, std::int32_t motor) {
         if (!primed_) {

@@ -10,10 +10,19 @@
 namespace rig {
 
 constexpr std::uint8_t kVersion = 1;
-constexpr std::uint32_t kFirmwareVersion = 0x000100;
+constexpr std::uint32_t kFirmwareVersion = 0x000200;
 constexpr std::size_t kMaxSetpoints = 100;
 constexpr std::size_t kQueueCapacity = 2000;
 constexpr std::uint32_t kWatchdogUs = 250000;
+constexpr std::int32_t kMinWatchdogUs = 5000;
+constexpr std::int32_t kMaxWatchdogUs = 1000000;
+constexpr std::int64_t kTickUs = 1000;
+
+// CRC-32 of the sources, set by the build
+#ifndef RIG_BUILD_HASH
+#define RIG_BUILD_HASH 0
+#endif
+constexpr std::uint32_t kBuildHash = RIG_BUILD_HASH;
 
 constexpr char kLayout[] =
     "rig teensy protocol 1\n"
@@ -22,27 +31,37 @@ constexpr char kLayout[] =
     "jaw i4, target i4, proximal i2, distal i2, current i2, fsr u2, command_e4 i2, load_ma i2, "
     "dropped u2\n"
     "2 HELLO_REPLY: version u1, kind u1, sequence u2, protocol_hash u4, firmware_version u4, "
-    "serial S24\n"
+    "build_hash u4, serial S24\n"
     "3 ACK: version u1, kind u1, sequence u2, command u1, result u1, status u2, queue_free u2\n"
     "4 PONG: version u1, kind u1, sequence u2, token u8, tick_us u4\n"
+    "5 TRIP_REPORT: version u1, kind u1, sequence u2, code u1, channel u1, value i4, limit i4, "
+    "tick_us u4, late_us u4\n"
     "16 HELLO: version u1, kind u1, sequence u2\n"
-    "17 ARM: version u1, kind u1, sequence u2, kp f8, ki f8, kd f8, velocity_filter f8, limit f8, "
-    "max_current i4, max_load_ma i4, max_proximal i4, max_distal i4, min_spindle i4, "
-    "max_spindle i4\n"
+    "17 ARM: version u1, kind u1, sequence u2, kp f8, ki f8, kd f8, velocity_filter f8, limit "
+    "f8, max_current i4, max_load_ma i4, max_proximal i4, max_distal i4, min_spindle i4, "
+    "max_spindle i4, min_jaw i4, max_jaw i4, max_motor_step i4, continuous_current i4, i2t i4, "
+    "stall_current i4, stall_motion i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, "
+    "watchdog_us i4, safe_state i4, hold_command_e4 i4\n"
     "18 START: version u1, kind u1, sequence u2\n"
     "19 SETPOINTS: version u1, kind u1, sequence u2, 100 x (target i4, load_ma i2)\n"
     "20 STOP: version u1, kind u1, sequence u2\n"
     "21 DISARM: version u1, kind u1, sequence u2\n"
     "22 PING: version u1, kind u1, sequence u2, token u8\n"
-    "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED\n"
-    "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, "
-    "6 WRONG_VERSION\n";
+    "23 TRIP: version u1, kind u1, sequence u2\n"
+    "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED, 32 "
+    "HOLDING, trip << 8\n"
+    "trip: 0 NONE, 1 HOST_SILENT, 2 OVER_CURRENT, 3 PROXIMAL_TORQUE, 4 DISTAL_TORQUE, 5 "
+    "SPINDLE_TRAVEL, 6 JAW_TRAVEL, 7 OVER_SPEED, 8 OVERHEATED, 9 STALLED, 10 SENSOR_SATURATED, "
+    "11 SENSOR_STALE, 12 SENSOR_MISSING\n"
+    "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, 6 "
+    "WRONG_VERSION\n";
 
 enum Kind : std::uint8_t {
     kSample = 1,
     kHelloReply = 2,
     kAck = 3,
     kPong = 4,
+    kTripReport = 5,
     kHello = 16,
     kArm = 17,
     kStart = 18,
@@ -50,6 +69,7 @@ enum Kind : std::uint8_t {
     kStop = 20,
     kDisarm = 21,
     kPing = 22,
+    kTrip = 23,
 };
 
 enum Status : std::uint16_t {
@@ -58,6 +78,24 @@ enum Status : std::uint16_t {
     kQueueDry = 4,
     kWatchdogTripped = 8,
     kLimitTripped = 16,
+    kHolding = 32,
+};
+constexpr unsigned kTripShift = 8;
+
+enum Trip : std::uint8_t {
+    kNoTrip = 0,
+    kHostSilent = 1,
+    kOverCurrent = 2,
+    kProximalTorque = 3,
+    kDistalTorque = 4,
+    kSpindleTravel = 5,
+    kJawTravel = 6,
+    kOverSpeed = 7,
+    kOverheated = 8,
+    kStalled = 9,
+    kSensorSaturated = 10,
+    kSensorStale = 11,
+    kSensorMissing = 12,
 };
 
 enum Result : std::uint8_t {
@@ -74,7 +112,7 @@ constexpr std::size_t kHeaderSize = 4;
 constexpr std::size_t kSetpointSize = 6;
 constexpr std::size_t kSerialSize = 24;
 constexpr std::size_t kGains = 5;
-constexpr std::size_t kLimits = 6;
+constexpr std::size_t kLimits = 19;
 constexpr std::size_t kArmSize = kHeaderSize + 8 * kGains + 4 * kLimits;
 constexpr std::size_t kPingSize = kHeaderSize + 8;
 

@@ -41,6 +41,9 @@ void rig_board_tick(void* board, std::uint32_t tick_us, const std::int32_t* inpu
     outputs[1] = given.load_ma;
 }
 
+// CRC-32 of the sources the core was built from.
+std::uint32_t rig_board_build_hash() { return rig::kBuildHash; }
+
 // Writes at most `room` waiting bytes to `out`; returns how many.
 std::size_t rig_board_transmit(void* board, std::uint8_t* out, std::size_t room) {
     return board_of(board)->transmit(out, room);

@@ -26,6 +26,16 @@ def diagnose(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first answer in seconds, without simulated twins.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler to work on."),
+    ] = None,
+    protocol_out: Annotated[
+        Path | None, typer.Option(help="Where the next experiment goes, as a protocol file.")
+    ] = None,
     ledger: Annotated[
         Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
     ] = None,
@@ -35,12 +45,16 @@ def diagnose(
 ) -> None:
     """Find the effect that the declared model lacks, and prove it on runs that nobody touched."""
     import json
-    from concurrent.futures import ProcessPoolExecutor
-    from contextlib import nullcontext
+    import os
+
+    # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from estimation import model_file
     from estimation.files import write_text_atomic
+    from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
+    from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import declared_models, run_diagnosis
     from rig.errors import UsageError
     from rig.reports.diagnosis import page, sentences
@@ -54,9 +68,7 @@ def diagnose(
             f"--model-out names one file, and there are {len(models)} balances.",
             fix=f"Choose one with --balance: {', '.join(m.balance for m in models)}.",
         )
-    if workers < 1:
-        raise UsageError(f"--workers is {workers}; it is 1 or more.")
-    with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as executor:
+    with engine(workers, scheduler) as executor:
         done = run_diagnosis(
             path,
             models,
@@ -64,6 +76,7 @@ def diagnose(
             seed=seed,
             format_name=format_,
             executor=executor,
+            quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),
         )
     for line in sentences(done.diagnosis):
@@ -77,6 +90,8 @@ def diagnose(
     if report is not None:
         where = write_report(report / "diagnosis.html", page(done, Provenance.now(seed)))
         screen.print(f"Report: {where}", markup=False)
+    if protocol_out is not None:
+        screen.print(write_protocol(done.diagnosis, protocol_out), markup=False)
     if json_ == Path("-"):
         emit_json(done.diagnosis.to_json())
     elif json_ is not None:

@@ -29,38 +29,56 @@ def live(
         float | None, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = None,
     plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder of recordings that a key starts.")
+    ] = Path("logs"),
     json_: JsonFlag = False,
 ) -> int:
     """Show grip torque, estimate against sensor, as the rig measures it.
 
     A simulated rig plays the quick protocol unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line.
+    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
+    terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
     """
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.live.estimator import ModelEstimator
+    from rig.live.keys import HELP, no_keys, pressed_keys
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
+    from rig.live.watching import watched
     from rig.logger import open_logger
     from rig.protocol import load_protocol
     from rig.trajectory import SAMPLE_RATE_HZ
 
     settings = load_config(config)
+    refuse_problems(settings)
     if protocol is None and settings.is_simulated:
-        protocol = "quick"
+        protocol = "quick" if settings.limits.load_command_a else "unloaded"
     plans = load_protocol(protocol).plans() if protocol else []
     model_path = model or settings.model_path
     estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None
-    blocks = session_blocks(
-        settings, lambda: open_logger(settings, pace=pace or None), plans, estimator
-    )
-    options = ShowOptions(
-        title=f"rig live: {settings.name}",
-        channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
-        lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
-        plain=plain,
-        json=json_,
-    )
-    show(until(blocks, duration), options, console())
+    with pressed_keys() as keys:
+        blocks = session_blocks(
+            settings,
+            lambda: open_logger(settings, pace=pace or None),
+            plans,
+            estimator,
+            keys or no_keys,
+            out,
+        )
+        if estimator is not None:
+            blocks = watched(blocks, estimator.model)
+        options = ShowOptions(
+            title=f"rig live: {settings.name}",
+            channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
+            lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
+            plain=plain,
+            json=json_,
+            half_width=estimator.half_width if estimator else None,
+            footer=HELP if keys else "Ctrl-C leaves",
+        )
+        show(until(blocks, duration), options, console())
     return 0

@@ -8,6 +8,7 @@ import typer
 from rig.cli.output import JsonFlag, console, emit_json
 
 if TYPE_CHECKING:
+    from calibration.linear import CalibrationSet
     from rig.log.check import LogReport
     from rig.log.reader import LogFile
     from rig.log.repair import RepairReport
@@ -81,6 +82,15 @@ def export(
         Path | None, typer.Option(help="File with --topic, else folder; beside the log by default.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
+    calibration: Annotated[
+        str | None,
+        typer.Option(help="Apply this set instead: a TOML file, or a shipped set's name."),
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(help="Apply this record of the store, by hash; may be repeated."),
+    ] = None,
+    store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
     json: JsonFlag = False,
 ) -> None:
     """Export a log, one file for each topic."""
@@ -92,12 +102,50 @@ def export(
         raise UsageError(
             f"There is no format {format_name!r}.", fix=f"Choose one of {', '.join(known)}."
         )
-    written = export_log(path, ExportFormat(format_name), out, topic, force=force)
+    applied = _other_calibrations(path, calibration, record or [], store)
+    written = export_log(
+        path, ExportFormat(format_name), out, topic, force=force, calibrations=applied
+    )
     if json:
-        emit_json({"written": written})
+        names = None if applied is None else {applied.name: applied.content_hash}
+        emit_json({"written": written, "calibrations": names})
     else:
         for target in written:
             console().print(f"wrote {target}")
+
+
+def _other_calibrations(
+    path: Path, calibration: str | None, records: list[str], store: Path | None
+) -> "CalibrationSet | None":
+    """Return the set an export is to be made with; None for the one it was recorded with.
+
+    A record whose range the log leaves is held to the rules: a remark, or an error.
+    """
+    if calibration is None and not records:
+        return None
+    from calibration.linear import load_calibration_set, shipped_calibration_set
+    from calibration.rules import judge_range, refuse_errors
+    from calibration.store import CalibrationStore, compose, default_folder
+    from rig.log.reader import read_log
+    from rig.log.recalibrate import carried_calibrations
+    from rig.log.streams import COUNTS
+
+    log = read_log(path, topics=(COUNTS,))
+    if calibration is None:
+        base = carried_calibrations(log)
+    elif calibration.endswith(".toml"):
+        base = load_calibration_set(Path(calibration))
+    else:
+        base = shipped_calibration_set(calibration)
+    kept = CalibrationStore(store or default_folder())
+    found = [kept.get(start) for start in records]
+    made = compose(base, found)
+    if COUNTS in log.topics:
+        rows = log.topics[COUNTS].rows
+        verdicts = [v for r in found for v in judge_range(r, rows[r.input])]
+        for verdict in refuse_errors(verdicts):
+            console().print(f"{verdict.channel}: {verdict.message}", markup=False)
+    return made
 
 
 def _logs(path: Path) -> list[Path]:

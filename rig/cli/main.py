@@ -8,13 +8,19 @@ from typer.exceptions import TyperException
 
 from rig import __version__
 from rig.cli.cal import cal_app
+from rig.cli.calibrate import calibrate_app
+from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
+from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.live import live
 from rig.cli.log import log_app
+from rig.cli.loop import loop
 from rig.cli.record import record
 from rig.cli.replay import replay
+from rig.cli.stop import stop
 from rig.cli.study import study_app
 
 app = typer.Typer(
@@ -34,10 +40,19 @@ app.command()(record)
 app.command()(live)
 app.command()(replay)
 app.command()(fit)
+app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(loop)
 app.add_typer(log_app, name="log")
 app.add_typer(study_app, name="study")
+app.add_typer(config_app, name="config")
+app.command()(doctor)
+app.command()(devices)
+app.command()(selftest)
+app.command()(stop)
+app.command()(udev)
+app.add_typer(firmware_app, name="firmware")
 
 
 def _version(wanted: bool) -> None:

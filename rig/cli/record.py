@@ -22,6 +22,9 @@ def record(
         Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", "-m", help="Fitted model to watch: does it still fit?")
+    ] = None,
     notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
@@ -31,11 +34,13 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.config import load_config
+    from rig.config_check import refuse_problems
     from rig.errors import UsageError
     from rig.logger import open_logger
     from rig.protocol import load_protocol
     from rig.record import RunResult, open_campaign_folder, read_manifest, record_campaign
     from rig.session import Session
+    from rig.watching import watch_runs
 
     screen = console()
     if resume is not None:
@@ -52,8 +57,10 @@ def record(
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
+    refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
         screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
+    watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
     results: list[RunResult] = []
@@ -69,6 +76,8 @@ def record(
             for result in record_campaign(session, todo, folder, notes=notes, on_progress=show):
                 done += result.expected
                 results.append(result)
+                if watch is not None and (news := watch.after(result.path)):
+                    screen.print(f"[yellow]{news}[/yellow]")
                 if result.drifted or not result.complete:
                     screen.print(f"[yellow]{result.name}: {result.remark}[/yellow]")
     except KeyboardInterrupt:
@@ -79,5 +88,6 @@ def record(
         f"{len(results)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
     )
     if json:
-        emit_json({"folder": folder, "runs": results, "look_at": bad})
+        told = {"folder": folder, "runs": results, "look_at": bad}
+        emit_json(told if watch is None else {**told, "model": watch.to_json()})
     return 1 if bad else 0

@@ -11,7 +11,7 @@ from rig.cli.output import JsonFlag, console
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
-    from rig.live.replay import EstimateStream
+    from rig.live.estimator import ModelEstimator
 
 
 def replay(
@@ -40,6 +40,7 @@ def replay(
     from rig.live.options import ShowOptions
     from rig.live.replay import replay_blocks
     from rig.live.run import show
+    from rig.live.watching import watched
 
     if not 0 <= speed < math.inf:
         raise UsageError(
@@ -56,7 +57,10 @@ def replay(
         plain=plain,
         json=json_,
     )
-    summary = show(replay_blocks(recording, estimator, speed or None), options, console())
+    blocks = replay_blocks(recording, estimator, speed or None)
+    if estimator is not None:
+        blocks = watched(blocks, estimator.model)
+    summary = show(blocks, options, console())
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
 
@@ -94,7 +98,7 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
+def _estimator(path: Path, recording: "Recording") -> "ModelEstimator":
     """Read a model file and begin a stream of its estimates at the recording's rate."""
     from rig.live.estimator import ModelEstimator
 

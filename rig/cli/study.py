@@ -1,5 +1,6 @@
 """`rig study`: make a paper's results again."""
 
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.study_arm import arm_studies
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
@@ -18,6 +20,9 @@ study_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+
+
+study_app.add_typer(arm_studies)
 
 
 @study_app.callback()
@@ -114,32 +119,78 @@ def _train(
 
 
 @study_app.command()
-def pique(
-    data: Annotated[
-        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-    ],
-    paths: Annotated[
-        tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
-    ] = ("one18", "two18"),
-    also: Annotated[
-        list[str] | None,
-        typer.Option(help="A further run to test on, with models fitted on the second path."),
+def zhao(
+    prototype: Annotated[str, typer.Option(help="third, journal or ball.")] = "third",
+    seeds: Annotated[int, typer.Option(min=2, help="Simulated graspers.")] = 20,
+    spread: Annotated[
+        float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
+    ] = 0.1,
+    diagnosis: Annotated[
+        bool, typer.Option("--diagnosis", help="Ask what the model lacks: a minute each.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016 again, simulated."""
+    from estimation.files import write_text_atomic
+    from rig.errors import UsageError
+    from rig.reports import zhao as shown
+    from rig.reports.table import to_rich
+    from rig.simulation.grasper_plant import PROTOTYPES
+    from rig.studies.haptics import run_haptics
+    from rig.studies.zhao import run_study
+
+    if prototype not in PROTOTYPES:
+        raise UsageError(
+            f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
+        )
+    with progress() as bar:
+        task = bar.add_task("graspers", total=seeds)
+
+        def step(name: str) -> None:
+            bar.update(task, description=name, advance=1)
+
+        study = run_study(prototype, range(seeds), spread, with_diagnosis=diagnosis, on_step=step)
+    haptics = run_haptics(0, spread, prototype)
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study, haptics):
+        screen.print(to_rich(table))
+    drawn = shown.write_figures(figures, haptics) if figures is not None else []
+    if out is not None:
+        names = [os.path.relpath(path, out.parent) for path in drawn]
+        write_text_atomic(out, shown.markdown(study, haptics, names))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json({"study": study, "haptics": haptics})
+
+
+@study_app.command()
+def loop(
+    data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
+    seed: Annotated[int, typer.Option(help="Seed of the split and of the surrogates.")] = 0,
+    task: Annotated[
+        list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
+    """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
     from estimation.files import write_text_atomic
-    from rig.reports import pique as shown
+    from rig.errors import UsageError
+    from rig.reports import loop as shown
     from rig.reports.table import to_rich
-    from rig.studies.arm_search import open_paths
-    from rig.studies.pique import run_study
+    from rig.studies.loop import TASKS, run_study
 
+    if any(not 1 <= number <= len(TASKS) for number in task or []):
+        raise UsageError(f"There are {len(TASKS)} rows.", fix="Write for example --task 1.")
+    tasks = [TASKS[number - 1] for number in task] if task else TASKS
     with progress() as bar:
-        task = bar.add_task("paths", total=None)
-        first, second, *others = open_paths(data, [*paths, *(also or [])])
+        shown_stage = bar.add_task("loop", total=None)
         study = run_study(
-            first, second, also=others, on_step=lambda step: bar.update(task, description=step)
+            data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
         )
     screen = console()
     for line in [shown.lead(study), *shown.notes(study)]:
@@ -151,101 +202,6 @@ def pique(
         screen.print(f"Markdown: {out}", markup=False)
     if json:
         emit_json(study)
-
-
-@study_app.command()
-def wrench(
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
-    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
-    from estimation.files import write_text_atomic
-    from rig.reports import pique_wrench as shown
-    from rig.reports.table import to_rich
-    from rig.studies.pique_wrench import run_wrench_study
-
-    with progress() as bar:
-        task = bar.add_task("arms", total=seeds)
-        study = run_wrench_study(seeds, workers, lambda: bar.advance(task))
-    screen = console()
-    for note in shown.NOTES:
-        screen.print(note, markup=False)
-    for table in shown.tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(study))
-        screen.print(f"Markdown: {out}", markup=False)
-    if json:
-        emit_json(study)
-
-
-@study_app.command()
-def delsol(
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
-    from estimation.files import write_text_atomic
-    from rig.reports.table import to_markdown, to_rich
-    from rig.simulation.hydraulic_arm import HYDRAULIC
-    from rig.studies.delsol import run_delsol, tables
-
-    with progress() as bar:
-        task = bar.add_task("arms", total=seeds)
-        study = run_delsol(seeds, lambda: bar.advance(task))
-    screen = console()
-    note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
-    screen.print(note, markup=False)
-    for table in tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        title = "# External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
-        parts = [title, note, *(to_markdown(table).rstrip() for table in tables(study))]
-        write_text_atomic(out, "\n\n".join([*parts, study.provenance.line()]) + "\n")
-        screen.print(f"Markdown: {out}", markup=False)
-    if json:
-        emit_json(study)
-
-
-@study_app.command()
-def payload(
-    data: Annotated[
-        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-    ],
-    on: Annotated[list[str], typer.Option(help="A run to look for an added mass on.")],
-    model: Annotated[str, typer.Option(help="Run without the mass, to fit a model on.")] = "two18",
-    height_m: Annotated[
-        float, typer.Option(min=0.01, help="Height of the mass above the remote centre, m.")
-    ] = 0.535,
-    height_error_m: Annotated[
-        float, typer.Option(min=0.0, help="Standard error of that height, m.")
-    ] = 0.01,
-    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
-    json: JsonFlag = False,
-) -> None:
-    """Find a mass added to an arm's insertion axis from its joints' torque."""
-    from estimation.files import write_text_atomic
-    from rig.reports.table import to_markdown, to_rich
-    from rig.studies.arm_search import open_paths
-    from rig.studies.payload import find_payload, table
-
-    with progress() as bar:
-        task = bar.add_task("paths", total=None)
-        fitted, *runs = open_paths(data, [model, *on])
-        found = find_payload(
-            fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
-        )
-    screen = console()
-    screen.print(to_rich(table(found)))
-    if out is not None:
-        text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
-        write_text_atomic(out, f"{text}\n{found.provenance.line()}\n")
-        screen.print(f"Markdown: {out}", markup=False)
-    if json:
-        emit_json(found)
 
 
 def _simulated(seed: int) -> "Source":

@@ -2,7 +2,7 @@
 
 A confirm run proves something once. A run that any earlier diagnosis held, to discover or to
 confirm, has been seen: a finding confirmed on it later is exploratory. Runs are known by the hash
-of their samples, so a copy or another folder does not make them new.
+of their samples, so a copy, another name or another folder does not make them new.
 """
 
 import json
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from estimation.diagnosis.split import Sealed, data_hash
+from estimation.diagnosis.split import Sealed, samples_hash
 from estimation.files import write_text_atomic
 from estimation.recording import Recording
 from rig.errors import DataError
@@ -46,10 +46,17 @@ class Ledger:
         Raises:
             LedgerError: The ledger cannot be read.
         """
-        known = {run for look in self._looks() for run in look}
-        return tuple(
-            r.name for r in recordings if r.name in sealed.confirm and data_hash([r]) in known
-        )
+        known = self.known(recordings)
+        return tuple(name for name in sealed.confirm if name in known)
+
+    def known(self, recordings: Sequence[Recording]) -> frozenset[str]:
+        """Return the names of the runs that any earlier look held, whatever they were called then.
+
+        Raises:
+            LedgerError: The ledger cannot be read.
+        """
+        looked_at = {run for look in self._looks() for run in look}
+        return frozenset(r.name for r in recordings if samples_hash(r) in looked_at)
 
     def write(self, recordings: Sequence[Recording], sealed: Sealed) -> None:
         """Write down a look before the confirm runs are opened.
@@ -64,7 +71,7 @@ class Ledger:
             "seed": sealed.seed,
             "discover": sealed.discover,
             "confirm": sealed.confirm,
-            "runs": {r.name: data_hash([r]) for r in recordings},
+            "runs": {r.name: samples_hash(r) for r in recordings},
         }
         try:
             before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""

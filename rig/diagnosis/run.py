@@ -7,15 +7,22 @@ from pathlib import Path
 
 from estimation import model_file
 from estimation.diagnosis.diagnose import Story, diagnose
+from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import Sealed, evidence, split
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.noise import noise_floors
+from rig.diagnosis.propose import propose
+from rig.diagnosis.twins import twins_of
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 
 Stage = Callable[[str], None]
+
+REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
+"""Shipped models that together declare the reference rig, measured or simulated."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,8 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     """Return the declared models to diagnose.
 
     Args:
-        path: A model file or the name of a shipped one; every shipped model that is named after its
-            balance when None.
+        path: A model file or the name of a shipped one; the balances of the reference rig when
+            None.
         balance: Only this balance.
 
     Raises:
@@ -52,8 +59,7 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     if path is not None:
         models = [model_file.read(path)]
     else:
-        read = [model_file.read(place) for place in model_file.shipped().values()]
-        models = [model for model in read if model.name == model.balance]
+        models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
     chosen = [model for model in models if balance in (None, model.balance)]
     if not chosen:
         known = ", ".join(dict.fromkeys(model.balance for model in models))
@@ -73,6 +79,7 @@ def run_diagnosis(
     seed: int = 0,
     format_name: str | None = None,
     executor: Executor | None = None,
+    quick: bool = False,
     on_stage: Stage = lambda _: None,
 ) -> Diagnosed:
     """Diagnose declared models on the recordings of a path.
@@ -84,6 +91,7 @@ def run_diagnosis(
         seed: Seed of the split and of everything random.
         format_name: Importer to use; guessed when None.
         executor: Runs work in parallel.
+        quick: A first answer, held against surrogates only, without simulated twins.
         on_stage: Told what begins.
 
     Raises:
@@ -92,19 +100,37 @@ def run_diagnosis(
         EstimationError: Nothing can be decided; says why.
     """
     on_stage("reading the recordings")
-    recordings = evidence(open_campaign(path, format_name))
-    sealed = split(recordings, seed)
-    seen = ledger.seen(recordings, sealed)
+    whole = evidence(open_campaign(path, format_name))
+    known = ledger.known(whole)
+    if len(whole) == PATHS:
+        recordings, sealed = split_paths(whole, seed, known)
+    else:
+        recordings, sealed = whole, split(whole, seed, known)
+    seen = tuple(name for name in sealed.confirm if path_of(name) in known)
+    on_stage("building the simulated twin of the declared models")
+    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     diagnosis, stories = diagnose(
         recordings,
         models,
         sealed,
         executor=executor,
+        twins=None if quick else twins.makers,
         on_stage=on_stage,
-        on_open=lambda: ledger.write(recordings, sealed),
+        on_open=lambda: ledger.write(whole, sealed),
     )
     notes = diagnosis.notes
+    if len(whole) == PATHS:
+        notes = (claim(sealed), *notes)
+    if twins.note:
+        notes = (*notes, twins.note)
     if seen:
         notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
-    diagnosis = replace(diagnosis, exploratory=bool(seen), notes=notes)
+    on_stage("looking for the experiment that tells rivals apart")
+    diagnosis = replace(
+        diagnosis,
+        exploratory=bool(seen),
+        notes=notes,
+        noise_floor=noise_floors(stories, recordings),
+        next_experiment=propose(diagnosis, stories, recordings, twins.twin),
+    )
     return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)

@@ -1,6 +1,6 @@
 """Opens our own logs: a `.mcap` file, the `.part` of a killed recorder, or a folder of both."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from estimation.campaign import Campaign, Run
@@ -18,6 +18,9 @@ from rig.log.writer import PART_SUFFIX
 class LogImporter:
     """Importer of logs written by rig.
 
+    A folder without logs of its own stands for the campaigns in its folders; their runs are then
+    named after both, `round-2/003-sine`.
+
     In a folder the runs stand in the order they were started, those without a recorded start by
     file name before them. A repaired log stands in for its original. A log whose recorder did not
     close it is opened too, excluded from evidence with the reason. Where a run was tried again, its
@@ -30,7 +33,7 @@ class LogImporter:
 
     def recognises(self, path: Path) -> bool:
         """Say whether the path is a log or a folder with at least one."""
-        return any(looks_like_log(item) for item in logs_in(path))
+        return any(looks_like_log(item) for item in _logs(path))
 
     def open(self, path: Path) -> Campaign:
         """Open logs as a campaign; samples are read when a run is.
@@ -38,7 +41,7 @@ class LogImporter:
         Raises:
             DataError: There is no log, or one of them is damaged beyond its unfinished end.
         """
-        paths = [item for item in logs_in(path) if not repaired_path(item).exists()]
+        paths = [item for item in _logs(path) if not repaired_path(item).exists()]
         if not paths:
             raise DataError(
                 f"There is no log in {path}.",
@@ -46,7 +49,18 @@ class LogImporter:
             )
         heads = [_head(item) for item in paths]
         heads.sort(key=lambda log: (log.run.started_at_ns or 0) if log.run else 0)
-        return Campaign(tuple(_run(log) for log in _last_attempts(heads)))
+        several = len({log.path.parent for log in heads}) > 1
+        return Campaign(tuple(_run(log, several) for log in _last_attempts(heads)))
+
+
+def _logs(path: Path) -> list[Path]:
+    """Return the logs of a folder, else those of the folders in it."""
+    own = logs_in(path)
+    if own or not path.is_dir():
+        return own
+    return [
+        item for folder in sorted(path.iterdir()) if folder.is_dir() for item in logs_in(folder)
+    ]
 
 
 def _head(path: Path) -> LogFile:
@@ -65,9 +79,9 @@ def _head(path: Path) -> LogFile:
 
 def _last_attempts(heads: list[LogFile]) -> list[LogFile]:
     """Leave out the logs of runs that were tried again."""
-    attempts: dict[str, list[LogFile]] = {}
+    attempts: dict[tuple[Path, str], list[LogFile]] = {}
     for log in heads:
-        attempts.setdefault(_name(log), []).append(log)
+        attempts.setdefault((log.path.parent, _name(log)), []).append(log)
     kept = []
     for same in attempts.values():
         planned = [log for log in same if not _unfinished(log) and log.end and log.end.clean]
@@ -84,15 +98,17 @@ def _unfinished(log: LogFile) -> bool:
     return log.end is None or log.path.suffix == PART_SUFFIX
 
 
-def _run(head: LogFile) -> Run:
+def _run(head: LogFile, several: bool) -> Run:
     path = head.path
     unfinished = _unfinished(head)
+    name = f"{path.parent.name}/{_name(head)}" if several else _name(head)
 
     def load() -> Recording:
         topics = None if unfinished else (SAMPLE,)
-        return recording_from_log(read_log(path, topics, tolerant=unfinished))
+        recording = recording_from_log(read_log(path, topics, tolerant=unfinished))
+        return replace(recording, name=name) if several else recording
 
-    return Run(_name(head), load=load, source=path, excluded=exclusion(head))
+    return Run(name, load=load, source=path, excluded=exclusion(head))
 
 
 IMPORTER = LogImporter()

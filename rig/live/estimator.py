@@ -26,6 +26,10 @@ class ModelEstimator:
         model = model_file.read(path)
         self._stream = Stream(model, sample_rate_hz)
         self.target_channel = model.target
+        self.model = model
+        # two standard errors of the runs it was fitted on, their means left in: what a person at
+        # the bench has to reckon with, in motion, on a rig that is as it was then
+        self.half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,).

@@ -16,6 +16,9 @@ class ShowOptions:
         lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
+        half_width: Half of the estimate's 95 % interval, in the main channel's SI unit; None where
+            it is not known.
+        footer: What a person can do.
     """
 
     title: str
@@ -23,6 +26,8 @@ class ShowOptions:
     lever_m: float = 0.012
     plain: bool = False
     json: bool = False
+    half_width: float | None = None
+    footer: str = "Ctrl-C leaves"
 
     def __post_init__(self) -> None:
         """Check the lever arm.

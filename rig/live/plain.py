@@ -6,13 +6,15 @@ from rig.live import text as words
 from rig.live.state import Reading, Snapshot
 
 
-def plain_line(snapshot: Snapshot, lever_m: float) -> str:
+def plain_line(snapshot: Snapshot, lever_m: float, half_width: float | None = None) -> str:
     """Return one line on a snapshot, for logs and for terminals that cannot draw."""
     time = "no samples yet" if snapshot.time_s is None else f"{snapshot.time_s:8.1f} s"
     parts = [time]
     for reading in snapshot.readings:
         source, value = words.main_value(reading)
         shown = words.with_unit(value, reading.unit)
+        if source == "estimate" and reading is snapshot.readings[0]:
+            shown += words.interval(half_width, reading.unit)
         parts.append(f"{words.name_of(reading.channel)}, {source} {shown}")
         force_n = words.tip_force_n(reading, value, lever_m)
         if force_n is not None:
@@ -27,7 +29,9 @@ def plain_line(snapshot: Snapshot, lever_m: float) -> str:
     return " | ".join(parts)
 
 
-def json_frame(snapshot: Snapshot, lever_m: float) -> dict[str, Any]:
+def json_frame(
+    snapshot: Snapshot, lever_m: float, half_width: float | None = None
+) -> dict[str, Any]:
     """Return a snapshot as plain types, SI units.
 
     `channels` maps each watched channel to its values; a value that is null has its reason beside
@@ -41,6 +45,7 @@ def json_frame(snapshot: Snapshot, lever_m: float) -> dict[str, Any]:
         "sample_rate_hz": snapshot.sample_rate_hz,
         "flagged": dict(snapshot.flagged),
         "lever_m": lever_m,
+        "estimate_half_width95": half_width,
         "channels": {r.channel: _json_reading(r, lever_m) for r in snapshot.readings},
         "devices": snapshot.devices,
         "limits": snapshot.limits,

@@ -1,6 +1,9 @@
 """A session with the rig as the stream of blocks the display shows."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -8,6 +11,9 @@ from drivers.transport import Transport
 from estimation.channels import unit_of
 from rig.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
+from rig.live.calibration_status import CalibrationStatus
+from rig.live.keys import LEAVE, MARK, RECORD, TARE, Keys, no_keys
+from rig.live.recorder import LiveRecorder
 from rig.live.replay import EstimateStream
 from rig.motion import motion_of
 from rig.protocol import RunPlan
@@ -22,6 +28,8 @@ def session_blocks(
     open_transport: Callable[[], Transport],
     plans: Sequence[RunPlan],
     estimator: EstimateStream | None,
+    keys: Keys = no_keys,
+    folder: Path = Path("logs"),
 ) -> Iterator[SampleBlock]:
     """Open the rig, take its zeros, and yield what it measures until closed.
 
@@ -32,14 +40,69 @@ def session_blocks(
         open_transport: Opens the way to the logger.
         plans: Runs to play one after the other; without any, the rig is only watched.
         estimator: A stream that has seen nothing yet; None for none.
+        keys: Keys pressed; see `rig.live.keys`.
+        folder: Where recordings go that a key starts.
     """
     with Session(config, open_transport()) as session:
         session.take_zeros(ZERO_S)
         if plans:
             session.settle()
             session.take_zeros(ZERO_S)
-        for reading in _readings(session, plans):
-            yield _block(session, reading, estimator)
+        calibrations = CalibrationStatus(config, session.calibrations.name)
+        with closing(_Hand(session, keys, folder)) as hand:
+            for reading in _readings(session, plans):
+                hand.obey(reading)
+                if hand.leaves:
+                    return
+                block = _block(session, reading, estimator)
+                said = (*block.devices, calibrations.of(reading), *hand.status())
+                yield replace(block, devices=said)
+
+
+class _Hand:
+    """What keys do to a session: tare, mark, record, leave."""
+
+    def __init__(self, session: Session, keys: Keys, folder: Path) -> None:
+        self._session = session
+        self._keys = keys
+        self._recorder = LiveRecorder(session, folder)
+        self._said = ""
+        self.leaves = False
+
+    def obey(self, reading: Reading) -> None:
+        """Do what the keys pressed since the last reading ask for, and record."""
+        for key in self._keys():
+            if key == LEAVE:
+                self.leaves = True
+            elif key == TARE:
+                self._tare(reading)
+            elif key == RECORD:
+                self._recorder.stop() if self._recorder.is_on else self._recorder.start()
+                self._said = ""
+            elif key == MARK:
+                self._recorder.mark()
+                self._said = "" if self._recorder.is_on else "no recording to mark: r starts one"
+        self._recorder.write(reading)
+
+    def status(self) -> tuple[DeviceStatus, ...]:
+        """Return what a person should see of it."""
+        said = ", ".join(part for part in (self._recorder.said, self._said) if part)
+        if not said:
+            return ()
+        return (DeviceStatus("recording", "on" if self._recorder.is_on else "off", said),)
+
+    def close(self) -> None:
+        """Close a log that is open."""
+        self._recorder.stop()
+
+    def _tare(self, reading: Reading) -> None:
+        if reading.armed:
+            self._said = "no tare while the rig moves"
+        elif self._recorder.is_on:
+            self._said = "no tare in a recording: its zeros are written at its start"
+        else:
+            self._session.take_zeros(ZERO_S)
+            self._said = "tared"
 
 
 def _readings(session: Session, plans: Sequence[RunPlan]) -> Iterator[Reading]:

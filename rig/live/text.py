@@ -25,6 +25,8 @@ STATES = {
     "ok": ("●", "good"),
     "armed": ("●", "good"),
     "disarmed": ("○", "quiet"),
+    "on": ("●", "bad"),
+    "off": ("○", "quiet"),
     "stale": ("▲", "warning"),
     "suspect": ("▲", "warning"),
     "fault": ("✖", "bad"),
@@ -74,6 +76,13 @@ def tip_force_n(reading: Reading, value: Value, lever_m: float) -> float | None:
     if reading.channel != TIP_CHANNEL or value.number is None:
         return None
     return value.number / lever_m
+
+
+def interval(half_width: float | None, unit: str) -> str:
+    """Return the 95 % interval of an estimate in words; empty where it is not known."""
+    if half_width is None:
+        return ""
+    return f" ±{with_unit(Value(half_width), unit)}"
 
 
 def error_rms(reading: Reading) -> str:

@@ -41,12 +41,14 @@ class View:
         title: What is being shown: a session's or a recording's name.
         lever_m: Lever arm from the jaw's axis to its tip, m.
         footer: What a person can do.
+        half_width: Half of the main estimate's 95 % interval, SI; None where it is not known.
     """
 
     snapshot: Snapshot
     title: str
     lever_m: float
     footer: str = "Ctrl-C leaves"
+    half_width: float | None = None
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield one line of text after the other, none wider than the terminal."""
@@ -59,7 +61,10 @@ class View:
     def lines(self, width: int, height: int) -> list[Text]:
         """Return the display's lines, at most `height` of them if the terminal is not tiny."""
         snapshot, main = self.snapshot, self.snapshot.readings[0]
-        above = [_header(snapshot, self.title, width), *_headline(main, self.lever_m, width)]
+        above = [
+            _header(snapshot, self.title, width),
+            *_headline(main, self.lever_m, width, self.half_width),
+        ]
         above += [_other(reading) for reading in snapshot.readings[1:]]
         if snapshot.flagged:
             seen = words.flagged(snapshot.flagged)
@@ -88,12 +93,17 @@ def _header(snapshot: Snapshot, title: str, width: int) -> Text:
     return line
 
 
-def _headline(reading: Reading, lever_m: float, width: int) -> Iterator[Text]:
+def _headline(
+    reading: Reading, lever_m: float, width: int, half_width: float | None = None
+) -> Iterator[Text]:
     """Yield the main number in large digits, and what belongs to it."""
     source, value = words.main_value(reading)
     name = _styled(f"{words.name_of(reading.channel)}, {source}  ", "title")
     style = STYLES["warning"] if value.number is None else STYLES[source]
-    number = Text(words.with_unit(value, reading.unit), style=style, no_wrap=True)
+    shown = words.with_unit(value, reading.unit)
+    if source == "estimate" and value.number is not None:
+        shown += words.interval(half_width, reading.unit)
+    number = Text(shown, style=style, no_wrap=True)
     if name.cell_len + number.cell_len <= width:
         yield name.append_text(number)
     else:

@@ -81,7 +81,7 @@ class JsonWriter:
 
     def frame(self, snapshot: Snapshot) -> None:
         """Write an object of kind `frame`."""
-        self._emit(json_frame(snapshot, self._options.lever_m))
+        self._emit(json_frame(snapshot, self._options.lever_m, self._options.half_width))
 
     def summary(self, summary: Summary) -> None:
         """Write an object of kind `summary`."""
@@ -111,7 +111,8 @@ class PlainWriter:
 
     def frame(self, snapshot: Snapshot) -> None:
         """Write one line."""
-        _say(self._console, plain_line(snapshot, self._options.lever_m))
+        options = self._options
+        _say(self._console, plain_line(snapshot, options.lever_m, options.half_width))
 
     def summary(self, summary: Summary) -> None:
         """Write what the stream came to."""
@@ -169,7 +170,8 @@ class DisplayWriter:
                 self._console.control(END_FRAME)
 
     def _view(self, snapshot: Snapshot) -> View:
-        return View(snapshot, self._options.title, self._options.lever_m)
+        options = self._options
+        return View(snapshot, options.title, options.lever_m, options.footer, options.half_width)
 
 
 def _say(console: Console, line: str) -> None:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.linear import CalibrationSet
 from rig.errors import UsageError
 from rig.log.reader import LogFile, Topic, read_log
+from rig.log.recalibrate import recalibrated
 from rig.log.writer import PART_SUFFIX
 
 Columns = dict[str, NDArray[np.generic]]
@@ -35,6 +38,7 @@ def export_log(
     topic: str | None = None,
     *,
     force: bool = False,
+    calibrations: CalibrationSet | None = None,
 ) -> list[Path]:
     """Export a log, one file for each topic.
 
@@ -47,6 +51,7 @@ def export_log(
         out: File to write, with one topic; else the folder to write to. Beside the log when None.
         topic: The one topic to export; all when None.
         force: Overwrite files that are there.
+        calibrations: Make the SI samples again from the raw counts with these; as recorded if None.
 
     Returns:
         The files written.
@@ -56,7 +61,11 @@ def export_log(
         UsageError: The log has no such topic.
         DamagedLogError: The log is damaged.
     """
-    log = read_log(path, None if topic is None else [topic])
+    log = read_log(path, None if topic is None or calibrations is not None else [topic])
+    if calibrations is not None:
+        log = recalibrated(log, calibrations)
+    if topic is not None:
+        log = replace(log, topics={n: t for n, t in log.topics.items() if n == topic})
     if not log.topics:
         raise UsageError(f"{path} has no topics to export.")
     targets = _targets(log, export_format, out, single=topic is not None)

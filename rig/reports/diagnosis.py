@@ -18,10 +18,7 @@ from rig.reports.provenance import Provenance
 from rig.reports.render import render
 from rig.reports.table import TextTable
 
-NO_NEXT = (
-    "None is proposed: choosing the experiment that tells rivals apart needs a simulation of the"
-    " declared model with each rival in it, which this version does not do."
-)
+NO_NEXT = "None is proposed: there are no rivals to tell apart."
 CONFIDENCE = (
     "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
     " gain is real and general; it has not been calibrated on known cases."
@@ -65,6 +62,27 @@ def _claim(finding: Finding) -> str:
     return "something is missing, and these runs do not tell what"
 
 
+def next_sentence(diagnosis: Diagnosis) -> str:
+    """Return what to record next and why."""
+    proposed = diagnosis.next_experiment
+    if proposed is None:
+        return NO_NEXT
+    rivals = (
+        " from ".join(proposed["between"][:2])
+        if len(proposed["between"]) == 2
+        else (", ".join(proposed["between"]) + " from each other")
+    )
+    if proposed["protocol"] is None:
+        return f"To tell {rivals}: {proposed['description']}."
+    others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())
+    return (
+        f"To tell {rivals}, record {proposed['name']!r}: {proposed['description']}"
+        f" ({proposed['seconds']:.0f} s). What the worse rival cannot imitate there is"
+        f" {proposed['discrimination']:.3g} times the variance of the noise; of the other"
+        f" experiments on the menu: {others}."
+    )
+
+
 def page(done: Diagnosed, provenance: Provenance) -> str:
     """Return the page of HTML."""
     diagnosis = done.diagnosis
@@ -88,7 +106,7 @@ def page(done: Diagnosed, provenance: Provenance) -> str:
             "figures": drawn,
             "tables": tables(done),
             "limits": [*diagnosis.notes, CONFIDENCE],
-            "next_experiment": NO_NEXT,
+            "next_experiment": next_sentence(diagnosis),
             "provenance": provenance,
         },
     )
@@ -120,8 +138,8 @@ def _errors(diagnosis: Diagnosis) -> TextTable:
         "Error on the confirm runs",
         columns,
         rows,
-        "Root mean square over the samples in motion; each run's mean removed, then with the means"
-        " left in."
+        "Root mean square over all valid samples, those at rest too; each run's mean removed, then"
+        " with the means left in."
         " Ratio: 95 % interval of a bootstrap over runs.",
     )
 

@@ -193,3 +193,28 @@ def bars(
         ax.set_ylabel(unit)
         ax.margins(x=0.01)
     return _drawn(figure, caption)
+
+
+def scattered(
+    series: Mapping[str, tuple[FloatArray, FloatArray]], x_label: str, y_label: str, caption: str
+) -> Markup:
+    """Draw points, one colour a series, and a line at zero; the names where there are few.
+
+    Args:
+        series: Name to x and y, each of shape (n,).
+        x_label: Name and unit of x.
+        y_label: Name and unit of y.
+        caption: What is seen.
+    """
+    figure, (ax,) = _axes(7.2, 2.6)
+    with mpl.rc_context(_STYLE):
+        for number, (name, (x, y)) in enumerate(series.items()):
+            step = max(1, len(x) // 400)
+            colour = COLOURS[number % len(COLOURS)]
+            ax.plot(x[::step], y[::step], ".", markersize=3, color=colour, label=name)
+        ax.axhline(0, color=_INK, linewidth=0.6)
+        ax.set_xlabel(x_label)
+        ax.set_ylabel(y_label)
+        if len(series) <= len(COLOURS):
+            _legend_above(ax)
+    return _drawn(figure, caption)

@@ -16,7 +16,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from drivers.teensy import control
-from drivers.teensy import limits as board_limits
+from drivers.teensy import guard as board_guard
+from drivers.teensy.guard import COLUMNS, Drive
 from rig.errors import UsageError
 from rig.simulation import (
     hidden,
@@ -33,9 +34,6 @@ from rig.simulation.parameters import PlantParameters, SensorParameters
 REFERENCE_START_COUNT = 1366
 """Spindle count at which the reference campaign's runs start: 60 degrees open."""
 
-UNBOUNDED = np.array([2**31 - 1] * 4 + [-(2**31), 2**31 - 1], np.int32)
-"""Limits that no count is beyond, in the order of `drivers.teensy.limits`."""
-
 
 class BenchInputError(UsageError):
     """The bench was asked for something it cannot run."""
@@ -51,7 +49,7 @@ def _fingerprint() -> str:
     digest = hashlib.sha256()
     for module in (
         control,
-        board_limits,
+        board_guard,
         hidden,
         hidden_cable,
         hidden_drive,
@@ -107,34 +105,19 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         first_tick,
         target,
         load_ma,
-        armed,
+        guard,
+        limits,
         control_state,
         gains,
-        bounds,
         rows,
     ):
         _ = source
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
-            command, load = 0, 0
-            if armed:
-                armed = not board_limits.beyond_limits(
-                    bounds,
-                    row[sensors.SPINDLE],
-                    row[sensors.PROXIMAL],
-                    row[sensors.DISTAL],
-                    row[sensors.CURRENT],
-                )
-            if armed:
-                command = control.control_tick(
-                    control_state, gains, target[k], row[sensors.SPINDLE], row[sensors.MOTOR]
-                )
-                load = load_ma[k]
-            row[sensors.COMMAND_E4] = command
-            row[sensors.LOAD_MA] = load
-            current = -p.command_full_scale_a * 1e-4 * command
-            plant.step_tick(state, p, effects, current, 1e-3 * load)
+            board_guard.drive_tick(row, target[k], load_ma[k], guard, limits, control_state, gains)
+            current = -p.command_full_scale_a * 1e-4 * row[sensors.COMMAND_E4]
+            plant.step_tick(state, p, effects, current, 1e-3 * row[sensors.LOAD_MA])
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
@@ -201,25 +184,19 @@ class SimulatedBench:
         ticks: int,
         target: NDArray[np.int32],
         load_ma: NDArray[np.int32],
-        armed: bool,
-        control_state: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        limits: NDArray[np.int32] | None = None,
+        drive: Drive,
     ) -> NDArray[np.int32]:
-        """Run closed-loop ticks with the controller of `drivers.teensy.control`.
+        """Run closed-loop ticks with the board's guard and controller of `drivers.teensy.guard`.
 
         Args:
             ticks: Number of ticks of 1 ms.
             target: Target of the spindle, encoder counts, shape (ticks,).
             load_ma: Current of the load motor, mA, shape (ticks,).
-            armed: When false, command and load are 0 and the controller does not run.
-            control_state: State of the controller, changed in place.
-            gains: Gains of the controller, shape (5,).
-            limits: Limits as in `drivers.teensy.limits`, shape (6,); none when None. From the first
-                tick on whose counts are beyond them, command and load are 0.
+            drive: The board's state, gains and limits, changed in place. From the tick on whose
+                counts cross a limit, the drive is in its safe state.
 
         Returns:
-            Counts with raw signs, shape (ticks, 9), int32, columns as in `rig.simulation.sensors`.
+            Counts with raw signs, shape (ticks, 11), int32, columns as in `drivers.teensy.guard`.
 
         Raises:
             BenchInputError: A shape does not fit.
@@ -229,7 +206,7 @@ class SimulatedBench:
                 raise BenchInputError(
                     f"{name} has shape {array.shape}.", f"{ticks} ticks need shape ({ticks},)."
                 )
-        rows = np.empty((ticks, 9), np.int32)
+        rows = np.empty((ticks, COLUMNS), np.int32)
         _run_with_controller(
             self._state,
             self._constants,
@@ -239,10 +216,7 @@ class SimulatedBench:
             self.ticks_done,
             np.ascontiguousarray(target, np.int32),
             np.ascontiguousarray(load_ma, np.int32),
-            armed,
-            control_state,
-            np.ascontiguousarray(gains, np.float64),
-            UNBOUNDED if limits is None else np.ascontiguousarray(limits, np.int32),
+            *drive.arrays,
             rows,
         )
         self.ticks_done += ticks

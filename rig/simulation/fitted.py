@@ -15,14 +15,14 @@ DECLARED_PLANT = PlantParameters(
     cable_load_friction_ratio=0.0,
     spindle_friction_n_m=0.04,
     jaw_friction_n_m=0.0,
-    jaw_viscous_n_m_s_rad=5e-5,
+    jaw_viscous_n_m_s_rad=0.0,
     motor_creep_speed_rad_s=2.0,
     spindle_creep_speed_rad_s=0.15,
 )
 """A rig of which the declared balances say everything.
 
 The default plant, as measured, holds three things they do not: cable friction in proportion to the
-load; friction of the jaw in front of the sensor, which the cable's stretch feels and the torque
+load; losses of the jaw in front of the sensor, which the cable's stretch feels and the torque
 sensor at the jaw does not; and friction that sticks, which at a reversal holds any torque until the
 gear is wound up. Here all of it is plain friction of the spindle that changes sign smoothly.
 """
@@ -87,11 +87,14 @@ def _with_gearbox(model: Model, plant: PlantParameters) -> PlantParameters:
 
 
 def _with_stretch(model: Model, plant: PlantParameters) -> PlantParameters:
-    """Read ratio x spindle angle - jaw angle = torque / stiffness; the ratio may be geometry."""
+    """Read ratio x spindle angle - jaw angle = torque / stiffness; the ratio may be geometry.
+
+    The stretch or the jaw's angle may be the target: torque adds to the one, takes from the other.
+    """
     ratio = _slope(model, ("spindle_angle",))
     if ratio is not None:
         plant = replace(plant, cable_ratio=ratio)
-    slope = _slope(model, ("torque", "load"))
+    slope = _slope(model, ("torque", "load"), -1 if model.target == "jaw_angle_rad" else 1)
     if slope is None:
         return plant
     return replace(plant, cable_stiffness_n_m_rad=1.0 / slope)
@@ -144,14 +147,17 @@ def _positive(model: Model, effect: str, name: str) -> float:
     return value
 
 
-def _slope(model: Model, words: Sequence[str]) -> float | None:
-    """Return the amplitude of the term with one input, one whose name holds one of the words."""
+def _slope(model: Model, words: Sequence[str], side: int = 1) -> float | None:
+    """Return the amplitude of the term with one input, one whose name holds one of the words.
+
+    It is positive on its side of the balance.
+    """
     for term in model.terms:
         names = list(term.channels.values())
         linear = len(names) == 1 and len(term.effect.amplitudes) == 1 and not term.effect.shape
         if not linear or names[0].endswith("_s") or not any(word in names[0] for word in words):
             continue
-        slope = term.weights[0]
+        slope = side * term.weights[0]
         if slope <= 0.0:
             raise DataError(
                 f"The {model.balance} model {model.name!r} makes no plant: "

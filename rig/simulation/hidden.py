@@ -354,3 +354,32 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
         values = [*effect.shape, *(shape.middle for shape in shapes[len(effect.shape) :])]
         rows[place] = [effect.strength, *values, *[0.0] * (2 - len(values))]
     return rows
+
+
+def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
+    """Return what a person asked to hide: effect to strength.
+
+    Args:
+        words: `effect` or `effect=strength`; `none` alone for nothing; one drawn by seed when there
+            are no words.
+        seed: Seed of the draw.
+
+    Raises:
+        UnknownHiddenEffectError: A name is unknown or a strength is no number.
+    """
+    if not words:
+        drawn = draw(seed)
+        return {drawn.name: round(drawn.strength, 3)}
+    if list(words) == ["none"]:
+        return {}
+    found = {}
+    for word in words:
+        name, _, strength = word.partition("=")
+        try:
+            found[name] = float(strength or 1.0)
+        except ValueError as error:
+            raise UnknownHiddenEffectError(
+                f"{strength!r} is no strength.", "Write for example motor_ripple=0.5."
+            ) from error
+    table(HiddenEffect(name, strength) for name, strength in found.items())
+    return found

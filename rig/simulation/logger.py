@@ -12,7 +12,11 @@ UNPACED_STEP_S = 0.2
 
 
 def open_simulated_logger(
-    simulation: SimulationSection, url: str = "sim://", pace: float | None = None
+    simulation: SimulationSection,
+    url: str = "sim://",
+    pace: float | None = None,
+    watchdog_s: float = 0.25,
+    step_s: float | None = None,
 ) -> SimulatedTransport:
     """Return the transport of a simulated rig.
 
@@ -20,6 +24,28 @@ def open_simulated_logger(
         simulation: Seed, spread, hidden effects, and whether the compiled firmware is in the loop.
         url: Name for messages.
         pace: Virtual seconds a real second, None for as fast as possible.
+        watchdog_s: Patience of the board with a silent host; time moves in smaller steps than that.
+        step_s: Longest virtual time between looks at the board; a choice of its own if None.
+
+    Raises:
+        UnknownHiddenEffectError: A hidden effect has no such name.
+    """
+    plant, sensors, effects = plant_and_sensors(simulation)
+    bench = SimulatedBench(plant, sensors, effects, simulation.seed)
+    if uses_firmware(simulation):
+        board: Board = FirmwareBoard(bench)
+    else:
+        board = TeensyFake(bench)
+    # nobody watches a rig that is faster than real time, so it may move in larger steps
+    usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
+    step_s = min(step_s or usual_s, 0.8 * watchdog_s)
+    return SimulatedTransport(board, url, step_s=step_s, pace=pace)
+
+
+def plant_and_sensors(
+    simulation: SimulationSection,
+) -> tuple[parameters.PlantParameters, parameters.SensorParameters, list[hidden.HiddenEffect]]:
+    """Return the plant, the sensors and the hidden effects of a simulated rig.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
@@ -31,16 +57,7 @@ def open_simulated_logger(
     if simulation.spread:
         plant = parameters.vary(plant, simulation.seed, simulation.spread)
         sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
-    bench = SimulatedBench(plant, sensors, effects, simulation.seed)
-    if uses_firmware(simulation):
-        return _transport(FirmwareBoard(bench), url, pace)
-    return _transport(TeensyFake(bench), url, pace)
-
-
-def _transport(board: Board, url: str, pace: float | None) -> SimulatedTransport:
-    # nobody watches a rig that is faster than real time, so it may move in larger steps
-    step_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
-    return SimulatedTransport(board, url, step_s=step_s, pace=pace)
+    return plant, sensors, effects
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:

@@ -16,6 +16,7 @@ for dry friction; J. J. Moreau, "Unilateral contact and dry friction in finite f
 1988). Nothing in the loop allocates and floating point is strict, so results repeat to the bit.
 """
 
+import math
 from collections import namedtuple
 from dataclasses import astuple, fields
 from typing import Any
@@ -84,6 +85,10 @@ def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray
     return state
 
 
+FULL = 6.0
+"""Creep speeds at which friction is taken to be full: tanh is there to 1e-5."""
+
+
 @numba.njit()
 def clip(value: float, limit: float) -> float:
     """Return the value brought into plus and minus the limit."""
@@ -95,7 +100,7 @@ def braking(speed: float, most: float, creep_speed: float) -> float:
     """Return the speed that friction takes in a step: all of it at most, or in proportion to it.
 
     With a creep speed the friction is its level times tanh(speed after the step / creep speed),
-    the tangent as its Pade approximant, solved by Newton steps.
+    solved by Newton steps, which come from below and settle.
 
     Args:
         speed: Speed the other torques would give.
@@ -104,17 +109,14 @@ def braking(speed: float, most: float, creep_speed: float) -> float:
     """
     if creep_speed <= 0.0:
         return clip(speed, most)
-    if abs(speed) > most + 3.0 * creep_speed:
+    if abs(speed) > most + FULL * creep_speed:
         return clip(speed, most)
     per_creep = 1.0 / creep_speed
     gain = most * per_creep
     after = speed / (1.0 + gain)
-    for _ in range(2):
-        x = min(max(after * per_creep, -3.0), 3.0)
-        per_below = 1.0 / (3.0 + x * x)
-        root = (9.0 - x * x) * per_below / 3.0
-        share = x * (27.0 + x * x) * per_below / 9.0
-        after -= (after + most * share - speed) / (1.0 + gain * root * root)
+    for _ in range(3):
+        share = math.tanh(after * per_creep)
+        after -= (after + most * share - speed) / (1.0 + gain * (1.0 - share * share))
     return clip(speed - after, most)
 
 

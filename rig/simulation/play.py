@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy import control
+from drivers.teensy.guard import Drive
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import REFERENCE_GAINS
 from rig.simulation.sensors import TURN_RAD, columns_of
@@ -27,6 +27,5 @@ def play(
     per_rad = bench.sensors.spindle_count_per_turn / TURN_RAD
     target = np.round(-target_angle_rad * per_rad).astype(np.int32)
     load_ma = np.round(1e3 * load_command_a).astype(np.int32)
-    gains = np.array(REFERENCE_GAINS)
-    counts = bench.advance(target.size, target, load_ma, True, control.new_state(), gains)
+    counts = bench.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
     return columns_of(counts, target, bench.sensors)

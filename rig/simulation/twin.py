@@ -6,8 +6,8 @@ of the method: the null of a parametric bootstrap (Efron and Tibshirani, "An Int
 Bootstrap", 1993, chapter 6).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class Reference:
         start_rad: Where the spindle stood at the first sample.
         started_at_ns: Start of the run, or None.
         instrument: Identity of the instrument.
+        others: Recorded channels that no plant simulates, such as a temperature; twins share them.
     """
 
     plan: RunPlan
@@ -59,6 +60,7 @@ class Reference:
     start_rad: float
     started_at_ns: int | None
     instrument: Instrument
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,22 @@ class Twin:
     plant: PlantParameters
     sensors: SensorParameters
     references: tuple[Reference, ...]
+
+    def play(self, plan: RunPlan, seed: int) -> Recording:
+        """Return one simulated run of another plan: the same rig, another motion and load."""
+        size = plan.target_angle_rad.size
+        first = self.references[0]
+        reference = Reference(
+            plan=plan,
+            time_s=np.arange(size) / SAMPLE_RATE_HZ,
+            tick=np.arange(size),
+            flags=np.zeros(size, np.uint8),
+            start_rad=float(plan.target_angle_rad[0]),
+            started_at_ns=None,
+            instrument=first.instrument,
+            others={name: np.full(size, x.mean()) for name, x in first.others.items()},
+        )
+        return simulate(reference, self.plant, self.sensors, seed)
 
     def __call__(self, seed: int) -> tuple[Recording, ...]:
         """Return one campaign's recordings; the same seed gives the same samples."""
@@ -159,6 +177,7 @@ def reference_of(run: Recording) -> Reference:
         start_rad=float(run["spindle_angle_rad"][0]),
         started_at_ns=run.started_at_ns,
         instrument=run.instrument,
+        others={name: values for name, values in run.columns.items() if name not in NEEDED},
     )
 
 
@@ -180,7 +199,7 @@ def simulate(
     return Recording(
         reference.plan.name,
         reference.time_s,
-        {name: values[logged] for name, values in played.items()},
+        {**reference.others, **{name: values[logged] for name, values in played.items()}},
         flags=reference.flags,
         conditions=reference.plan.conditions,
         rig="simulated twin",

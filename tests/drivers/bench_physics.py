@@ -6,8 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.control import control_tick
-from drivers.teensy.limits import beyond_limits
+from drivers.teensy.guard import COLUMNS, Drive, drive_tick
 
 START_SPINDLE = 1366
 MOTOR, VELOCITY, CURRENT_MA, LOAD_MA, TICK = range(5)
@@ -42,15 +41,12 @@ def step(state, command_e4, load_ma):
 
 
 @numba.njit  # not cached: the cache does not see changes in the functions of other files
-def run(state, rows, target, load_ma, armed, control_state, gains, limits):
+def run(state, rows, target, load_ma, guard, limits, control_state, gains):
     """Run closed-loop ticks with the controller inside."""
     for k in range(rows.shape[0]):
         row = rows[k]
         sample(state, row)
-        if armed and beyond_limits(limits, row[1], row[3], row[4], row[5]):
-            armed = False
-        row[7] = control_tick(control_state, gains, target[k], row[1], row[0]) if armed else 0
-        row[8] = load_ma[k] if armed else 0
+        drive_tick(row, target[k], load_ma[k], guard, limits, control_state, gains)
         step(state, row[7], row[8])
 
 
@@ -65,13 +61,10 @@ class PlainBench:
         ticks: int,
         target: NDArray[np.int32],
         load_ma: NDArray[np.int32],
-        armed: bool,
-        control_state: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        limits: NDArray[np.int32],
+        drive: Drive,
     ) -> NDArray[np.int32]:
-        rows = np.empty((ticks, 9), np.int32)
-        run(self.state, rows, target, load_ma, armed, control_state, gains, limits)
+        rows = np.empty((ticks, COLUMNS), np.int32)
+        run(self.state, rows, target, load_ma, *drive.arrays)
         return rows
 
     def advance_with_board(
@@ -107,18 +100,12 @@ class ScriptedBench:
         ticks: int,
         target: NDArray[np.int32],
         load_ma: NDArray[np.int32],
-        armed: bool,
-        control_state: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        limits: NDArray[np.int32],
+        drive: Drive,
     ) -> NDArray[np.int32]:
-        rows = np.zeros((ticks, 9), np.int32)
+        rows = np.zeros((ticks, COLUMNS), np.int32)
         for k, row in enumerate(rows):
             row[:7] = self.next_inputs()
-            armed = armed and not beyond_limits(limits, row[1], row[3], row[4], row[5])
-            if armed:
-                row[7] = control_tick(control_state, gains, target[k], row[1], row[0])
-                row[8] = load_ma[k]
+            drive_tick(row, target[k], load_ma[k], *drive.arrays)
         return rows
 
     def advance_with_board(

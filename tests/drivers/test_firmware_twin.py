@@ -1,5 +1,6 @@
 """The C++ core and the Python fake answer the same commands with the same bytes."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError
-from drivers.teensy.protocol import Kind, Limits
+from drivers.teensy.protocol import Kind, Limits, SafeState, Trip
 from tests.drivers.bench_physics import PlainBench, ScriptedBench
 
 GAINS = np.array([20.0, 0.05, -1.0, 0.2, 10000.0])
@@ -63,9 +64,10 @@ def assert_twins(
     make_bench: Callable[[], PlainBench | ScriptedBench] = PlainBench,
 ) -> bytes:
     """Run a script on both and return the bytes they agree on."""
-    fake = answers(TeensyFake(make_bench(), start_tick_us=start_tick_us), script)
-    core = answers(
-        FirmwareBoard(make_bench(), start_tick_us=start_tick_us, library=library), script
+    board = FirmwareBoard(make_bench(), start_tick_us=start_tick_us, library=library)
+    core = answers(board, script)
+    fake = answers(
+        TeensyFake(make_bench(), start_tick_us=start_tick_us, build_hash=board.build_hash), script
     )
     for index, (ours, theirs) in enumerate(zip(fake, core, strict=True)):
         assert ours == theirs, f"action {index}: {script[index]!r}"
@@ -76,6 +78,15 @@ def statuses(data: bytes) -> set[int]:
     frames = FrameStream(protocol.SAMPLE_DTYPE.itemsize).feed(data)
     assert frames.bad == 0
     return set(np.unique(frames.payloads.view(protocol.SAMPLE_DTYPE)["status"]).tolist())
+
+
+def assert_tripped(data: bytes, trip: Trip) -> None:
+    latch = (
+        protocol.STATUS_WATCHDOG_TRIPPED
+        if trip is Trip.HOST_SILENT
+        else protocol.STATUS_LIMIT_TRIPPED
+    )
+    assert any(s >> protocol.TRIP_SHIFT == trip and s & latch for s in statuses(data))
 
 
 def test_a_whole_session(library: Path) -> None:
@@ -90,7 +101,7 @@ def test_the_watchdog(library: Path) -> None:
     script: list[Action] = [command(Kind.HELLO, 1), command(Kind.START, 2), arm(3)]
     script += [setpoints(4, sweep(0)), 249, ping(5, 0), 250, 1, 1, 10, setpoints(6, sweep(0))]
     script += [arm(7), 5]
-    assert protocol.STATUS_WATCHDOG_TRIPPED in statuses(assert_twins(script, library))
+    assert_tripped(assert_twins(script, library), Trip.HOST_SILENT)
 
 
 @pytest.mark.parametrize("limits", [TIGHT, Limits(2**31 - 1, 900, 2**31 - 1, 2**31 - 1, 0, 1400)])
@@ -98,7 +109,8 @@ def test_a_limit(library: Path, limits: Limits) -> None:
     far = [limits.min_spindle] * 100
     script: list[Action] = [command(Kind.HELLO, 1), command(Kind.START, 2), arm(3, limits)]
     script += [setpoints(4, far), 100, setpoints(5, far), 30, arm(6, limits), 3]
-    assert protocol.STATUS_LIMIT_TRIPPED in statuses(assert_twins(script, library))
+    seen = statuses(assert_twins(script, library))
+    assert any(status & protocol.STATUS_LIMIT_TRIPPED for status in seen)
 
 
 def test_saturation_and_a_host_that_does_not_read(library: Path) -> None:
@@ -115,7 +127,7 @@ def test_saturation_and_a_host_that_does_not_read(library: Path) -> None:
 EDGES = {
     "motor": [0],
     "spindle": [-4001, -4000, 4000, 4001],
-    "jaw": [-(2**31), 2**31 - 1],
+    "jaw": [-(2**31) + 1, 2**31 - 1],
     "proximal": [-32769, -32768, -32767, -5801, -5800, 5800, 5801, 32766, 32767, 32768],
     "distal": [-32769, -32768, -32767, -30001, -30000, 30000, 30001, 32767],
     "current": [-32768, -1501, -1500, 1500, 1501, 32766, 32767],
@@ -159,6 +171,117 @@ def test_the_controllers_round_alike(
     assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
 
 
+HELD = {"safe_state": SafeState.HOLD, "hold_command_e4": 300}
+GUARDS = {
+    Trip.OVER_CURRENT: ({"max_current": 1500}, "current", [1501]),
+    Trip.PROXIMAL_TORQUE: ({"max_proximal": 900}, "proximal", [-901]),
+    Trip.DISTAL_TORQUE: ({"max_distal": 900}, "distal", [901]),
+    Trip.JAW_TRAVEL: ({"min_jaw": -50, "max_jaw": 50}, "jaw", [51]),
+    Trip.OVER_SPEED: ({"max_motor_step": 100}, "motor", [0, 101, 202, 303, 404]),
+    Trip.OVERHEATED: ({"continuous_current": 100, "i2t": 2}, "current", [140, 141] * 40),
+    Trip.STALLED: (
+        {"stall_current": 200, "stall_motion": 3, "stall_ticks": 20},
+        "current",
+        [210, 215] * 30,
+    ),
+    Trip.SENSOR_SATURATED: ({"saturated_ticks": 5}, "proximal", [32767] * 9),
+    Trip.SENSOR_STALE: ({"stale_ticks": 30}, "distal", [7] * 90),
+    Trip.SENSOR_MISSING: ({}, "spindle", [protocol.MISSING]),
+}
+"""For each trip the limits that make it, and a channel's counts that cross them."""
+
+
+def moving_inputs(ticks: int) -> np.ndarray:
+    """Counts of a rig at work: the motor moves, the sensors make noise."""
+    tick = np.arange(ticks)
+    inputs = np.zeros((ticks, 7), np.int32)
+    inputs[:, 0] = 5 * tick
+    inputs[:, 1] = -tick // 4
+    for column in (3, 4, 5):
+        inputs[:, column] = tick * (7 + column) % 23 - 11
+    return inputs
+
+
+def guarded_script(limits: Limits) -> list[Action]:
+    script: list[Action] = [command(Kind.START, 1), arm(2, limits), setpoints(3, [0] * 100), 7]
+    return [*script, 90, ping(4, 0), command(Kind.TRIP, 5), 30, command(Kind.DISARM, 6), 3]
+
+
+@pytest.mark.parametrize("state", [{}, HELD], ids=["release", "hold"])
+@pytest.mark.parametrize("trip", list(GUARDS), ids=lambda trip: trip.name)
+def test_every_guard_trips_alike_with_its_own_code(library: Path, trip: Trip, state: dict) -> None:
+    limits, channel, counts = GUARDS[trip]
+    inputs = moving_inputs(140)
+    column = list(EDGES).index(channel)
+    inputs[10 : 10 + len(counts), column] = counts
+    if trip is Trip.STALLED:
+        inputs[:, 0] = 1000
+    limits = dataclasses.replace(WIDEST, **limits, **state)
+    script = guarded_script(limits)
+    data = assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
+    assert_tripped(data, trip)
+    quiet = moving_inputs(140)
+    data = assert_twins(script, library, make_bench=lambda: ScriptedBench(quiet))
+    assert not any(status >> protocol.TRIP_SHIFT for status in statuses(data))
+
+
+@pytest.mark.parametrize("watchdog_us", [5_000, 50_000, 1_000_000])
+def test_the_watchdogs_patience_is_the_hosts_choice(library: Path, watchdog_us: int) -> None:
+    limits = dataclasses.replace(WIDEST, watchdog_us=watchdog_us, **HELD)
+    script: list[Action] = [command(Kind.START, 1), arm(2, limits), setpoints(3, sweep(0))]
+    script += [watchdog_us // 1000 + 1, 1, 20, command(Kind.TRIP, 4), command(Kind.DISARM, 5), 2]
+    assert_tripped(assert_twins(script, library), Trip.HOST_SILENT)
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.fixed_dictionaries(
+        {
+            "max_motor_step": st.integers(1, 12),
+            "continuous_current": st.integers(0, 12),
+            "i2t": st.integers(0, 20),
+            "stall_current": st.integers(0, 15),
+            "stall_motion": st.integers(0, 20),
+            "stall_ticks": st.integers(1, 40),
+            "saturated_ticks": st.integers(1, 3),
+            "stale_ticks": st.integers(1, 6),
+            "watchdog_us": st.sampled_from([5_000, 40_000, 250_000]),
+            "safe_state": st.sampled_from(list(SafeState)),
+            "hold_command_e4": st.integers(0, 10000),
+            "max_jaw": st.integers(0, 30),
+        }
+    ),
+)
+def test_any_guard_on_any_inputs(library: Path, seed: int, limits: dict) -> None:
+    random = np.random.default_rng(seed)
+    inputs = moving_inputs(200)
+    inputs[:, 0] = np.cumsum(random.integers(-9, 10, 200))
+    inputs[:, 2] = np.cumsum(random.integers(-1, 2, 200))
+    inputs[:, 3:6] = random.choice([-11, 0, 3, 11], (200, 3))
+    for _ in range(3):
+        value = random.choice([protocol.MISSING, 32767, -32768, 2**31 - 1])
+        inputs[random.integers(0, 200), random.integers(0, 7)] = value
+    script = guarded_script(dataclasses.replace(WIDEST, **limits))
+    assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
+
+
+def test_holding_keeps_the_spindle_where_it_was_and_a_second_trip_releases(library: Path) -> None:
+    limits = dataclasses.replace(WIDEST, watchdog_us=20_000, max_proximal=20000, **HELD)
+    inputs = moving_inputs(140)
+    inputs[100, 3] = 20001
+    script: list[Action] = [command(Kind.START, 1), arm(2, limits), setpoints(3, [0] * 100), 130]
+    data = assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
+    samples = FrameStream(42).feed(data).payloads.view(protocol.SAMPLE_DTYPE)[:, 0]
+    holding = (samples["status"] & protocol.STATUS_HOLDING) != 0
+    assert (np.flatnonzero(holding) == np.arange(21, 100)).all()
+    assert len(set(samples["target"][holding].tolist())) == 1
+    assert np.abs(samples["command_e4"][holding]).max() <= HELD["hold_command_e4"]
+    assert (samples["load_ma"][holding] == 0).all()
+    assert (samples["command_e4"][100:] == 0).all()
+    assert {s >> protocol.TRIP_SHIFT for s in samples["status"][21:].tolist()} == {1}
+
+
 def test_refusals(library: Path) -> None:
     nan = GAINS.copy()
     nan[0] = np.nan
@@ -166,6 +289,17 @@ def test_refusals(library: Path) -> None:
         assert_twins([arm(1, gains=gains)], library)
     for limits in (Limits(-1, 0, 0, 0, 0, 0), Limits(0, 0, 0, 0, 1, 0)):
         assert_twins([arm(1, limits)], library)
+    for change in (
+        {"stall_ticks": 0},
+        {"watchdog_us": 4_999},
+        {"watchdog_us": 1_000_001},
+        {"safe_state": 2},
+        {"hold_command_e4": 10_001},
+        {"min_jaw": 1, "max_jaw": 0},
+        {"i2t": -1},
+    ):
+        data = assert_twins([arm(1, dataclasses.replace(WIDEST, **change))], library)
+        assert FrameStream(42).feed(data).others[0][5] == protocol.Result.BAD_VALUE
     full: list[Action] = [setpoints(10 + k, [k] * 100) for k in range(21)]
     assert_twins([arm(1), *full, 7, setpoints(40, [0] * 8), setpoints(41, [0] * 7)], library)
     assert_twins([setpoints(1, [0]), arm(2, TIGHT), setpoints(3, [4001])], library)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from drivers.errors import FrameError
 from drivers.teensy import protocol
-from drivers.teensy.protocol import Ack, Kind, Limits
+from drivers.teensy.protocol import Ack, Kind, Limits, Trip
 
 u16 = st.integers(0, 2**16 - 1)
 i32 = st.integers(-(2**31), 2**31 - 1)
@@ -29,16 +29,29 @@ def test_no_other_frame_has_the_size_of_a_sample() -> None:
 
 def test_the_text_names_every_kind() -> None:
     lines = protocol.layout_text().splitlines()
-    assert [line.split(":")[0] for line in lines[2:-2]] == [f"{k} {k.name}" for k in Kind]
+    assert [line.split(":")[0] for line in lines[2:-3]] == [f"{k} {k.name}" for k in Kind]
 
 
-@given(u16, st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), st.tuples(*[i32] * 6))
+@given(u16, st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), st.tuples(*[i32] * 19))
 def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ...]) -> None:
     payload = protocol.encode_arm(sequence, np.array(gains), Limits(*limits))
     kind, number, fields = protocol.decode(payload)
     assert (kind, number) == (Kind.ARM, sequence)
     assert [float(fields[name]) for name in protocol.GAIN_NAMES] == gains
     assert tuple(int(fields[name]) for name in protocol.LIMIT_NAMES) == limits
+
+
+@given(u16, st.sampled_from(list(Trip)), i32, i32, st.integers(0, 2**32 - 1))
+def test_a_trip_report_comes_back(sequence: int, code: Trip, value: int, limit: int, at: int):
+    payload = protocol.encode_trip_report(sequence, code, 3, value, limit, at, 2**40)
+    report = protocol.decode_trip_report(protocol.decode(payload)[2])
+    assert report == protocol.TripReport(code, "proximal", value, limit, at, 2**32 - 1)
+
+
+def test_an_unknown_trip_is_refused() -> None:
+    fields = protocol.decode(protocol.encode_trip_report(1, 99, 255, 0, 0, 0, 0))[2]
+    with pytest.raises(FrameError, match="99"):
+        protocol.decode_trip_report(fields)
 
 
 @given(u16, st.lists(st.tuples(i32, st.integers(-(2**15), 2**15 - 1)), min_size=1, max_size=100))
@@ -60,7 +73,7 @@ def test_identity_and_pong_come_back() -> None:
     identity = protocol.decode_identity(fields)
     assert identity.serial == "TEENSY-0042"
     assert identity.protocol_hash == protocol.PROTOCOL_HASH
-    assert identity.firmware_version == "0.1.0"
+    assert identity.firmware_version == "0.2.0"
     kind, sequence, pong = protocol.decode(protocol.encode_pong(5, 2**64 - 1, 2**32 - 1))
     assert (kind, sequence) == (Kind.PONG, 5)
     assert (int(pong["token"]), int(pong["tick_us"])) == (2**64 - 1, 2**32 - 1)

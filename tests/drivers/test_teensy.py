@@ -234,7 +234,7 @@ def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
     board = TeensyFake(PlainBench(), protocol_hash=0xDEADBEEF)
     logger = logger_of(board)
     with pytest.raises(
-        ProtocolMismatchError, match=f"deadbeef.*{protocol.PROTOCOL_HASH:08x}.*Flash"
+        ProtocolMismatchError, match=f"deadbeef.*{protocol.PROTOCOL_HASH:08x}.*rig firmware flash"
     ):
         logger.arm(GAINS, WIDEST)
     logger.close()

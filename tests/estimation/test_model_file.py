@@ -55,10 +55,18 @@ def test_what_is_written_is_read_back(model):
 
 
 def test_shipped_models_are_declared_and_not_fitted():
-    assert set(shipped()) == {"grip", "linear", "motor"}
-    for name, target in (("grip", "distal"), ("linear", "proximal"), ("motor", "proximal")):
+    targets = {
+        "cable": "proximal_torque_n_m",
+        "gearbox": "gearbox_differential_rad",
+        "grip": "distal_torque_n_m",
+        "linear": "proximal_torque_n_m",
+        "motor": "proximal_torque_n_m",
+        "stretch": "jaw_angle_rad",
+    }
+    assert targets.keys() <= shipped().keys()
+    for name, target in targets.items():
         model = read(Path(name))
-        assert (model.name, model.target) == (name, f"{target}_torque_n_m")
+        assert (model.name, model.target) == (name, target)
         assert not model.is_fitted
     assert [term.sign for term in read(Path("motor")).terms] == [1, -1, -1, -1, 1]
 
@@ -110,5 +118,5 @@ def test_what_is_wrong_is_named(old, new, message):
 
 
 def test_a_missing_file_names_the_shipped_ones(tmp_path):
-    with pytest.raises(ModelFileError, match="grip, linear, motor"):
+    with pytest.raises(ModelFileError, match="grip, linear, motor, stretch"):
         read(tmp_path / "none.toml")

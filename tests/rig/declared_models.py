@@ -1,67 +1,17 @@
-"""The four declared balances of the rig, of catalogue effects, and a campaign to fit them on."""
+"""The four declared balances of the rig, as shipped, and a campaign to fit them on."""
 
-from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
-from estimation.campaign import Campaign
-from estimation.effects import effect
-from estimation.model import Model, Term
+from estimation import model_file
 from estimation.recording import Recording
+from rig.diagnosis.run import REFERENCE_RIG
 from rig.protocol import load_protocol
 from rig.simulation.parameters import PlantParameters, SensorParameters
 from rig.simulation.twin import reference_of, simulate
 
-STRETCH = "cable_stretch_rad"
-
-
-def term(name: str, sign: int = 1, **channels: str) -> Term:
-    return Term(effect(name), sign, channels)
-
-
-MOTOR = Model(
-    "motor",
-    "motor",
-    "proximal_torque_n_m",
-    (
-        term("motor.torque_constant"),
-        term("inertia.missing", -1),
-        term("friction.viscous", -1),
-        term("friction.coulomb", -1),
-        term("sensor.offset"),
-    ),
-)
-GEARBOX = Model(
-    "gearbox",
-    "gearbox",
-    "gearbox_differential_rad",
-    (term("spring.position", position="proximal_torque_n_m"), term("sensor.offset")),
-)
-CABLE = Model(
-    "cable",
-    "cable",
-    "proximal_torque_n_m",
-    (
-        term("transmission.ratio"),
-        term("friction.viscous", speed="spindle_velocity_rad_s"),
-        term("friction.coulomb", speed="spindle_velocity_rad_s"),
-        term("inertia.missing", acceleration="spindle_acceleration_rad_s2"),
-        term("sensor.offset"),
-    ),
-)
-STRETCHED = Model(
-    "stretch",
-    "stretch",
-    STRETCH,
-    (term("spring.position", position="distal_torque_n_m"), term("sensor.offset")),
-)
-
-
-def with_stretch(recordings: Iterable[Recording], ratio: float) -> Campaign:
-    return Campaign.of(
-        r.with_columns(**{STRETCH: ratio * r["spindle_angle_rad"] - r["jaw_angle_rad"]})
-        for r in recordings
-    )
+MODELS = [model_file.read(Path(name)) for name in REFERENCE_RIG]
 
 
 def record(

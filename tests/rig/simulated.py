@@ -25,7 +25,7 @@ def simulated(**simulation: object) -> Config:
 
 def transport(config: Config) -> SimulatedTransport:
     """A transport to the configured simulated rig."""
-    return open_simulated_logger(config.simulation)
+    return open_simulated_logger(config.simulation, watchdog_s=config.safety.watchdog_s)
 
 
 class Wrapped:

@@ -103,3 +103,30 @@ def test_a_log_beyond_the_calibrated_range_is_told(rig, tmp_path):
     assert code == 0
     assert [v["rule"] for v in said["verdicts"]] == ["out_of_range"]
     assert rig("cal", "check")[1]["verdicts"] == []
+
+
+def test_a_log_is_exported_with_another_record(rig, tmp_path):
+    """Twice the slope is twice the torque; the zero that was measured before the run stays."""
+    import numpy as np
+
+    short = tmp_path / "short.toml"
+    short.write_text(
+        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
+        "duration_s = 1.0\n"
+    )
+    rig("record", "-p", str(short), "--out", str(tmp_path / "runs"))
+    (log,) = (tmp_path / "runs").glob("*.mcap")
+    _, added = rig("cal", "add", certificate(tmp_path, "7.9622e-05"), "--operator", "Ada")
+    digest = added["added"]["proximal_torque_n_m"]
+    torques = []
+    for words in ([], ["--record", digest], ["--calibration", "reference"]):
+        target = tmp_path / f"sample{len(torques)}.npz"
+        code, said = rig("log", "export", str(log), "--topic", "/rig/sample", "--format", "npz",
+                         "--out", str(target), *words)  # fmt: skip
+        assert code == 0
+        torques.append(np.load(target)["proximal_torque_n_m"])
+    assert said["calibrations"]["reference"]
+    np.testing.assert_allclose(torques[1], 2 * torques[0], rtol=1e-12)
+    np.testing.assert_array_equal(torques[2], torques[0])
+    code, said = rig("log", "export", str(log), "--record", "ffff")
+    assert code == 5

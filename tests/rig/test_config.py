@@ -1,9 +1,15 @@
 """The configuration: every key checked, the nearest one named."""
 
+import json
+from pathlib import Path
+
 import pytest
 
-from rig.config import SIMULATED, load_config
-from rig.errors import UsageError
+from rig.cli.main import main
+from rig.config import SIMULATED, load_config, shipped_configs
+from rig.config_check import problems, refuse_problems
+from rig.config_text import to_toml
+from rig.errors import ExitCode, UsageError
 
 
 def test_the_simulated_rig_is_the_default():
@@ -41,3 +47,99 @@ def test_a_wrong_key_is_named(tmp_path, old, new, message):
 def test_a_file_that_is_not_there_is_a_usage_error(tmp_path):
     with pytest.raises(UsageError, match="cannot be read"):
         load_config(tmp_path / "absent.toml")
+
+
+def test_a_range_is_told_with_its_unit(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        SIMULATED.read_text().replace("motor_current_a = 0.6", "motor_current_a = 600", 1)
+    )
+    with pytest.raises(UsageError, match=r"limits.motor_current_a: .*60, given 600 A"):
+        load_config(path)
+
+
+def test_a_key_inside_a_device_is_checked_too(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(SIMULATED.read_text() + '\n[devices.jaw]\ndriver = "usb520"\nulr = "sim://"\n')
+    with pytest.raises(UsageError, match=r"devices\.jaw\.ulr: .*did you mean 'url'"):
+        load_config(path)
+
+
+def test_a_shipped_configuration_is_found_by_name():
+    assert load_config(Path("reference")).name == "reference rig"
+    with pytest.raises(UsageError, match="reference"):
+        load_config(Path("referense"))
+
+
+@pytest.mark.parametrize("name", shipped_configs())
+def test_every_shipped_configuration_is_sound_and_survives_being_shown(name, tmp_path):
+    config = load_config(Path(name))
+    assert problems(config) == []
+    assert config.calibration_set().channels
+    shown = tmp_path / "shown.toml"
+    shown.write_text(to_toml(config))
+    assert load_config(shown) == config
+
+
+def on_one_bus(drive, sensor):
+    bus = {"url": "can:socketcan:can0"}
+    return load_config(Path("canopen")).changed(
+        logger=bus | drive, devices={"jaw_force": {"driver": "ati-can"} | bus | sensor}
+    )
+
+
+@pytest.mark.parametrize("node", range(1, 16))
+def test_the_factory_identifiers_of_the_sensor_are_those_of_a_drives_process_data(node):
+    config = on_one_bus({"options": {"node_id": node}}, {"bit_rate": 1_000_000})
+    (problem,) = problems(config)
+    assert f"{0x200 + node:#05x}" in problem.what
+    assert "0x68" in problem.fix
+
+
+def test_unequal_bit_rates_on_one_bus_are_refused():
+    (problem,) = problems(on_one_bus({}, {"options": {"base": 0x68}}))
+    assert "250000" in problem.what
+    with pytest.raises(UsageError, match="250000"):
+        refuse_problems(on_one_bus({}, {"options": {"base": 0x68}}))
+
+
+def test_the_shifted_base_at_the_drives_bit_rate_is_sound():
+    sound = {"options": {"base": 0x68}, "bit_rate": 1_000_000}
+    assert problems(on_one_bus({}, sound)) == []
+
+
+@pytest.mark.parametrize(
+    ("device", "message"),
+    [
+        ({"driver": "ati-can", "url": "can:slcan:/dev/ttyACM0?bitrate=500000"}, "500000"),
+        ({"driver": "ati-kan", "url": "can:socketcan:can1"}, "no driver 'ati-kan'"),
+        ({"driver": "usb520", "url": "can:socketcan:can1"}, "on no CAN bus"),
+        ({"driver": "ati-can", "url": "/dev/ttyACM0"}, "needs a CAN bus"),
+        ({"driver": "usb520", "url": "sim://", "options": {"baud": 1}}, "no option 'baud'"),
+    ],
+)
+def test_what_a_device_cannot_be(device, message):
+    config = load_config().changed(devices={"jaw_force": device})
+    (problem,) = problems(config)
+    assert message in problem.what
+    assert problem.key == "devices.jaw_force"
+    assert problem.fix
+
+
+def test_two_devices_on_one_adapter_are_refused():
+    url = "can:gs_usb:0?bitrate=250000"
+    devices = {
+        name: {"driver": "ati-can", "url": url, "options": {"base": base}}
+        for name, base in (("one", 0x20), ("two", 0x21))
+    }
+    (problem,) = problems(load_config().changed(devices=devices))
+    assert "one adapter" in problem.what
+
+
+def test_config_check_speaks_to_machines(tmp_path, capsys):
+    assert main(["config", "check", "canopen", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sound"]
+    bad = tmp_path / "bad.toml"
+    bad.write_text(to_toml(on_one_bus({}, {})))
+    assert main(["config", "check", str(bad), "--json"]) == ExitCode.USAGE
+    assert len(json.loads(capsys.readouterr().out)["problems"]) == 2

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from numba import types
 
 from drivers.teensy import control
+from drivers.teensy.guard import Drive
+from drivers.teensy.protocol import Limits
 from rig.simulation.bench import BenchInputError, SimulatedBench
 from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.parameters import REFERENCE_GAINS
@@ -27,18 +29,17 @@ LOAD = np.full(TICKS, 400, np.int32)
 def run(seed: int, cuts: tuple[int, ...] = (), **options: object) -> tuple[np.ndarray, np.ndarray]:
     """Counts and final state of one run, advanced in pieces."""
     bench = SimulatedBench(seed=seed, **options)  # type: ignore[arg-type]
-    state = control.new_state()
+    drive = Drive.armed(GAINS)
     edges = [0, *sorted(cuts), TICKS]
     parts = [
-        bench.advance(b - a, TARGET[a:b], LOAD[a:b], True, state, GAINS)
-        for a, b in itertools.pairwise(edges)
+        bench.advance(b - a, TARGET[a:b], LOAD[a:b], drive) for a, b in itertools.pairwise(edges)
     ]
     return np.concatenate(parts), bench.state
 
 
-def test_rows_are_int32_of_nine_fields() -> None:
+def test_rows_are_int32_of_all_fields() -> None:
     rows, _ = run(0)
-    assert rows.shape == (TICKS, 9)
+    assert rows.shape == (TICKS, 11)
     assert rows.dtype == np.int32
 
 
@@ -60,10 +61,8 @@ def test_cutting_the_run_changes_nothing(cuts: list[int]) -> None:
 def test_sensors_are_sampled_before_the_command_acts() -> None:
     bench = SimulatedBench(seed=0)
     away = np.full(2, 0, np.int32)
-    rows = bench.advance(2, away, np.zeros(2, np.int32), True, control.new_state(), GAINS)
-    at_rest = SimulatedBench(seed=0).advance(
-        1, away[:1], np.zeros(1, np.int32), False, control.new_state(), GAINS
-    )
+    rows = bench.advance(2, away, np.zeros(2, np.int32), Drive.armed(GAINS))
+    at_rest = SimulatedBench(seed=0).advance(1, away[:1], np.zeros(1, np.int32), Drive())
     np.testing.assert_array_equal(rows[0, :7], at_rest[0, :7])
     assert rows[0, 7] != 0
     assert rows[1, 5] > rows[0, 5] + 100  # the current has answered one tick later
@@ -71,19 +70,19 @@ def test_sensors_are_sampled_before_the_command_acts() -> None:
 
 def test_a_limit_takes_the_motors_out_of_force_from_its_tick_on() -> None:
     free, _ = run(3)
-    limits = np.array([32767, 1000, 2000, 32767, -(2**31), 2**31 - 1], np.int32)
+    limits = Limits(32767, 1000, 2000, 32767, -(2**31), 2**31 - 1)
     bench = SimulatedBench(seed=3)
-    rows = bench.advance(TICKS, TARGET, LOAD, True, control.new_state(), GAINS, limits)
+    rows = bench.advance(TICKS, TARGET, LOAD, Drive.armed(GAINS, limits))
     breach = int(np.argmax(np.abs(free[:, 3]) > 2000))
     assert 0 < breach < TICKS
     np.testing.assert_array_equal(rows[:breach], free[:breach])
     np.testing.assert_array_equal(rows[breach, :7], free[breach, :7])
-    np.testing.assert_array_equal(rows[breach:, 7:], 0)
+    np.testing.assert_array_equal(rows[breach:, 7:9], 0)
 
 
 def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(BenchInputError, match="target has shape"):
-        SimulatedBench().advance(5, TARGET, LOAD[:5], True, control.new_state(), GAINS)
+        SimulatedBench().advance(5, TARGET, LOAD[:5], Drive())
     with pytest.raises(BenchInputError, match="address 0x0"):
         SimulatedBench().advance_with_board(5, 0, 0, 0)
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.teensy import control
+from drivers.teensy.guard import Drive
 from rig import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import HiddenEffect
-from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, SensorParameters, vary
+from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.play import play
 
 FREE = PlantParameters(
@@ -46,10 +46,10 @@ def energies_after_a_pluck(parameters: PlantParameters, ticks: int) -> NDArray[n
     """Stretch the cable by 0.1 rad, let go with the motor off, and return energy tick by tick."""
     bench = SimulatedBench(parameters, start_count=683)
     bench._state[plant.JAW_ANGLE] -= 0.1
-    none, state, gains = np.zeros(1, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
+    none, drive = np.zeros(1, np.int32), Drive()
     energies = [energy_j(bench.state, parameters)]
     for _ in range(ticks):
-        bench.advance(1, none, none, False, state, gains)
+        bench.advance(1, none, none, drive)
         energies.append(energy_j(bench.state, parameters))
     return np.array(energies)
 
@@ -66,13 +66,13 @@ def test_an_eccentric_gear_keeps_energy_too() -> None:
     bench._state[plant.JAW_ANGLE] -= 0.1
     bench._state[plant.MOTOR_SPEED] = 60.0
     bench._state[plant.SPINDLE_SPEED] = 60.0 / 35.0
-    none, state, gains = np.zeros(1, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
+    none, drive = np.zeros(1, np.int32), Drive()
     energies = []
     for _ in range(300):  # before the jaw meets its stop
         angle = 16.0 * float(bench.state[plant.SPINDLE_ANGLE])
         error = 5.0 * 2e-3 * (np.sin(angle + 0.4) + 0.3 * np.sin(2.0 * angle))
         energies.append(energy_j(bench.state, FREE, error))
-        bench.advance(1, none, none, False, state, gains)
+        bench.advance(1, none, none, drive)
     np.testing.assert_allclose(energies, energies[0], rtol=0.02)
 
 
@@ -81,10 +81,10 @@ def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
     clamped = replace(FREE, spindle_friction_n_m=10.0)
     bench = SimulatedBench(clamped, start_count=683)
     bench._state[plant.MOTOR_ANGLE] += 0.5
-    none, state, gains = np.zeros(1, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
+    none, drive = np.zeros(1, np.int32), Drive()
     seen, gear = [], []
     for _ in range(1000):
-        bench.advance(1, none, none, False, state, gains)
+        bench.advance(1, none, none, drive)
         now = bench.state
         twist = now[plant.MOTOR_ANGLE] / 35.0 - now[plant.SPINDLE_ANGLE]
         seen.append(now[plant.PROXIMAL_TORQUE])
@@ -124,10 +124,10 @@ def test_friction_holds_without_creep_or_chatter() -> None:
     rest_rad = -1000 * 2 * np.pi / 8192
     closing = trajectory.minimum_jerk(rest_rad, rest_rad + 0.4, 1.0)
     play(bench, closing, np.full(closing.size, 0.1))
-    idle, state, gains = np.zeros(300, np.int32), control.new_state(), np.array(REFERENCE_GAINS)
-    bench.advance(300, idle, idle, False, state, gains)
+    idle, drive = np.zeros(300, np.int32), Drive()
+    bench.advance(300, idle, idle, drive)
     before = bench.state
-    bench.advance(300, idle, idle, False, state, gains)
+    bench.advance(300, idle, idle, drive)
     after = bench.state
     moving = [plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]
     standing = [plant.MOTOR_ANGLE, plant.SPINDLE_ANGLE, plant.JAW_ANGLE]
@@ -162,7 +162,7 @@ def test_the_drive_limits_its_current() -> None:
     bench = SimulatedBench(start_count=0)
     far = np.full(200, -20000, np.int32)
     gains = np.array([20.0, 0.0, 0.0, 1.0, 10000.0])
-    bench.advance(200, far, np.zeros(200, np.int32), True, control.new_state(), gains)
+    bench.advance(200, far, np.zeros(200, np.int32), Drive.armed(gains))
     assert bench.state[plant.CURRENT] == pytest.approx(0.56)
 
 

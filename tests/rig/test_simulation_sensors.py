@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.teensy import control
+from drivers.teensy.guard import Drive
 from rig import trajectory
 from rig.simulation import sensors
 from rig.simulation.bench import SimulatedBench
@@ -30,7 +30,7 @@ def rest(parameters: SensorParameters, ticks: int, seed: int = 0) -> np.ndarray:
     """Counts of the disarmed rig at rest."""
     idle = np.zeros(ticks, np.int32)
     bench = SimulatedBench(sensors_parameters=parameters, seed=seed)
-    return bench.advance(ticks, idle, idle, False, control.new_state(), GAINS)
+    return bench.advance(ticks, idle, idle, Drive())
 
 
 def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
@@ -38,7 +38,7 @@ def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
     target = np.round(1366 - 0.4 * np.arange(1000)).astype(np.int32)
     load = np.full(1000, load_ma, np.int32)
     bench = SimulatedBench(sensors_parameters=parameters)
-    return bench.advance(1000, target, load, True, control.new_state(), GAINS)
+    return bench.advance(1000, target, load, Drive.armed(GAINS))
 
 
 def test_raw_signs_on_closing() -> None:
@@ -127,10 +127,10 @@ def test_the_force_sensor_reads_grip_over_the_lever_arm() -> None:
 
 
 def test_disarmed_commands_are_zero_and_the_controller_rests() -> None:
-    state = control.new_state()
+    drive = Drive()
     far = np.full(100, -5000, np.int32)
     bench = SimulatedBench()
-    rows = bench.advance(100, far, np.full(100, 700, np.int32), False, state, GAINS)
+    rows = bench.advance(100, far, np.full(100, 700, np.int32), drive)
     np.testing.assert_array_equal(rows[:, [sensors.COMMAND_E4, sensors.LOAD_MA]], 0)
-    np.testing.assert_array_equal(state, control.new_state())
+    np.testing.assert_array_equal(drive.control_state, 0.0)
     assert np.ptp(rows[:, sensors.SPINDLE]) == 0

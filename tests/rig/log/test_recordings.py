@@ -130,6 +130,18 @@ def test_a_folder_opens_as_a_campaign_in_the_order_of_the_starts(tmp_path):
     assert campaign.clock().gap_known.all()
 
 
+def test_a_folder_of_campaigns_opens_as_one_with_names_of_both(tmp_path):
+    for place in ("first", "second"):
+        (tmp_path / place).mkdir()
+        for name in ("a", "b"):
+            start_ns = 10**18 * (1 + (name == "b") + 4 * (place == "second"))
+            write_recording(tmp_path / place / f"{name}.mcap", simple(name, start_ns))
+    assert IMPORTER.recognises(tmp_path)
+    campaign = IMPORTER.open(tmp_path)
+    assert campaign.names == ("first/a", "first/b", "second/a", "second/b")
+    assert [recording.name for recording in campaign] == list(campaign.names)
+
+
 def test_a_single_log_opens_as_a_campaign_of_one(log):
     assert IMPORTER.recognises(log)
     (recording,) = IMPORTER.open(log)

@@ -1,0 +1,122 @@
+"""What one curve cannot say of a force-sensing resistor: loading against unloading, and creep.
+
+    F = p(x) + (g / 2) s w(u)          w(u) = 4 u (1 - u)
+
+x is the voltage with its creep taken off, x = v / (1 + r log10(t / t1)), t the time under load; u
+goes from 0 to 1 over the calibrated range, s is 1 on loading and -1 on unloading, g the greatest
+gap between the two. The lens w closes at both ends, as a loop does that was driven through all of
+the range; loops within it are narrower, so g is what a whole press shows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.fsr import Creep, FsrCurve, FsrRun
+from estimation.recording import FloatArray
+
+CREEP_START_S = 0.1
+"""Creep counts from so long after the load came."""
+
+
+@dataclass(frozen=True, slots=True)
+class FsrMemory:
+    """What the sensor remembers.
+
+    Attributes:
+        gap_n: Force on loading less that on unloading at mid-range; 0 where it was not told apart
+            from none on runs left out.
+        gap_standard_error_n: Of the gap, runs as the unit.
+        creep_ratio: Relative rise of the voltage a decade of time; 0 where it was not told apart.
+        held_out_rmse_n: Error on runs left out, without and with the gap.
+    """
+
+    gap_n: float = 0.0
+    gap_standard_error_n: float = 0.0
+    creep_ratio: float = 0.0
+    held_out_rmse_n: tuple[float, float] = (float("nan"), float("nan"))
+
+    def force_n(self, curve: FsrCurve, time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
+        """Return the force of one press, shape (n,).
+
+        Args:
+            curve: The curve.
+            time_s: Time, s, rising; the press begins where the voltage leaves the lowest tenth.
+            fsr_v: Voltage, shape (n,), smooth enough that its slope says which way it goes.
+
+        Raises:
+            FsrRangeError: A voltage lies outside the curve's range.
+        """
+        volts = self.without_creep(curve, time_s, fsr_v)
+        return curve.force_n(volts) + self.gap_n / 2 * _lens(curve, volts) * _direction(
+            time_s, volts
+        )
+
+    def memoryless(self, curve: FsrCurve, run: FsrRun) -> FsrRun:
+        """Return a run as a sensor without memory would have given it."""
+        volts = self.without_creep(curve, run.time_s, run.fsr_v)
+        bias_n = self.gap_n / 2 * _lens(curve, volts) * _direction(run.time_s, volts)
+        return FsrRun(run.name, run.time_s, volts, run.force_n - bias_n)
+
+    def without_creep(self, curve: FsrCurve, time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
+        """Return the voltage with its creep taken off, shape (n,)."""
+        if self.creep_ratio == 0.0:
+            return fsr_v
+        floor = curve.low_v + 0.1 * (curve.high_v - curve.low_v)
+        loaded = fsr_v > floor
+        begins = np.where(loaded & ~np.roll(loaded, 1), time_s, -np.inf)
+        begins[0] = time_s[0]
+        since = time_s - np.maximum.accumulate(begins)
+        decades = np.log10(np.maximum(since, CREEP_START_S) / CREEP_START_S)
+        return np.where(loaded, fsr_v / (1.0 + self.creep_ratio * decades), fsr_v)
+
+
+def fit_memory(curve: FsrCurve, runs: Sequence[FsrRun], creep: Creep | None) -> FsrMemory:
+    """Measure what a curve's runs remember, and keep what predicts runs left out.
+
+    Args:
+        curve: The curve of the runs.
+        runs: The runs, each one or more whole presses.
+        creep: Creep under a constant load; None where it was not measured.
+    """
+    pairs = []
+    for run in runs:
+        column = 0.5 * _lens(curve, run.fsr_v) * _direction(run.time_s, run.fsr_v)
+        pairs.append((column, run.force_n - curve.force_n(run.fsr_v)))
+    gaps = np.array([_slope([pair]) for pair in pairs])
+    gap = _slope(pairs)
+    without, with_gap = np.empty(len(pairs)), np.empty(len(pairs))
+    for k, (column, left) in enumerate(pairs):
+        others = _slope([pair for j, pair in enumerate(pairs) if j != k])
+        without[k] = np.mean(left**2)
+        with_gap[k] = np.mean((left - others * column) ** 2)
+    gain = without - with_gap
+    matters = gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size)
+    creeps = creep is not None and abs(creep.rate) > 3 * creep.standard_error
+    return FsrMemory(
+        gap_n=gap if matters else 0.0,
+        gap_standard_error_n=float(gaps.std(ddof=1) / np.sqrt(gaps.size)),
+        creep_ratio=creep.rate if creeps and creep is not None else 0.0,
+        held_out_rmse_n=(float(np.sqrt(without.mean())), float(np.sqrt(with_gap.mean()))),
+    )
+
+
+def _slope(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    column = np.concatenate([x for x, _ in pairs])
+    left = np.concatenate([y for _, y in pairs])
+    return float(column @ left / max(float(column @ column), 1e-300))
+
+
+def _lens(curve: FsrCurve, fsr_v: FloatArray) -> FloatArray:
+    share = np.clip((fsr_v - curve.low_v) / (curve.high_v - curve.low_v), 0.0, 1.0)
+    return np.asarray(4.0 * share * (1.0 - share))
+
+
+def _direction(time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
+    """Return 1 where the voltage rises, -1 where it falls, held where it rests."""
+    rate = np.gradient(fsr_v, time_s)
+    least = 0.05 * np.abs(rate).max()
+    sign = np.where(rate > least, 1.0, np.where(rate < -least, -1.0, 0.0))
+    last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.size), 0))
+    return np.asarray(sign[last])

@@ -1,0 +1,198 @@
+"""What a guided calibration is: steps with a measurement each, then a conclusion from all of them.
+
+A procedure knows no device and asks nobody. Who runs it passes in an operator, who is told what to
+set up before each step, and a bench, which measures it. Nothing is kept before the conclusion is
+reached, so that an aborted session leaves nothing behind.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.errors import CalibrationError
+from calibration.linear import CalibrationSet
+from calibration.quality import SATURATED_SHARE, BadDataError
+from calibration.record import Fit
+from estimation.recording import Flag, FloatArray, Recording
+
+
+class AbortedError(CalibrationError):
+    """The operator ended the session before its last step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One thing to set up and measure.
+
+    Attributes:
+        name: Name of the run, unique in the session.
+        conditions: What is set, numbers in SI with the unit in the name; kept in the raw log.
+        instruction: What a person has to do first; empty where the rig needs no hands.
+        duration_s: How long to measure a rig that is not moved.
+        target_angle_rad: Spindle trajectory at 1 kHz, shape (n,); None where nothing moves.
+        load_command_a: Load current at 1 kHz, shape (n,); None where nothing moves.
+    """
+
+    name: str
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    instruction: str = ""
+    duration_s: float = 2.0
+    target_angle_rad: FloatArray | None = None
+    load_command_a: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What a step gave.
+
+    Attributes:
+        recording: Channels in SI units and the step's conditions. Sensors are tared once,
+            before the first step that moves the rig.
+        counts: Raw counts of the logger, structured, shape (n,); None without a logger.
+        details: What the devices said of themselves, such as counts a unit.
+    """
+
+    recording: Recording
+    counts: NDArray[np.void] | None = None
+    details: Mapping[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One calibration that came out.
+
+    Attributes:
+        channel: SI channel it gives.
+        input: Raw counts field or channel it reads.
+        fit: The fit.
+        low: Least input it was measured at; None if it has no range.
+        high: Greatest input.
+        tared: Whether the zero is measured anew before each run.
+    """
+
+    channel: str
+    input: str
+    fit: Fit
+    low: float | None = None
+    high: float | None = None
+    tared: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """What the fit leaves, for the record's figure.
+
+    Attributes:
+        label: Name and unit of the variable.
+        unit: Name and unit of the residual.
+        series: Name of each run to its variable and residual, each of shape (n,).
+    """
+
+    label: str
+    unit: str
+    series: Mapping[str, tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """What a session came to.
+
+    Attributes:
+        results: The calibrations.
+        found: Other numbers that were measured on the way, and words on what was not.
+        residuals: For the figure.
+    """
+
+    results: tuple[Result, ...]
+    found: Mapping[str, float | str]
+    residuals: Residuals
+
+
+class Procedure(Protocol):
+    """One kind of calibration."""
+
+    @property
+    def kind(self) -> str:
+        """Kind of the records it makes."""
+        ...
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """Devices it measures with: `logger`, `force_sensor` or both."""
+        ...
+
+    def steps(self) -> Sequence[Step]:
+        """Return the steps in order."""
+        ...
+
+    def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
+        """Return what the measurements say, in the order of the steps.
+
+        Args:
+            measurements: One a step.
+            lines: The calibrations the recordings were converted with.
+
+        Raises:
+            BadDataError: They cannot carry a calibration; its `rule` says why.
+        """
+        ...
+
+
+class Operator(Protocol):
+    """Who sets up a step: a person at the terminal, or hands in the simulated world."""
+
+    def prepare(self, step: Step) -> None:
+        """Return when the step is set up.
+
+        Raises:
+            AbortedError: The session is to end here.
+        """
+        ...
+
+
+class Bench(Protocol):
+    """What measures a step."""
+
+    def measure(self, step: Step) -> Measurement:
+        """Play the step's trajectory, or read the rig at rest for the step's duration."""
+        ...
+
+
+Progress = Callable[[Step, int, int], None]
+"""Told the step that begins, its number from 0, and how many there are."""
+
+
+def carry_out(
+    procedure: Procedure, operator: Operator, bench: Bench, on_step: Progress | None = None
+) -> list[Measurement]:
+    """Go through the steps and return their measurements.
+
+    Raises:
+        AbortedError: The operator ended the session.
+        BadDataError: A sensor was at its limit.
+    """
+    steps = procedure.steps()
+    measured = []
+    for number, step in enumerate(steps):
+        if on_step:
+            on_step(step, number, len(steps))
+        operator.prepare(step)
+        measurement = bench.measure(step)
+        refuse_saturated(measurement.recording)
+        measured.append(measurement)
+    return measured
+
+
+def refuse_saturated(recording: Recording) -> None:
+    """Refuse a recording with more than one sample in a hundred flagged as saturated."""
+    share = float(np.mean((recording.flags & np.uint8(Flag.SATURATED)) != 0))
+    if share > SATURATED_SHARE:
+        raise BadDataError(
+            "saturated",
+            f"{recording.name}: a converter was at its limit in {share:.0%} of the samples.",
+            "What lies beyond a limit is not measured.",
+            "Load less, or reduce the amplifier's gain.",
+        )

@@ -1,0 +1,101 @@
+"""Least squares with the run as the unit of evidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from calibration.quality import BadDataError, check_limit, check_points
+from estimation.recording import FloatArray
+
+Run = tuple[FloatArray, FloatArray]
+"""One run's columns, shape (n, p), and its target, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """A fit over runs.
+
+    Attributes:
+        values: Coefficients, shape (p,).
+        covariance: Of the coefficients, from the runs' scores (the sandwich of Liang and Zeger
+            1986), shape (p, p).
+        residual_rms: Over all samples.
+        residuals: Each run's, target less fit.
+        held_out: Each run's mean square error by the fit on all others, shape (runs,).
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    residual_rms: float
+    residuals: tuple[FloatArray, ...]
+    held_out: FloatArray
+
+    def half_widths(self, level: float = 0.95) -> FloatArray:
+        """Return the half-widths of the coefficients' intervals, Student's over the runs."""
+        freedom = max(1, len(self.residuals) - 1)
+        return np.asarray(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(np.diag(self.covariance)))
+
+    def nested(self) -> tuple[tuple[float, ...], ...]:
+        """Return the covariance as a record keeps it."""
+        return tuple(map(tuple, self.covariance.tolist()))
+
+
+def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:
+    """Fit the target on the columns of all runs.
+
+    Raises:
+        BadDataError: Too few runs or samples, or columns that cannot be told apart.
+    """
+    check_points(len(runs), least_runs, "runs")
+    design = np.concatenate([columns for columns, _ in runs])
+    target = np.concatenate([values for _, values in runs])
+    check_points(len(target), 20 * design.shape[1], "samples")
+    scaled = design / np.maximum(np.abs(design).max(axis=0), 1e-300)
+    if np.linalg.matrix_rank(scaled, tol=1e-9 * len(target)) < design.shape[1]:
+        raise BadDataError(
+            "no_change",
+            "Two of the quantities to be found change only together.",
+            "One experiment cannot tell them apart.",
+            "Use more levels of load, both directions and more than one speed.",
+        )
+    values = np.linalg.lstsq(design, target)[0]
+    bread = np.linalg.inv(design.T @ design)
+    residuals = tuple(y - x @ values for x, y in runs)
+    scores = np.array([x.T @ e for (x, _), e in zip(runs, residuals, strict=True)])
+    covariance = bread @ (scores.T @ scores) @ bread * len(runs) / (len(runs) - 1)
+    left = np.concatenate(residuals)
+    return Regression(
+        values,
+        np.asarray(covariance),
+        float(np.sqrt(np.mean(left**2))),
+        residuals,
+        np.array([_held_out(runs, k) for k in range(len(runs))]),
+    )
+
+
+def refuse_drift(fit: Regression, span: float, limit: float = 0.05) -> float:
+    """Return how far the last run's residual is from the first's, over the span of the target.
+
+    Raises:
+        BadDataError: It is beyond the limit.
+    """
+    drift = float(fit.residuals[-1].mean() - fit.residuals[0].mean()) / span
+    fix = "Let the rig and its amplifiers warm up, then begin again."
+    check_limit("drift", abs(drift), limit, "Drift from the first to the last run", fix)
+    return drift
+
+
+def is_better(more: Regression, fewer: Regression) -> bool:
+    """Return whether the larger fit predicts runs left out better, by one standard error."""
+    gain = fewer.held_out - more.held_out
+    return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size))
+
+
+def _held_out(runs: Sequence[Run], left_out: int) -> float:
+    others = [run for k, run in enumerate(runs) if k != left_out]
+    design = np.concatenate([columns for columns, _ in others])
+    values = np.linalg.lstsq(design, np.concatenate([y for _, y in others]))[0]
+    columns, target = runs[left_out]
+    return float(np.mean((target - columns @ values) ** 2))

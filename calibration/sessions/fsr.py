@@ -1,0 +1,163 @@
+"""Force-sensing resistor pressed on the force sensor: curve, hysteresis, creep."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.fsr import Creep, FsrRun, fit_fsr, measure_creep
+from calibration.fsr_memory import CREEP_START_S, fit_memory
+from calibration.linear import CalibrationSet
+from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
+from calibration.quality import BadDataError, check_points
+from calibration.record import Fit
+from estimation.filters import LowPass, zero_phase
+
+FSR = "fsr_v"
+SMOOTH = LowPass(cutoff_hz=5.0, order=3)
+KEPT_HZ = 50.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FsrSession:
+    """Calibrate a force-sensing resistor.
+
+    Attributes:
+        top_n: Greatest force of a press.
+        presses: Number of presses, one run each.
+        press_s: Length of a press.
+        hold_s: Length of the hold that shows creep; 0 for none.
+        degree: Degree of the polynomial; chosen on runs left out if None.
+        force_at_zero_n: Force at 0 V, held; fitted if None.
+        axis: Channel of the force sensor that presses, rising.
+        rail_v: Upper end of the amplifier's range.
+    """
+
+    top_n: float = 1.6
+    presses: int = 8
+    press_s: float = 8.0
+    hold_s: float = 30.0
+    degree: int | None = None
+    force_at_zero_n: float | None = None
+    axis: str = "force_z_n"
+    rail_v: float = 3.3
+
+    kind = "fsr"
+    devices = ("logger", "force_sensor")
+
+    def steps(self) -> list[Step]:
+        """The empty sensors, the presses, and a hold under a weight."""
+        rest = Step(
+            "rest",
+            {"press_n": 0.0, "profile": "hold"},
+            "Let nothing touch the sensors.",
+            duration_s=1.0,
+        )
+        text = (
+            f"After Enter press slowly up to {self.top_n:g} N and off again, once, "
+            f"in about {self.press_s:g} s."
+        )
+        runs = [
+            Step(f"press-{k}", {"press_n": self.top_n, "profile": "ramp"}, text, self.press_s)
+            for k in range(self.presses)
+        ]
+        if self.hold_s <= 0:
+            return [rest, *runs]
+        weight = 0.7 * self.top_n
+        hold = Step(
+            "hold",
+            {"press_n": weight, "profile": "hold"},
+            f"After Enter put a weight of {weight / 9.80665 * 1e3:.0f} g on and leave it.",
+            self.hold_s,
+        )
+        return [rest, *runs, hold]
+
+    def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
+        """Return the curve from voltage to force with what it remembers."""
+        by_name = {m.recording.name: m for m in measurements}
+        rest = by_name.get("rest")
+        if rest is None:
+            raise BadDataError("points", "There is no reading of the empty sensors.")
+        zero_n = float(rest.recording[self.axis].mean())
+        floor_v = float(rest.recording[FSR].mean() + 5 * rest.recording[FSR].std() + 0.005)
+        presses = [m for name, m in by_name.items() if name.startswith("press")]
+        check_points(len(presses), 3, "presses")
+        runs = [self._run(m, zero_n, floor_v) for m in presses]
+        fitted = fit_fsr(
+            runs, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
+        )
+        hysteresis, drift = fitted.hysteresis, fitted.drift
+        creep = self._creep(by_name.get("hold"), zero_n)
+        memory = fit_memory(fitted.curve, runs, creep)
+        # the curve in the middle of the loop: what memory adds is taken off, and it is fitted again
+        pure = [memory.memoryless(fitted.curve, run) for run in runs]
+        fitted = fit_fsr(
+            pure, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
+        )
+        curve = fitted.curve
+        fit = curve.as_fit()
+        size = len(fit.parameters)
+        covariance = np.zeros((size + 2, size + 2))
+        covariance[:size, :size] = fit.covariance
+        covariance[size, size] = memory.gap_standard_error_n**2
+        covariance[size + 1, size + 1] = creep.standard_error**2 if creep else 0.0
+        whole = Fit(
+            "polynomial",
+            {**fit.parameters, "loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
+            tuple(map(tuple, covariance.tolist())),
+            fit.residual_rms,
+            fit.points,
+        )
+        low, high = curve.interval_n(np.array([(curve.low_v + curve.high_v) / 2]))
+        held_out = ", ".join(f"{d}: {e:.4f}" for d, e in fitted.held_out_rmse_n.items())
+        found: dict[str, float | str] = {
+            "degree": str(len(curve.coefficients) - 1),
+            "held_out_rmse_n_by_degree": held_out,
+            "interval95_mid_n": float(high[0] - low[0]) / 2,
+            "hysteresis_ratio": "no loading and unloading at one voltage"
+            if hysteresis is None
+            else hysteresis,
+            "held_out_rmse_n": memory.held_out_rmse_n[0],
+            "held_out_rmse_with_gap_n": memory.held_out_rmse_n[1],
+            "loading_gap": "modelled" if memory.gap_n else "not told apart from none",
+            "creep": "not measured"
+            if creep is None
+            else f"{creep.rate:+.2%} a decade +- {creep.standard_error:.2%}",
+            "drift_ratio": drift,
+        }
+        series = {run.name: (run.fsr_v, run.force_n - curve.force_n(run.fsr_v)) for run in pure}
+        return Conclusion(
+            (Result("fsr_force_n", FSR, whole, curve.low_v, curve.high_v),),
+            found,
+            Residuals("voltage, V", "residual, N", series),
+        )
+
+    def _run(self, measurement: Measurement, zero_n: float, floor_v: float) -> FsrRun:
+        """Return the pressed part of a run, both channels smoothed alike."""
+        recording = measurement.recording
+        rate_hz = recording.sample_rate_hz
+        both = np.column_stack([recording[FSR], recording[self.axis] - zero_n])
+        smooth = zero_phase(both, rate_hz, SMOOTH)
+        step = max(1, round(rate_hz / KEPT_HZ))
+        smooth, time_s = smooth[::step], recording.time_s[::step]
+        pressed = smooth[:, 0] > floor_v
+        if pressed.sum() < 20:
+            raise BadDataError(
+                "no_change",
+                f"{recording.name}: the resistor's voltage never rises above its rest.",
+                f"It rests below {floor_v:.3g} V.",
+                "Check that it is connected, and press on its sensing area.",
+            )
+        return FsrRun(recording.name, time_s[pressed], smooth[pressed, 0], smooth[pressed, 1])
+
+    def _creep(self, hold: Measurement | None, zero_n: float) -> Creep | None:
+        if hold is None:
+            return None
+        recording = hold.recording
+        step = max(1, round(recording.sample_rate_hz / KEPT_HZ))
+        both = np.column_stack([recording[FSR], recording[self.axis] - zero_n])
+        smooth = zero_phase(both, recording.sample_rate_hz, SMOOTH)[::step]
+        on = int(np.argmax(smooth[:, 1] > 0.9 * smooth[:, 1].max()))
+        time_s = recording.time_s[::step][on:] - recording.time_s[::step][on]
+        run = FsrRun("hold", time_s + CREEP_START_S, smooth[on:, 0], smooth[on:, 1])
+        return measure_creep(run, start_s=1.0)

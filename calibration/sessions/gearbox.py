@@ -1,0 +1,149 @@
+"""The gear's twist against the torque it carries: stiffness and backlash.
+
+    m / N - s = (T - T0) / k + (b / 2) sgn(T - T0) + c
+
+m the motor's angle, s the spindle's, T the torque at the spindle, b the backlash. Loads of both
+signs are needed: a gear that always leans to one side shows no gap. T0 is the reading at which the
+gear carries nothing. A tare does not give it, since at rest friction holds some torque; the reading
+at which the gap is crossed does, so it is searched for.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.linear import CalibrationSet
+from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
+from calibration.quality import BadDataError, check_change
+from calibration.record import Fit
+from calibration.regression import Regression, is_better, refuse_drift, regress
+from calibration.sessions.motion import moves, need_channel, steady
+from estimation.recording import FloatArray
+
+TORQUE, MOTOR, SPINDLE = "proximal_torque_n_m", "motor_angle_rad", "spindle_angle_rad"
+LEAST_TORQUE_N_M = 0.02
+"""Below this torque the gear may stand anywhere in its gap, and the sample is left out."""
+
+ZEROS_N_M = np.arange(-0.06, 0.0601, 0.002)
+"""Readings of an unloaded gear that are tried."""
+
+Twist = tuple[FloatArray, FloatArray]
+"""One run's torque, N m, and twist, rad, each of shape (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearboxSession:
+    """Calibrate the gear's twist.
+
+    Attributes:
+        loads_a: Loads of both signs.
+        speeds_rad_s: Speeds of the spindle.
+        repeats: How often each is moved.
+        gear_ratio: Motor turns a turn of the spindle.
+    """
+
+    loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)
+    speeds_rad_s: tuple[float, ...] = (0.6,)
+    repeats: int = 2
+    gear_ratio: float = 35.0
+
+    kind = "gearbox"
+    devices = ("logger",)
+
+    def steps(self) -> list[Step]:
+        """One move a load, speed and repeat."""
+        return moves(self.speeds_rad_s, self.loads_a, self.repeats)
+
+    def _twist(self, measurement: Measurement) -> Twist:
+        run = steady(measurement, (TORQUE, MOTOR, SPINDLE))
+        return run[TORQUE], run[MOTOR] / self.gear_ratio - run[SPINDLE]
+
+    def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
+        """Return stiffness and backlash."""
+        loads = [float(m.recording.conditions["load_command_a"]) for m in measurements]
+        if not (min(loads) < 0 < max(loads)):
+            raise BadDataError(
+                "levels",
+                f"The loads go from {min(loads):g} to {max(loads):g} A.",
+                "Backlash shows only where the gear leans to both sides.",
+                "Load both ways: some loads of each sign.",
+            )
+        twists = [self._twist(m) for m in measurements]
+        every = np.concatenate([torque for torque, _ in twists])
+        check_change(need_channel(every, TORQUE), 0.05, "The torque")
+        zero_n_m, whole, without = _best_zero(twists)
+        _refuse_no_slope(whole.values[0], whole.residual_rms, every)
+        drift = refuse_drift(whole, float(np.ptp(every)) * abs(float(whole.values[0])))
+        has_gap = is_better(whole, without) and abs(whole.values[1]) > whole.half_widths()[1]
+        compliance, half_gap, offset = whole.values
+        jacobian = np.diag([-1.0 / compliance**2, 2.0, 1.0])
+        covariance = jacobian @ whole.covariance @ jacobian.T
+        fit = Fit(
+            "gearbox",
+            {
+                "stiffness_n_m_rad": float(1.0 / compliance),
+                "backlash_rad": float(2.0 * half_gap),
+                "offset_rad": float(offset),
+            },
+            tuple(map(tuple, covariance.tolist())),
+            whole.residual_rms,
+            int(every.size),
+        )
+        found: dict[str, float | str] = {
+            "backlash": "told apart from none on runs left out"
+            if has_gap
+            else "not told apart from none on runs left out",
+            "drift_ratio": drift,
+            "backlash_ci95_rad": float(2 * whole.half_widths()[1]),
+            "torque_zero_n_m": zero_n_m if has_gap else "only a gap shows it",
+            "stiffness_without_backlash_n_m_rad": float(1.0 / without.values[0]),
+        }
+        carried = [torque[_carries(torque, zero_n_m)] for torque, _ in twists]
+        series = {
+            m.recording.name: (torque, left * 1e3)
+            for m, torque, left in zip(measurements, carried, whole.residuals, strict=True)
+        }
+        result = Result("gear_twist_rad", TORQUE, fit, float(every.min()), float(every.max()))
+        return Conclusion((result,), found, Residuals("torque, N m", "residual, mrad", series))
+
+
+def _carries(torque_n_m: FloatArray, zero_n_m: float) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(torque_n_m - zero_n_m) > LEAST_TORQUE_N_M)
+
+
+def _best_zero(twists: Sequence[Twist]) -> tuple[float, Regression, Regression]:
+    """Return the torque reading of an unloaded gear, and the fits with and without a gap."""
+    found = {}
+    for zero in ZEROS_N_M:
+        runs, plain = [], []
+        for torque, twist in twists:
+            kept = _carries(torque, zero)
+            carried = torque[kept] - zero
+            columns = np.column_stack([carried, np.sign(carried), np.ones_like(carried)])
+            runs.append((columns, twist[kept]))
+            plain.append((columns[:, [0, 2]], twist[kept]))
+        signs = np.concatenate([columns[:, 1] for columns, _ in runs])
+        if abs(signs.mean()) < 0.99 and min(len(y) for _, y in runs) > 0:
+            found[float(zero)] = (regress(runs), regress(plain))
+    if not found:
+        raise BadDataError(
+            "levels",
+            "The gear carries torque of one sign only.",
+            "Backlash shows only where it leans to both sides.",
+            "Load both ways: some loads of each sign.",
+        )
+    best = min(found, key=lambda zero: (round(found[zero][0].residual_rms, 7), abs(zero)))
+    return best, *found[best]
+
+
+def _refuse_no_slope(compliance: float, residual_rad: float, torque_n_m: FloatArray) -> None:
+    twist = compliance * float(np.ptp(torque_n_m))
+    if twist < 2 * residual_rad:
+        raise BadDataError(
+            "no_change",
+            f"The gear twists by {twist * 1e3:.3g} mrad over the whole range of torque.",
+            f"That is less than twice what the fit leaves, {residual_rad * 1e3:.3g} mrad.",
+            "Load more, and check the signs of both encoders and of the torque.",
+        )

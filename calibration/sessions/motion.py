@@ -1,0 +1,87 @@
+"""Trajectories of guided calibrations, and the samples of them that a fit may use."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration.procedure import Measurement, Step
+from calibration.quality import BadDataError
+from estimation.filters import zero_phase
+from estimation.recording import FloatArray
+
+RATE_HZ = 1000.0
+START_RAD = -1.047
+"""Where a calibration starts: the jaw open."""
+MOVING_RAD_S = 0.2
+KEPT_HZ = 100.0
+
+
+def ramps(speed_rad_s: float, travel_rad: float, pause_s: float = 0.3) -> FloatArray:
+    """Return closing and opening once at a constant speed, resting at both ends, rad."""
+    ramp = np.arange(0.0, travel_rad, speed_rad_s / RATE_HZ)
+    pause = np.zeros(round(pause_s * RATE_HZ))
+    return np.concatenate([pause, ramp, pause + travel_rad, ramp[::-1], pause]) + START_RAD
+
+
+def moves(
+    speeds_rad_s: Sequence[float], loads_a: Sequence[float], repeats: int, travel_rad: float = 0.9
+) -> list[Step]:
+    """Return one step for every load, speed and repeat, each closing and opening once."""
+    grid = itertools.product(range(repeats), loads_a, speeds_rad_s)
+    steps = []
+    for repeat, load, speed in grid:
+        angle = ramps(speed, travel_rad)
+        steps.append(
+            Step(
+                f"move-{load:g}A-{speed:g}rad_s-{repeat}",
+                {"load_command_a": load, "speed_rad_s": speed},
+                target_angle_rad=angle,
+                load_command_a=np.full(angle.size, load),
+            )
+        )
+    return steps
+
+
+def steady(measurement: Measurement, names: Sequence[str]) -> dict[str, FloatArray]:
+    """Return channels where the spindle moves steadily, all low-passed alike, 100 samples a second.
+
+    Besides the channels there is `direction`: 1 where the spindle closes, -1 where it opens, and
+    `spindle_velocity_rad_s`. Samples within 0.1 s of a change of direction are left out.
+
+    Raises:
+        BadDataError: The rig did not move.
+    """
+    recording = measurement.recording
+    rate_hz = recording.sample_rate_hz
+    columns = np.column_stack([recording[name] for name in (*names, "spindle_angle_rad")])
+    smooth = zero_phase(columns, rate_hz)
+    velocity = np.gradient(zero_phase(smooth[:, -1], rate_hz)) * rate_hz
+    around = round(0.1 * rate_hz)
+    kernel = np.ones(2 * around + 1)
+    still = np.convolve(np.abs(velocity) < MOVING_RAD_S, kernel, mode="same") > 0
+    step = max(1, round(rate_hz / KEPT_HZ))
+    kept = (~still & recording.valid)[::step]
+    if kept.sum() < 20:
+        raise BadDataError(
+            "no_change",
+            f"{recording.name}: the spindle hardly moves.",
+            f"It is to be faster than {MOVING_RAD_S:g} rad/s for some tenths of a second.",
+            "Check that the motor has its supply and that the jaw is free.",
+        )
+    found = {name: smooth[::step, k][kept] for k, name in enumerate(names)}
+    found["spindle_velocity_rad_s"] = velocity[::step][kept]
+    found["direction"] = np.sign(found["spindle_velocity_rad_s"])
+    return found
+
+
+def need_channel(values: FloatArray, name: str) -> FloatArray:
+    """Return values as they are, refusing those of a sensor that shows nothing at all."""
+    if np.ptp(values) == 0.0:
+        raise BadDataError(
+            "no_change",
+            f"{name} reads the same all the time.",
+            "A real sensor has noise; this one is not connected, or its input is stuck.",
+            "Check its plug and its supply.",
+        )
+    return values

@@ -1,0 +1,150 @@
+"""Torque sensor on the bench: zero, shunt, then known weights on an arm, up and down again."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.linear import CalibrationSet
+from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
+from calibration.quality import BadDataError
+from calibration.torque import ShuntCheck, check_shunt, fit_torque, weight_torque_n_m
+from calibration.torque import Step as Load
+from estimation.recording import FloatArray
+
+SENSORS = {"proximal": "proximal_torque_n_m", "distal": "distal_torque_n_m"}
+"""Sensor to its channel; the counts field has the sensor's name."""
+
+MASSES_KG = (0.05, 0.1, 0.15, 0.2, 0.25)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueSession:
+    """Calibrate one torque sensor against weights.
+
+    Attributes:
+        sensor: `proximal` or `distal`.
+        arm_m: From the axis to where the weights hang, the arm level.
+        masses_kg: Weights, rising.
+        shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
+        counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
+        temperature_k: Temperature of the sensor; None if it was not measured.
+        rails_counts: Least and greatest count of the converter.
+    """
+
+    sensor: str = "proximal"
+    arm_m: float = 0.1
+    masses_kg: tuple[float, ...] = MASSES_KG
+    shunt_v_v: float | None = None
+    counts_per_v_v: float | None = None
+    temperature_k: float | None = None
+    rails_counts: tuple[float, float] = (-32768.0, 32767.0)
+
+    kind = "torque"
+    devices = ("logger",)
+
+    def __post_init__(self) -> None:
+        if self.sensor not in SENSORS:
+            raise BadDataError(
+                "points",
+                f"There is no torque sensor {self.sensor!r}.",
+                f"Known: {', '.join(SENSORS)}.",
+            )
+        rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
+        if not (rising and self.arm_m > 0 and np.isfinite(self.arm_m)):
+            raise BadDataError("levels", "An arm is longer than 0, and the masses rise from 0.")
+        if (self.shunt_v_v is None) != (self.counts_per_v_v is None):
+            raise BadDataError(
+                "points", "A shunt check needs the certificate's V/V and the counts a V/V."
+            )
+
+    def steps(self) -> list[Step]:
+        """Zero, shunt if there is one, then up and down through the weights, ending at zero."""
+        steps = [] if self.shunt_v_v is None else [self._shunt_step(0), self._shunt_step(1)]
+        up = (0.0, *self.masses_kg)
+        for number, mass in enumerate((*up, *up[-2::-1])):
+            what = f"Hang {mass * 1e3:g} g on the arm" if mass else "Take every weight off the arm"
+            steps.append(
+                Step(
+                    f"{number:02d}-{mass * 1e3:g}g",
+                    {"sensor": self.sensor, "mass_kg": mass, "arm_m": self.arm_m},
+                    f"{what} of the {self.sensor} sensor and wait until it hangs still.",
+                )
+            )
+        return steps
+
+    def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
+        """Return the line of the sensor; see `calibration.torque`."""
+        field = lines.channels[SENSORS[self.sensor]].counts
+        loads, shunt = [], {}
+        for measurement in measurements:
+            conditions, counts = measurement.recording.conditions, _counts(measurement, field)
+            if "shunt_ratio" in conditions:
+                shunt[conditions["shunt_ratio"]] = counts
+            else:
+                torque = weight_torque_n_m(float(conditions["mass_kg"]), float(conditions["arm_m"]))
+                loads.append(Load(float(torque), counts))
+        checked = self._check(shunt)
+        fitted = fit_torque(loads, rails_counts=self.rails_counts)
+        found: dict[str, float | str] = {
+            "linearity_ratio": fitted.linearity,
+            "hysteresis_ratio": _or_words(fitted.hysteresis, "no load was reached both ways"),
+            "zero_drift_ratio": _or_words(fitted.drift, "it did not begin and end at zero"),
+            "temperature_k": _or_words(self.temperature_k, "not measured"),
+            "shunt_deviation_ratio": checked.deviation if checked else "no shunt was given",
+        }
+        torques = np.array([load.torque_n_m for load in loads])
+        means = np.array([load.counts.mean() for load in loads])
+        left = (means - fitted.zero_counts) * fitted.slope_n_m - torques
+        turn = int(torques.argmax()) + 1
+        result = Result(
+            SENSORS[self.sensor],
+            field,
+            fitted.as_fit(),
+            fitted.low_counts,
+            fitted.high_counts,
+            True,
+        )
+        series = {
+            "loading": (torques[:turn], left[:turn] * 1e3),
+            "unloading": (torques[turn:], left[turn:] * 1e3),
+        }
+        return Conclusion((result,), found, Residuals("torque, N m", "residual, mN m", series))
+
+    def _shunt_step(self, state: int) -> Step:
+        word = "Switch the shunt on" if state else "Take every weight off; shunt switched off"
+        conditions: dict[str, float | str] = {"sensor": self.sensor, "shunt_ratio": float(state)}
+        if state and self.shunt_v_v is not None and self.counts_per_v_v is not None:
+            conditions["shunt_v_v_ratio"] = self.shunt_v_v
+            conditions["counts_per_v_v_ratio"] = self.counts_per_v_v
+        return Step(f"shunt-{state}", conditions, f"{word}.")
+
+    def _check(self, shunt: dict[float | str, FloatArray]) -> ShuntCheck | None:
+        if self.shunt_v_v is None or self.counts_per_v_v is None:
+            return None
+        checked = check_shunt(
+            shunt[0.0],
+            shunt[1.0],
+            self.shunt_v_v,
+            self.counts_per_v_v,
+            rails_counts=self.rails_counts,
+        )
+        if not checked.passes:
+            raise BadDataError(
+                "shunt",
+                f"The shunt changes the reading by {checked.change_counts:.0f} counts, the "
+                f"certificate says {checked.certificate_counts:.0f}.",
+                f"That is {checked.deviation:+.2%}; {checked.tolerance:.0%} passes.",
+                "Check wiring, excitation and the amplifier's gain before hanging weights.",
+            )
+        return checked
+
+
+def _counts(measurement: Measurement, field: str) -> FloatArray:
+    if measurement.counts is None:
+        raise BadDataError("points", f"{measurement.recording.name} has no raw counts.")
+    return measurement.counts[field].astype(np.float64)
+
+
+def _or_words(value: float | None, words: str) -> float | str:
+    return words if value is None else value

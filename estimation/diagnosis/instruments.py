@@ -1,0 +1,82 @@
+"""A reading as the other sensors tell it, for effects that could fit the noise of that reading.
+
+What a reading was a moment ago, less what it is now, is its noise as much as its motion: an effect
+made of that takes the noise of a regressor out of the residual and is found on data that lack
+nothing. So the search makes such columns from the reading's projection on motion and on the other
+torque sensors (two-stage least squares): their noise is not in the residual.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.derived import measured_channels
+from estimation.diagnosis.candidate import Candidate, projected
+from estimation.diagnosis.design import Run
+from estimation.recording import FloatArray
+
+SPEED, ACCELERATION, ANGLE = (
+    "motor_velocity_rad_s",
+    "motor_acceleration_rad_s2",
+    "motor_angle_rad",
+)
+FORCES = ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m")
+
+WIDTHS_RAD_S = (1.0, 5.0)
+"""Widths of the smooth signs that stand for friction at a reversal."""
+
+
+def instruments(measured: Collection[str]) -> list[str]:
+    """Return the channels a projection is made from; none where the motor is not measured."""
+    if ANGLE not in measured:
+        return []
+    return [SPEED, ACCELERATION, ANGLE, *(name for name in FORCES if name in measured)]
+
+
+def projection(runs: Sequence[Run], pool: Sequence[Candidate], target: str) -> Callable[[Run], Run]:
+    """Return what adds to a run's channels those that the candidates want projected.
+
+    Args:
+        runs: Runs the projection is fitted on, with the channels of `instruments`.
+        pool: The candidates.
+        target: The balance's target, which is no instrument.
+    """
+    wanted = {name for c in pool for role, name in c.channels if role in c.effect.projected_roles}
+    fits = {name: fit for name in sorted(wanted) if (fit := _fitted(runs, name, target))}
+
+    def added(run: Run) -> Run:
+        new = {projected(name): _columns(run.channels, f) @ w for name, (f, w) in fits.items()}
+        return replace(run, channels={**run.channels, **new})
+
+    return added
+
+
+def _fitted(
+    runs: Sequence[Run], name: str, target: str
+) -> tuple[tuple[str, ...], FloatArray] | None:
+    """Return the forces among the instruments of a channel and the weights of all columns."""
+    there = set.intersection(*(set(run.channels) for run in runs))
+    own = {name, *measured_channels([name]), target}
+    forces = tuple(f for f in FORCES if f in there and f not in own)
+    if not {SPEED, ACCELERATION, ANGLE} <= there or not forces:
+        return None
+    columns, aims = [], []
+    for run in runs:
+        table = np.column_stack([_columns(run.channels, forces), run.channels[name]])[run.kept]
+        table -= table.mean(axis=0)
+        columns.append(table[:, :-1])
+        aims.append(table[:, -1])
+    joined = np.vstack(columns)
+    scale = np.maximum(joined.std(axis=0), np.finfo(float).tiny)
+    weights = np.linalg.lstsq(joined / scale, np.concatenate(aims), rcond=1e-8)[0]
+    return forces, weights / scale
+
+
+def _columns(channels: Mapping[str, FloatArray], forces: Sequence[str]) -> FloatArray:
+    """Return motion, friction and the forces, shape (n, columns)."""
+    speed, angle = channels[SPEED], channels[ANGLE]
+    signs = [np.tanh(speed / width) for width in WIDTHS_RAD_S]
+    motion = [speed, channels[ACCELERATION], angle, angle**2, *signs, signs[-1] * angle]
+    loads = [channels[force] for force in forces]
+    return np.column_stack([*motion, *loads, *(np.abs(load) * signs[-1] for load in loads)])

@@ -1,0 +1,132 @@
+"""Two recorded paths only: one discovers, cross-validated by its whole periods, the other confirms.
+
+Where a motion was recorded along two paths and no more, there are no runs to leave out. A path that
+repeats itself is cut into its periods, and those stand for runs; the other path, cut in the same
+way, is opened once.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diagnosis.split import Sealed, SplitError, check_one_rig, data_hash, seal
+from estimation.recording import FloatArray, Recording
+
+PATHS = 2
+LEAST_PERIODS = 3
+ALIKE = 0.7
+"""Least correlation of a path with itself one period later."""
+
+AS_GOOD = 0.02
+SHORTEST_S = 1.0
+MARK = ", period "
+
+
+def split_paths(
+    recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()
+) -> tuple[list[Recording], Sealed]:
+    """Cut two paths into whole periods and choose which path discovers.
+
+    Args:
+        recordings: The two paths.
+        seed: Seed of the choice.
+        seen: Names of paths that an earlier diagnosis held; where one is new, that one confirms.
+
+    Returns:
+        The periods of both paths, and their split.
+
+    Raises:
+        SplitError: The paths are of different rigs or instruments, or one does not repeat itself.
+    """
+    check_one_rig(recordings)
+    new = [k for k, path in enumerate(recordings) if path.name not in seen]
+    confirms = new[0] if len(new) == 1 else int(np.random.default_rng(seed).integers(PATHS))
+    cut = [periods(path) for path in recordings]
+    discover = tuple(piece.name for piece in cut[1 - confirms])
+    confirm = tuple(piece.name for piece in cut[confirms])
+    data = data_hash(recordings)
+    sealed = Sealed(discover, confirm, seed, data, seal(data, discover, confirm))
+    return [*cut[0], *cut[1]], sealed
+
+
+def path_of(name: str) -> str:
+    """Return the name of the path a period was cut from; of a run its own name."""
+    return name.rpartition(MARK)[0] or name
+
+
+def claim(sealed: Sealed) -> str:
+    """Return what two paths can prove, in words."""
+    return (
+        f"Two recorded paths only: {path_of(sealed.discover[0])} discovered, cross-validated by its"
+        f" {len(sealed.discover)} periods, and {path_of(sealed.confirm[0])} confirmed."
+        " Periods of one path are less apart than runs: the claim holds for these two paths."
+    )
+
+
+def periods(path: Recording) -> list[Recording]:
+    """Cut a path into its whole periods; a rest of half a period and more at its end counts too.
+
+    Raises:
+        SplitError: It does not repeat itself.
+    """
+    length = period_samples(path)
+    starts = range(0, len(path) - length // 2, length)
+    return [
+        _piece(path, np.arange(start, min(start + length, len(path))), number)
+        for number, start in enumerate(starts, start=1)
+    ]
+
+
+def period_samples(path: Recording) -> int:
+    """Return the length of a path's period: where its positions are most like themselves.
+
+    Raises:
+        SplitError: There is no such length that fits three times into the path.
+    """
+    angles = [
+        values
+        for name, values in path.columns.items()
+        if ("angle" in name or "position" in name) and np.ptp(values) > 0
+    ]
+    shortest, longest = round(SHORTEST_S * path.sample_rate_hz), len(path) // LEAST_PERIODS
+    likeness = np.mean([_likeness(x)[: longest + 1] for x in angles], axis=0) if angles else [0.0]
+    inside = np.array(likeness)
+    # what is near lag zero is alike because nothing has moved yet
+    apart = int(np.argmax(inside < 0.5)) if (inside < 0.5).any() else len(inside)
+    inside[: max(apart, shortest)] = -1.0
+    best = _first_peak(inside)
+    if inside.size == 0 or inside[best] < ALIKE:
+        raise SplitError(
+            f"Path {path.name!r} does not repeat itself {LEAST_PERIODS} times.",
+            "With two recordings only, whole periods of one stand for runs, and there are none.",
+            "Record three runs at least, or paths of several periods.",
+        )
+    return best
+
+
+def _first_peak(likeness: FloatArray) -> int:
+    """Return the shortest lag about as good as the best: two periods are as alike as one."""
+    if likeness.size == 0:
+        return 0
+    near = np.flatnonzero(likeness >= likeness.max() - AS_GOOD)
+    first = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)[0]
+    return int(first[np.argmax(likeness[first])])
+
+
+def _likeness(x: FloatArray) -> FloatArray:
+    """Return the correlation of a signal with itself at every lag, shape (n,)."""
+    n = len(x)
+    centred = x - x.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    sums = np.fft.irfft(power)[:n]
+    whole = np.concatenate([[0.0], np.cumsum(centred**2)])
+    lags = np.arange(n)
+    early, late = whole[n - lags], whole[n] - whole[lags]
+    likeness: FloatArray = sums / np.maximum(np.sqrt(early * late), np.finfo(float).tiny)
+    return likeness
+
+
+def _piece(path: Recording, places: NDArray[np.intp], number: int) -> Recording:
+    return replace(path.at(places), name=f"{path.name}{MARK}{number}")

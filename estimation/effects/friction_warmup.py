@@ -1,0 +1,44 @@
+"""Warm-up: friction that settles while a run lasts."""
+
+from typing import ClassVar
+
+import numba
+import numpy as np
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.recording import FloatArray
+
+
+@numba.njit(cache=True)
+def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Walk; state: whether a sample has come, the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 1]
+        age = (now[i, 1] - state[1]) / shape[0]
+        rows[i, 0] = np.exp(-age) * np.tanh(now[i, 0] / shape[1])
+
+
+class Warmup(Remembering):
+    """Friction of cold grease that fades, or of a warming fit that grows: then it is negative.
+
+    Equation: torque = F exp(-t / time) tanh(speed / width), t since the run's first sample.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint
+    as it warms), to first order in temperature.
+    """
+
+    id = "friction.warmup"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "clock": "time_s"}
+    amplitudes = (Parameter("friction", "target", "loss at the start beyond that of long after"),)
+    shape = (
+        Parameter("time", "clock", "time after which 37 % is left", 0.5, 60.0, points=6),
+        Parameter(
+            "width", "speed", "speed at which 76 % of the direction is there", 1e-2, 50.0, points=6
+        ),
+    )
+    walk = _walk
+    rest = (0.0, 0.0)
+    confused_with = ("change.step", "friction.dwell", "sensor.drift", "motor.thermal")
+    told_apart_by = "the first run once more at the end, and once more after a night's rest"

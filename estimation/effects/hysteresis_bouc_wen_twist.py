@@ -1,0 +1,31 @@
+"""Hysteresis of a spring: a twist that lags behind the load in a loop."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.hysteresis_bouc_wen import walk_loop
+
+
+class Twist(Remembering):
+    """What wires that rub on each other keep back of a cable's or a shaft's deflection.
+
+    Equation: deflection lost = F z; dz / d load = (1 - |z|^n (1 + sign(z d load)) / 2) / reach,
+    n being the sharpness, z = 0 at the start.
+
+    Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with
+    beta = gamma, the load in the place of the deflection.
+    """
+
+    id = "hysteresis.bouc_wen.twist"
+    family = "hysteresis.bouc_wen"
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
+    roles: ClassVar = {"load": "distal_torque_n_m"}
+    amplitudes = (Parameter("lost", "target", "half the width of the loop", lower=0.0),)
+    shape = (
+        Parameter("reach", "load", "load from the loop's middle to its end", 1e-3, 1.0, points=9),
+        Parameter("sharpness", "1", "how sharp its corners are", 1.0, 4.0, points=3),
+    )
+    walk = walk_loop
+    rest = (0.0, 0.0, 0.0)
+    confused_with = ("hysteresis.presliding", "transmission.backlash", "transmission.relaxation")
+    told_apart_by = "loads that swell and shrink slowly, and the same ten times slower"

@@ -1,0 +1,61 @@
+"""Presliding after Maxwell: several contacts side by side, each with its own way to slide."""
+
+from typing import ClassVar
+
+import numba
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.recording import FloatArray
+
+SPREAD = (1.0, 3.0, 9.0)
+"""Ways to slide of the elements, in units of the shortest."""
+
+
+@numba.njit(cache=True)
+def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Walk; state: whether a sample has come, the last travel, each element's bend / its limit."""
+    for i in range(len(now)):
+        moved = (now[i, 0] - state[1]) / shape[0] if state[0] else 0.0
+        state[0], state[1] = 1.0, now[i, 0]
+        for k in range(len(SPREAD)):
+            state[2 + k] = min(max(state[2 + k] + moved / SPREAD[k], -1.0), 1.0)
+            rows[i, k] = state[2 + k]
+
+
+class MaxwellSlip(Remembering):
+    """A bank of springs in series with dry contacts.
+
+    Equation: torque = sum F_k z_k; z_k follows travel / (reach s_k) and stays within -1 and 1,
+    s = 1, 3, 9; z = 0 at the start.
+
+    Source: Lampaert, Al-Bender and Swevers 2003 (generalised Maxwell-slip model), its elements in
+    quasi-static motion.
+    """
+
+    id = "hysteresis.presliding.maxwell"
+    family = "hysteresis.presliding"
+    balances: ClassVar = {
+        "motor": -1,
+        "gearbox": -1,
+        "cable": 1,
+        "stretch": -1,
+        "grasp": -1,
+        "joint": 1,
+    }
+    roles: ClassVar = {"travel": "spindle_angle_rad"}
+    amplitudes = (
+        Parameter("short", "target", "loss of the contact that slides first", lower=0.0),
+        Parameter("middle", "target", "loss of the next", lower=0.0),
+        Parameter("long", "target", "loss of the last", lower=0.0),
+    )
+    shape = (Parameter("reach", "travel", "way to slide of the first", 3e-4, 3.0, points=13),)
+    walk = _walk
+    rest = (0.0, 0.0, 0.0, 0.0, 0.0)
+    confused_with = (
+        "friction.coulomb",
+        "friction.stribeck",
+        "hysteresis.bouc_wen",
+        "transmission.backlash",
+        "transmission.relaxation",
+    )
+    told_apart_by = "reversals of shrinking amplitude, and the same ten times slower"

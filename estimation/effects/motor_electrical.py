@@ -1,0 +1,33 @@
+"""Electrical lag: torque that follows the measured current late."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.first_order import AT_REST, behind
+
+
+class ElectricalLag(Remembering):
+    """Torque that follows the measured current as a first-order lag does.
+
+    Eddy currents and the amplifier's own current loop let the flux linked with the rotor trail the
+    current that is measured at the supply.
+
+    Equation: torque = K (lagged - current); d lagged / dt = (current - lagged) / T, at rest on the
+    first sample.
+
+    Source: the first-order RL model of a DC motor's windings; Krishnan 2001, "Electric Motor
+    Drives", chapter 2.
+    """
+
+    id = "motor.electrical"
+    balances: ClassVar = {"motor": 1, "grasp": 1}
+    roles: ClassVar = {"clock": "time_s", "current": "motor_current_a"}
+    amplitudes = (
+        Parameter("gain", "target / current", "torque constant of what is late", lower=0.0),
+    )
+    shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 5e-2, points=6),)
+    walk = behind
+    rest = AT_REST
+    projected_roles = ("current",)
+    confused_with = ("sensor.delay", "sensor.lag", "inertia.missing")
+    told_apart_by = "a fast chirp of the current against a blocked spindle, and in free motion"

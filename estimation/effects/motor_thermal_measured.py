@@ -1,0 +1,37 @@
+"""Thermal loss of torque by the measured temperature of the motor."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from estimation.effects.effect import Parameter, Pointwise
+
+REFERENCE_K = 298.15
+"""Temperature at which data sheets give a torque constant, K."""
+
+
+class MeasuredThermalLoss(Pointwise):
+    """The torque constant falls in proportion to the motor's temperature.
+
+    Equation: loss = c current (temperature - 298.15 K).
+
+    Source: the reversible temperature coefficient of a magnet's remanence, IEC 60404-8-1.
+    """
+
+    id = "motor.thermal.measured"
+    family = "motor.thermal"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"current": "motor_current_a", "temperature": "motor_temperature_k"}
+    amplitudes = (
+        Parameter(
+            "loss",
+            "target / current / temperature",
+            "fall of the torque constant for one kelvin",
+            lower=0.0,
+        ),
+    )
+    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
+    told_apart_by = "a run repeated at once after itself, and again after the motor has cooled"
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return the current times the warming."""
+        return (inputs["current"] * (inputs["temperature"] - REFERENCE_K),)

@@ -1,0 +1,41 @@
+"""Thermal loss of torque over the time of a run, whatever heats the motor."""
+
+from typing import ClassVar
+
+import numba
+import numpy as np
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.recording import FloatArray
+
+
+@numba.njit(cache=True)
+def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Walk; state: whether a sample has come, the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 0]
+        rows[i, 0] = now[i, 1] * (1.0 - np.exp(-(now[i, 0] - state[1]) / shape[0]))
+
+
+class WarmingLoss(Remembering):
+    """The torque constant settles to its warm value by an exponential.
+
+    Equation: loss = c current (1 - exp(-t / T)), t from the first sample of the run.
+
+    Source: Newton's law of cooling under a steady mean load, and a magnet's remanence that falls in
+    proportion to its temperature.
+    """
+
+    id = "motor.thermal.warming"
+    family = "motor.thermal"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"clock": "time_s", "current": "motor_current_a"}
+    amplitudes = (
+        Parameter("loss", "target / current", "fall of the torque constant, warm", lower=0.0),
+    )
+    shape = (Parameter("time_constant", "clock", "thermal time constant", 0.5, 100.0, points=6),)
+    walk = _walk
+    rest = (0.0, 0.0)
+    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
+    told_apart_by = "a run repeated at once after itself, and again after the motor has cooled"

@@ -1,0 +1,45 @@
+"""Sensor lag: a reading that follows what it measures as a first-order lag does."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.first_order import AT_REST, behind
+
+
+class SensorLag(Remembering):
+    """A reading behind a first-order filter that the others do not go through.
+
+    Equation: error = a (lagged - reading); d lagged / dt = (reading - lagged) / T, at rest on the
+    first sample. A late target shows through what the balance says of it (a > 0), a late regressor
+    as the opposite (a < 0): motor by the projected load or the current, gearbox by the proximal
+    torque, cable by the distal torque, stretch by the distal torque or the spindle's angle.
+
+    Source: any anti-aliasing filter or bridge amplifier; Ljung 1999, "System Identification",
+    section 13.7 (filters of the channels must match).
+    """
+
+    id = "sensor.lag"
+    balances: ClassVar = {
+        "motor": 1,
+        "gearbox": 1,
+        "cable": 1,
+        "stretch": 1,
+        "grasp": 1,
+        "joint": 1,
+    }
+    roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
+    # a late reading weighs as much as the reading: 1 for the target's own, at most 1.5 on the rig
+    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
+    shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 0.2, points=6),)
+    walk = behind
+    rest = AT_REST
+    projected_roles = ("reading",)
+    confused_with = (
+        "sensor.delay",
+        "sensor.creep",
+        "motor.electrical",
+        "inertia.missing",
+        "friction.viscous",
+        "transmission.relaxation",
+    )
+    told_apart_by = "a chirp: the lag's phase bends with frequency, and its gain falls"

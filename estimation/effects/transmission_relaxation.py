@@ -1,0 +1,57 @@
+"""Relaxation: a transmission that goes on yielding after the load has come."""
+
+from typing import ClassVar
+
+import numba
+import numpy as np
+
+from estimation.effects.effect import Parameter, Remembering
+from estimation.recording import FloatArray
+
+
+@numba.njit(cache=True)
+def walk_lag(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Walk; state: whether a sample has come, its time and load, the load less its lag.
+
+    Where there are several columns, each is `SLOWER` times slower than the one before.
+    """
+    for i in range(len(now)):
+        load, clock = now[i, 0], now[i, 1]
+        if state[0]:
+            span, change = clock - state[1], load - state[2]
+            time = shape[0]
+            for k in range(rows.shape[1]):
+                # exact for a load that changes evenly between two samples
+                part = span / time
+                gone = -np.expm1(-part)
+                share = gone / part if part > 0.0 else 1.0
+                state[3 + k] = state[3 + k] * (1.0 - gone) + change * share
+                time *= SLOWER
+        state[0], state[1], state[2] = 1.0, clock, load
+        for k in range(rows.shape[1]):
+            rows[i, k] = state[3 + k]
+
+
+SLOWER = 8.0
+"""Ratio of the times of neighbouring elements of a Prony series."""
+
+
+class Relaxation(Remembering):
+    """The standard linear solid: what a cable has not yet yielded of its final deflection.
+
+    Equation: deflection lost = c (load - x); dx/dt = (load - x) / time, x = load at the start.
+
+    Source: the standard linear solid of Zener 1948.
+    """
+
+    id = "transmission.relaxation"
+    balances: ClassVar = {"gearbox": -1, "stretch": 1}
+    roles: ClassVar = {"load": "distal_torque_n_m", "clock": "time_s"}
+    amplitudes = (
+        Parameter("compliance", "target / load", "compliance that comes with time", lower=0.0),
+    )
+    shape = (Parameter("time", "clock", "time after which 63 % of it has come", 0.02, 30.0),)
+    walk = walk_lag
+    rest = (0.0, 0.0, 0.0, 0.0)
+    confused_with = ("hysteresis.presliding", "sensor.creep", "sensor.drift", "sensor.lag")
+    told_apart_by = "a step of load that is held three times as long"

@@ -1,0 +1,128 @@
+"""The residual watch: says when a fitted model stops fitting what is recorded.
+
+The unit is the run, as everywhere. Each run's error, on the scale of its logarithm, is held against
+the error and the spread over runs that the model's own fit had; a one-sided cumulative sum adds up
+what is beyond half a spread (Page, Biometrika 41, 1954), so that a small lasting change is told
+like a large one, and a single odd run is not.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.derived import settled_places
+from estimation.model import Model, balance_channels, estimate
+from estimation.recording import Recording
+
+SLACK = 0.5
+"""Spreads by which a run may be worse than usual without counting."""
+
+LIMIT = 5.0
+"""Sum at which the model no longer fits: with this slack a change is claimed by chance once in
+some 900 runs (normal errors)."""
+
+MOST = 4.0
+"""A run counts as this many spreads at most, so that no single run decides."""
+
+LEAST_SPREAD = 0.1
+"""Runs that the model was not fitted on differ by a tenth at least."""
+
+FIRST = 5
+"""Runs that stand for the fit's own where the model's file tells no error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What one run says of the model.
+
+    Attributes:
+        name: Name of the run.
+        rmse: Its error, in the unit of the target, its mean removed where offsets are a nuisance.
+        usual: The error of the model's own fit; None while it is still being learnt.
+        statistic: The cumulative sum, in spreads.
+        since: First run that the model does not fit, or None while it fits.
+    """
+
+    name: str
+    rmse: float
+    usual: float | None
+    statistic: float
+    since: str | None
+
+    @property
+    def fits(self) -> bool:
+        """Whether the model still fits."""
+        return self.since is None
+
+
+class ResidualWatch:
+    """Sees runs one after the other and says when a model stops fitting."""
+
+    def __init__(self, model: Model, least_spread: float = LEAST_SPREAD) -> None:
+        """Start before the first run.
+
+        Args:
+            model: A fitted model.
+            least_spread: Least spread of the log error; more for pieces of runs than for runs.
+        """
+        self.model = model
+        self._least_spread = least_spread
+        self._learnt: list[float] = []
+        self._sum = 0.0
+        self._rising: list[tuple[str, float]] = []
+        self._since: str | None = None
+
+    def see(self, recording: Recording) -> Sight | None:
+        """Take the next run; None where it has no sample that a fit would use.
+
+        Raises:
+            NotFittedError: A parameter has no value.
+            MissingChannelError: The run lacks a channel of the model.
+        """
+        error = run_error(self.model, recording)
+        if error is None or error <= 0.0:
+            return None
+        usual, spread = self._usual()
+        if usual is None:
+            self._learnt.append(error)
+            return Sight(recording.name, error, None, 0.0, None)
+        worse = min((math.log(error / usual)) / max(spread, self._least_spread), MOST)
+        self._sum = max(0.0, self._sum + worse - SLACK)
+        self._rising = [*self._rising, (recording.name, worse)] if self._sum > 0.0 else []
+        if self._sum > LIMIT and self._since is None:
+            self._since = _begin(self._rising)
+        return Sight(recording.name, error, usual, self._sum, self._since)
+
+    def _usual(self) -> tuple[float | None, float]:
+        """Return the error a run usually has and the spread of its logarithm."""
+        evidence = self.model.evidence
+        if evidence is not None:
+            rmse = evidence.rmse if self.model.run_offsets else evidence.rmse_with_means
+            return rmse, evidence.run_spread or 0.0
+        if len(self._learnt) < FIRST:
+            return None, 0.0
+        logs = np.log(self._learnt)
+        return float(np.exp(logs.mean())), float(logs.std(ddof=1))
+
+
+def _begin(rising: Sequence[tuple[str, float]]) -> str:
+    """Return the run at which a step in the error explains most of it, in least squares."""
+    errors = np.array([worse for _, worse in rising])
+    after = np.cumsum(errors[::-1])[::-1]
+    lengths = np.arange(len(errors), 0, -1)
+    gain = np.where(after > 0, after**2 / lengths, 0.0)
+    return rising[int(np.argmax(gain))][0]
+
+
+def run_error(model: Model, recording: Recording) -> float | None:
+    """Return a model's error on one run as its fit counts it, or None without a usable sample."""
+    channels = balance_channels(model, recording)
+    places = settled_places(channels, model.low_pass, samples=model.samples)
+    if places.size == 0:
+        return None
+    error = (channels[model.target] - estimate(model, channels))[places]
+    if model.run_offsets:
+        error = error - error.mean()
+    return float(np.sqrt(np.mean(error**2)))

@@ -1,0 +1,58 @@
+// A board on whatever hardware there is: the tick of the sampling timer, and the bytes in between.
+//
+// Hardware offers
+//   std::uint32_t now_us();                                a free-running timer; it may wrap
+//   rig::Inputs sample();                                  counts; rig::kMissing where there is none
+//   void drive(const rig::Outputs&);                       set values of both motors
+//   std::size_t read(std::uint8_t* out, std::size_t room);  bytes from the host, without waiting
+//   std::size_t write(const std::uint8_t*, std::size_t);    takes what it can without waiting
+//   class Lock;                                            keeps the tick out while it lives
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "board.hpp"
+
+namespace rig {
+
+template <class Hardware, std::size_t TransmitCapacity>
+class App {
+  public:
+    App(Hardware& hardware, const char* serial) : hardware_(hardware), board_(serial) {}
+
+    // Once a millisecond, from the sampling timer.
+    void tick(std::uint32_t tick_us) {
+        hardware_.drive(board_.tick(tick_us, hardware_.sample()));
+    }
+    void tick() { tick(hardware_.now_us()); }
+
+    // From the main loop, as often as there is time.
+    void exchange() {
+        std::uint8_t bytes[kChunk];
+        const std::size_t received = hardware_.read(bytes, kChunk);
+        if (received != 0) {
+            const typename Hardware::Lock lock;
+            board_.receive(bytes, received);
+        }
+        if (first_ == last_) fill();
+        if (first_ < last_) first_ += hardware_.write(waiting_ + first_, last_ - first_);
+    }
+
+  private:
+    static constexpr std::size_t kChunk = 512;
+
+    void fill() {
+        const typename Hardware::Lock lock;
+        first_ = 0;
+        last_ = board_.transmit(waiting_, kChunk);
+    }
+
+    Hardware& hardware_;
+    Board<TransmitCapacity> board_;
+    std::uint8_t waiting_[kChunk] = {};
+    std::size_t first_ = 0;
+    std::size_t last_ = 0;
+};
+
+}  // namespace rig

@@ -1,0 +1,101 @@
+// The firmware as a process of its own, in real time, on a pseudo-terminal: what a board on USB is to
+// a host, with a small plant in place of the rig. Prints the terminal's path and runs until it is
+// told to end or its parent is gone.
+//   build/rig_firmware [SERIAL]
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "../core/app.hpp"
+#include "plain_plant.hpp"
+
+namespace {
+
+constexpr std::size_t kTransmitCapacity = 65536;
+constexpr std::uint64_t kTickNs = 1000000;
+
+volatile std::sig_atomic_t ended = 0;
+void end(int) { ended = 1; }
+
+std::uint64_t now_ns() {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return static_cast<std::uint64_t>(now.tv_sec) * 1000000000U +
+           static_cast<std::uint64_t>(now.tv_nsec);
+}
+
+void sleep_until(std::uint64_t when_ns) {
+    timespec when{};
+    when.tv_sec = static_cast<time_t>(when_ns / 1000000000U);
+    when.tv_nsec = static_cast<long>(when_ns % 1000000000U);
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR && !ended) {
+    }
+}
+
+class PtyHardware {
+  public:
+    struct Lock {  // one thread: nothing to keep out
+        Lock() {}
+    };
+
+    explicit PtyHardware(int master) : master_(master) {}
+
+    std::uint32_t now_us() { return static_cast<std::uint32_t>(now_ns() / 1000U); }
+    rig::Inputs sample() { return plant_.sample(); }
+    void drive(const rig::Outputs& outputs) { plant_.step(outputs); }
+
+    std::size_t read(std::uint8_t* out, std::size_t room) { return some(::read(master_, out, room)); }
+    std::size_t write(const std::uint8_t* data, std::size_t size) {
+        return some(::write(master_, data, size));
+    }
+
+  private:
+    // nothing there, nobody at the other end, or no room: the same to a board
+    static std::size_t some(ssize_t count) { return count > 0 ? static_cast<std::size_t>(count) : 0; }
+
+    int master_;
+    rig::PlainPlant plant_;
+};
+
+int open_master() {
+    const int master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0) return -1;
+    termios raw{};
+    if (tcgetattr(master, &raw) != 0) return -1;
+    cfmakeraw(&raw);
+    return tcsetattr(master, TCSANOW, &raw) == 0 ? master : -1;
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+    std::signal(SIGTERM, end);
+    std::signal(SIGINT, SIG_IGN);  // Ctrl-C is the host's; the board makes itself safe
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    const int master = open_master();
+    if (master < 0) {
+        std::perror("no pseudo-terminal");
+        return 1;
+    }
+    std::printf("%s\n", ptsname(master));
+    std::fflush(stdout);
+    PtyHardware hardware(master);
+    static rig::App<PtyHardware, kTransmitCapacity> app(hardware, count > 1 ? words[1] : "PTY-0001");
+    const std::uint64_t began_ns = now_ns();
+    for (std::uint64_t tick = 1; !ended; ++tick) {
+        // the clock says when a tick is due, so a process that slept too long catches up
+        const std::uint64_t due_ns = began_ns + tick * kTickNs;
+        if (now_ns() < due_ns) sleep_until(due_ns);
+        app.exchange();
+        app.tick(static_cast<std::uint32_t>(due_ns / 1000U));
+        app.exchange();
+    }
+    return 0;
+}

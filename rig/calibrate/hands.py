@@ -1,0 +1,160 @@
+"""Hands in the simulated world: they do what a step asks a person to do, and the sensors see it."""
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.procedure import Step
+from calibration.torque import weight_torque_n_m
+from drivers.ati_net.driver import AtiNet
+from drivers.ati_net.fake import RdtFake, fake_calibration
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.guard import COLUMNS, Drive
+from drivers.transport.simulated import SimulatedTransport
+from rig.config import Config
+from rig.simulation import hidden, parameters
+from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench
+from rig.simulation.press import PressedFsr, press_force_n
+from rig.simulation.sensors import DISTAL, FSR, PROXIMAL
+
+MARK_COUNT = 1000
+"""Spindle count at which the simulated rig's index mark is lined up."""
+
+
+class HandledBench:
+    """The simulated bench with what hands add to it. Implements `drivers.teensy.fake.Bench`."""
+
+    def __init__(self, config: Config) -> None:
+        simulation = config.simulation
+        effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
+        if simulation.draw_hidden is not None:
+            effects.append(hidden.draw(simulation.draw_hidden))
+        plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
+        if simulation.spread:
+            plant = parameters.vary(plant, simulation.seed, simulation.spread)
+            sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
+        self._plant, self._sensors, self._effects = plant, sensors, effects
+        self._inner = self._made(REFERENCE_START_COUNT, simulation.seed)
+        self._seed = simulation.seed
+        self._added = np.zeros(COLUMNS)
+        self._noise = np.random.default_rng(simulation.seed)
+        self.fsr: PressedFsr | None = None
+
+    def _made(self, start_count: int, seed: int) -> SimulatedBench:
+        return SimulatedBench(self._plant, self._sensors, self._effects, seed, start_count)
+
+    def hang(self, sensor: str, torque_n_m: float) -> None:
+        """Put a torque on a sensor, from its weight's arm."""
+        column, sign = (PROXIMAL, 1.0) if sensor == "proximal" else (DISTAL, -1.0)
+        self._added[column] = sign * torque_n_m / self._sensors.torque_n_m_per_count
+
+    def unbalance(self, sensor: str, counts: float) -> None:
+        """Switch a shunt, which changes the reading by so many counts."""
+        self._added[PROXIMAL if sensor == "proximal" else DISTAL] = counts
+
+    def turn_to_mark(self) -> None:
+        """Turn the spindle by hand until the mark is lined up, to about two counts."""
+        self._seed += 1
+        at = MARK_COUNT + round(float(self._noise.normal(0.0, 1.5)))
+        self._inner = self._made(at, self._seed)
+
+    def advance(
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        drive: Drive,
+    ) -> NDArray[np.int32]:
+        """Run the bench and add what hands do; see `drivers.teensy.fake.Bench.advance`."""
+        rows = self._inner.advance(ticks, target, load_ma, drive)
+        for column in np.flatnonzero(self._added):
+            limit = self._sensors.torque_limit_count
+            moved = np.clip(np.round(rows[:, column] + self._added[column]), -limit - 1, limit)
+            rows[:, column] = moved.astype(np.int32)
+        if self.fsr is not None:
+            rows[:, FSR] = self.fsr.counts(ticks)
+        return rows
+
+
+class LoadedRdt(RdtFake):
+    """The force sensor's fake with a load of our own on it, counts a unit from its calibration."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__()
+        self._noise = np.random.default_rng(seed)
+        self.zero = np.array([3.1, -2.2, 5.7, 0.041, -0.033, 0.012])
+        self.wrench = np.zeros(6)
+        self.press: NDArray[np.float64] | None = None
+        self._pressed = 0
+
+    def load(self, tick: int) -> NDArray[np.int64]:
+        """Return the counts of the six axes, int64, shape (6,)."""
+        wrench = self.zero + self.wrench
+        if self.press is not None:
+            wrench = wrench.copy()
+            wrench[2] += self.press[min(self._pressed, self.press.size - 1)]
+            self._pressed += 1
+        noise = self._noise.normal(0.0, 1.0, 6) * [0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4]
+        return np.round((wrench + noise) * 1e6).astype(np.int64)
+
+    def begin_press(self, force_n: NDArray[np.float64] | None) -> None:
+        """Press from now on with this force a millisecond; None for no press."""
+        self.press, self._pressed = force_n, 0
+
+
+GRAVITY_M_S2 = 9.80665
+TOOL_KG = 0.215
+TOOL_CENTRE_M = np.array([0.004, -0.002, 0.031])
+"""Mass and centre of mass of the simulated tool, which a session does not know."""
+
+
+class SimulatedHands:
+    """Sets up steps in the simulated world. Implements `calibration.procedure.Operator`.
+
+    Args:
+        config: The simulated rig's configuration.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.bench = HandledBench(config)
+        self._board = TeensyFake(self.bench)
+        self._rdt = LoadedRdt(config.simulation.seed)
+        self._seed = config.simulation.seed
+
+    def open_logger(self) -> SimulatedTransport:
+        """Open the way to the simulated logger, the same board each time."""
+        return SimulatedTransport(self._board, "sim://", step_s=0.2)
+
+    def open_force_sensor(self) -> AtiNet:
+        """Open the simulated force sensor, the same one each time."""
+        return AtiNet(SimulatedTransport(self._rdt, "sim://ati-net"), fake_calibration)
+
+    def prepare(self, step: Step) -> None:
+        """Do what the step asks for, by its conditions."""
+        said = step.conditions
+        if "mass_kg" in said:
+            torque = weight_torque_n_m(float(said["mass_kg"]), float(said["arm_m"]))
+            self.bench.hang(str(said["sensor"]), float(torque))
+        if "shunt_ratio" in said:
+            gain = float(said.get("shunt_v_v_ratio", 0.0)) * float(
+                said.get("counts_per_v_v_ratio", 0.0)
+            )
+            self.bench.unbalance(str(said["sensor"]), float(said["shunt_ratio"]) * gain)
+        if "mark_ratio" in said:
+            self.bench.turn_to_mark()
+        if "press_n" in said:
+            self._press(step)
+        if "gravity_x_ratio" in said:
+            down = np.array([float(said[f"gravity_{axis}_ratio"]) for axis in "xyz"])
+            force = float(said.get("tool_ratio", 1.0)) * TOOL_KG * GRAVITY_M_S2 * down
+            self._rdt.wrench = np.concatenate([force, np.cross(TOOL_CENTRE_M, force)])
+
+    def _press(self, step: Step) -> None:
+        said = step.conditions
+        seed = int.from_bytes(hashlib.sha256(f"{self._seed}{step.name}".encode()).digest()[:4])
+        force = press_force_n(
+            str(said["profile"]), float(said["press_n"]), step.duration_s + 1.0, seed
+        )
+        self._rdt.begin_press(force)
+        self.bench.fsr = PressedFsr(force, seed)

@@ -1,0 +1,192 @@
+"""The logger of a rig that has none: its logic in this computer, behind it a drive on CANopen.
+
+The drive knows torque and position; guards, position loop, queue of setpoints and watchdog are the
+logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to a
+logger like any other. What a board does better: a pause of this computer is a pause of the position
+loop; the drive then keeps its last torque until its own watch on this computer's heartbeat ends it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.epos4.driver import Epos4
+from drivers.errors import LinkLostError
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.guard import (
+    COLUMNS,
+    COMMAND_E4,
+    CURRENT,
+    MOTOR,
+    SPINDLE,
+    STATE,
+    Drive,
+    drive_tick,
+)
+from drivers.teensy.protocol import MISSING, STATUS_ARMED, STATUS_HOLDING, TICK_US
+from drivers.transport.can_bus import CanBus
+
+SERIAL_PREFIX = "EPOS4-"
+TICKS_A_READ = 20
+"""Most ticks between looks at what the host has to say; shorter than any patience of the board."""
+ANSWER_S = 0.005
+MOST_MISSED = 3
+"""SYNCs on end without an answer after which the motor's position is missing."""
+_IN_FORCE = STATUS_ARMED | STATUS_HOLDING
+
+
+class Epos4Bench:
+    """The drive as `drivers.teensy.fake.Bench`: inputs from it, torque to it.
+
+    The spindle is the motor's encoder; current is told by torque, 1 mA a count; what the drive does
+    not measure is 0.
+
+    Args:
+        device: The drive, started.
+    """
+
+    def __init__(self, device: Epos4) -> None:
+        self._device = device
+        self._rated_torque_n_m = device.ratings.rated_torque_n_m
+        self._position_count = 0
+        self._current_ma = 0
+        self._missed = 0
+        self._powered = False
+        self._lost = 0
+
+    def advance(
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        drive: Drive,
+    ) -> NDArray[np.int32]:
+        """Run ticks, one a SYNC; see `drivers.teensy.fake.Bench.advance`."""
+        rows = np.zeros((ticks, COLUMNS), np.int32)
+        for k, row in enumerate(rows):
+            self._measure()
+            missing = self._missed >= MOST_MISSED
+            row[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
+            row[CURRENT] = self._current_ma
+            drive_tick(row, target[k], load_ma[k], *drive.arrays)
+            self._command(int(row[COMMAND_E4]), bool(drive.guard[STATE] & _IN_FORCE))
+        return rows
+
+    def follow(self, in_force: bool) -> None:
+        """Put the power stage in force, or take it out, and return when the drive has said so.
+
+        Raises:
+            DriverError: It has not said so.
+        """
+        if in_force and not self._powered:
+            self._powered = True  # a drive that failed half-way is to be disarmed
+            self._device.arm()
+        elif not in_force and self._powered:
+            self._device.disarm()
+            self._powered = False
+
+    def release(self) -> None:
+        """Disarm whatever is believed, and read it back."""
+        self._device.disarm()
+        self._powered = False
+
+    def _measure(self) -> None:
+        """Wait for the next SYNC and take the drive's answer, if there is one."""
+        batch = self._device.read(ANSWER_S)
+        while not len(batch) and batch.lost == self._lost:
+            batch = self._device.read(ANSWER_S)
+        self._lost = batch.lost
+        if len(batch):
+            self._missed = 0
+            self._position_count = int(batch.columns["position_count"][-1])
+            self._current_ma = round(1000 * float(batch.columns["motor_current_a"][-1]))
+        else:
+            self._missed += 1
+
+    def _command(self, command_e4: int, in_force: bool) -> None:
+        if not in_force:
+            self.follow(False)
+        elif self._powered:
+            self._device.set_torque(1e-4 * command_e4 * self._rated_torque_n_m)
+
+
+class CanopenLogger:
+    """A link to the logic of a logger, with the interface of `drivers.transport.Transport`.
+
+    Args:
+        device: The drive; identified and started here, closed with this.
+        bus: The bus it is on, for its clock.
+    """
+
+    def __init__(self, device: Epos4, bus: CanBus) -> None:
+        self._device = device
+        self._bus = bus
+        self._closed = False
+        identity = device.identify()
+        device.start()
+        self.bench = Epos4Bench(device)
+        self.bench.release()  # an earlier program may have left it in force
+        self._board = TeensyFake(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self._began_s = bus.now_s
+        self._ticks = 0
+
+    @property
+    def url(self) -> str:
+        """The bus's URL."""
+        return self._bus.url
+
+    @property
+    def now_s(self) -> float:
+        """The bus's clock, seconds."""
+        return self._bus.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        """Run ticks until there are samples or `timeout_s` has passed.
+
+        Raises:
+            DriverError: The drive has a fault, is silent, or its bus is gone.
+        """
+        self._require_link()
+        give_up_s = self._bus.now_s + timeout_s
+        data = self._board.transmit()
+        ticks = 0
+        while timeout_s > 0 and ticks < TICKS_A_READ and self._bus.now_s < give_up_s:
+            self._tick()
+            ticks += 1
+            data += self._board.transmit()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand bytes to the logic; the drive follows it before anything is acknowledged."""
+        self._require_link()
+        before = self._board.in_force
+        self._board.receive(data)
+        after = self._board.in_force
+        if after != before:
+            self.bench.follow(after)
+            self._missed_while_busy()
+
+    def close(self) -> None:
+        """Disarm where the drive may be armed, and let go of the bus.
+
+        Raises:
+            DisarmUnconfirmedError: The bus is closed, but the drive's state is unknown.
+        """
+        if not self._closed:
+            self._closed = True
+            self._device.close()
+
+    def _tick(self) -> None:
+        self._missed_while_busy()
+        self._board.advance(1)
+        self._ticks += 1
+
+    def _missed_while_busy(self) -> None:
+        """Let the logic's clock follow the bus's: ticks nobody ran are lost, and numbered."""
+        due = round((self._bus.now_s - self._began_s) * 1e6) // TICK_US
+        if due > self._ticks + 1:
+            self._board.skip(due - self._ticks - 1)
+            self._ticks = due - 1
+
+    def _require_link(self) -> None:
+        if self._closed:
+            raise LinkLostError(f"{self.url} is closed.")

@@ -1,0 +1,98 @@
+"""`rig doctor | devices | udev | selftest`: what is there, and is it in order."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json
+
+ConfigOption = Annotated[
+    Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+]
+
+
+def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
+    """Look for what is wrong with the rig, and say what to type.
+
+    Exit code 1 when something must be put right, 0 when there are at most warnings.
+    """
+    from rig.config import load_config
+    from rig.doctor.examine import examine
+    from rig.doctor.finding import Level, worst
+
+    screen = console()
+    found = []
+    for finding in examine(load_config(config)):
+        found.append(finding)
+        screen.print(
+            f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}", markup=False
+        )
+        if finding.fix:
+            screen.print(f"{'':8}fix: {finding.fix}", markup=False)
+    grave = worst(found)
+    if json:
+        emit_json({"level": grave, "findings": found})
+    return 1 if grave is Level.ERROR else 0
+
+
+def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
+    """List serial ports, CAN interfaces, installed drivers, and what is configured."""
+    from drivers.registry import drivers
+    from rig.config import load_config
+    from rig.config_check import LOGGER
+    from rig.doctor.ports import can_interfaces, serial_ports
+
+    settings = load_config(config)
+    configured: dict[str, Any] = {LOGGER: settings.logger, **settings.devices}
+    ports, buses = serial_ports(), can_interfaces()
+    texts = {name: driver.description for name, driver in drivers().items()}
+    if json:
+        named = {n: {"driver": s.driver, "url": s.url} for n, s in configured.items()}
+        emit_json(
+            {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
+        )
+        return
+    screen = console()
+    for port in ports:
+        where = f"usb:{port.usb}" if port.usb else "not on USB"
+        screen.print(f"port        {port.path}  {where}  {port.name}", markup=False)
+    for name in buses:
+        screen.print(f"CAN         {name}  can:socketcan:{name}", markup=False)
+    if not ports and not buses:
+        screen.print("No serial port and no CAN interface is present.")
+    for name, section in configured.items():
+        screen.print(f"configured  {name}: {section.driver} at {section.url}", markup=False)
+    for name, text in texts.items():
+        screen.print(f"driver      {name:12}{text}", markup=False)
+
+
+def udev() -> None:
+    """Print the udev rules that give you the rig's devices; the first lines say how to install."""
+    from rig.doctor.udev import udev_rules
+
+    typer.echo(udev_rules(), nl=False)
+
+
+def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:
+    """Run the acceptance test of a bench: devices, rates, zeros, limits, watchdog, stop.
+
+    Nothing moves. Exit code 1 when a check fails.
+    """
+    from rig.config import load_config
+    from rig.config_check import refuse_problems
+    from rig.doctor.selftest import selftest as checks
+
+    settings = load_config(config)
+    refuse_problems(settings)
+    screen = console()
+    done = []
+    for check in checks(settings):
+        done.append(check)
+        word = "pass" if check.passed else "FAIL"
+        screen.print(f"{word}  {check.name}: {check.detail}", markup=False)
+    failed = [check.name for check in done if not check.passed]
+    screen.print(f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}.")
+    if json:
+        emit_json({"passed": not failed, "checks": done})
+    return 1 if failed else 0

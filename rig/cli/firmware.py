@@ -1,0 +1,58 @@
+"""`rig firmware`: which firmware is where, build it, flash it."""
+
+from typing import Annotated
+
+import typer
+
+from rig.cli.doctor import ConfigOption
+from rig.cli.output import JsonFlag, console, emit_json
+
+firmware_app = typer.Typer(
+    name="firmware",
+    help="Say which firmware is where, build it, flash it.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+BoardOption = Annotated[str, typer.Option("--board", "-b", help="teensy41 or teensy35.")]
+
+
+@firmware_app.command()
+def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
+    """Hold the board's firmware against this program's and this source tree's.
+
+    Exit code 1 when they do not go together.
+    """
+    from rig.config import load_config
+    from rig.firmware import compare
+
+    settings = load_config(config)
+    versions = compare(settings)
+    screen = console()
+    screen.print(f"program   {versions.program}", markup=False)
+    screen.print(f"sources   {versions.sources}", markup=False)
+    screen.print(f"board     {versions.board}", markup=False)
+    for remark in versions.remarks:
+        screen.print(remark, markup=False)
+    if json:
+        emit_json(versions)
+    return 0 if versions.fits else 1
+
+
+@firmware_app.command()
+def build(board: BoardOption = "") -> None:
+    """Build the firmware: for the simulated rig, or with --board for a Teensy."""
+    from rig.firmware import build as make
+    from rig.firmware import build_for
+
+    where = build_for(board) if board else make()
+    console().print(f"Built {where}.", markup=False)
+
+
+@firmware_app.command()
+def flash(board: BoardOption = "teensy41") -> None:
+    """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
+    from rig.firmware import flash as write
+
+    write(board)
+    console().print("Flashed. Next: rig firmware version", markup=False)

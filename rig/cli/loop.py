@@ -1,0 +1,97 @@
+"""`rig loop`: record, diagnose, take the next experiment, until the name is unique."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json, progress
+
+
+def loop(
+    sim: Annotated[
+        bool, typer.Option("--sim", help="On the simulated rig; no other is moved.")
+    ] = False,
+    hide: Annotated[
+        list[str] | None,
+        typer.Option(help="Hidden effect, or effect=strength; by seed if none; `none` for none."),
+    ] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    protocol: Annotated[
+        str | None, typer.Option("--protocol", "-p", help="First protocol; diagnosis if none.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for everything.")] = None,
+    rounds: Annotated[int, typer.Option(help="Campaigns at most.")] = 3,
+    minutes: Annotated[float, typer.Option(help="No round begins later than this.")] = 20.0,
+    seed: Annotated[int | None, typer.Option(help="Seed; by the clock if none.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Without simulated twins.")] = False,
+    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to work on.")
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Record, diagnose and choose the next experiment, until the name is unique.
+
+    Ends when every name is unique, when nothing is missing, or when the budget is spent.
+    """
+    from rig.config import load_config
+    from rig.diagnosis.engine import engine
+    from rig.diagnosis.loop import Budget, Round, run_loop
+    from rig.diagnosis.run import declared_models
+    from rig.errors import UsageError
+    from rig.protocol import load_protocol
+    from rig.reports.diagnosis import next_sentence, page, sentences
+    from rig.reports.provenance import Provenance
+    from rig.reports.render import write_report
+    from rig.simulation.hidden import chosen
+
+    if not sim:
+        raise UsageError("The loop moves the simulated rig only.", fix="Type `rig loop --sim`.")
+    screen = console()
+    now = datetime.now()
+    number = seed if seed is not None else int(now.timestamp()) % 1000
+    hidden = chosen(hide, number)
+    settings = load_config().changed(simulation={"seed": number, "hidden": hidden})
+    folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
+    screen.print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
+    first = load_protocol(protocol) if protocol else None
+    made: list[Round] = []
+    with engine(workers, scheduler) as executor, progress() as bar:
+        task = bar.add_task("samples", total=None)
+
+        def count(name: str, samples: int, expected: int) -> None:
+            bar.update(task, completed=samples, total=expected, description=name)
+
+        for one in run_loop(
+            folder,
+            settings,
+            declared_models(None, balance),
+            Budget(rounds, minutes),
+            first=first,
+            seed=number,
+            executor=executor,
+            quick=quick,
+            on_stage=lambda text: screen.print(f"- {text}", markup=False),
+            on_progress=count,
+        ):
+            made.append(one)
+            for line in sentences(one.done.diagnosis):
+                screen.print(line, markup=False)
+            report = folder / f"round-{one.number}"
+            where = write_report(report / "diagnosis.html", page(one.done, Provenance.now(number)))
+            screen.print(f"Report: {where}", markup=False)
+            screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
+    told = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
+    screen.print(f"What was hidden: {told or 'nothing'}.", markup=False)
+    if json:
+        last = made[-1]
+        emit_json(
+            {
+                "folder": folder,
+                "hidden": hidden,
+                "stopped": last.stopped,
+                "rounds": [one.to_json() for one in made],
+            }
+        )

@@ -1,0 +1,33 @@
+"""`rig stop`: take the motors out of force, and say so only once the board has said so."""
+
+from rig.cli.doctor import ConfigOption
+from rig.cli.output import JsonFlag, console, emit_json
+
+
+def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
+    """Disarm the rig and read back that it is disarmed.
+
+    Exit code 0 only when the rig itself has said so; 4 when its state is unknown.
+    """
+    from drivers.errors import DriverError
+    from drivers.teensy.driver import TeensyLogger
+    from rig.config import load_config
+    from rig.errors import ExitCode
+    from rig.logger import open_logger
+
+    settings = load_config(config)
+    screen = console()
+    try:
+        with TeensyLogger(open_logger(settings)) as logger:
+            logger.disarm()
+    except DriverError as error:
+        screen.print(f"{settings.name}: UNKNOWN. Take the motors for live.", markup=False)
+        for word, text in (("why", f"{error.what} {error.why}"), ("fix", error.fix)):
+            screen.print(f"  {word}: {text}", markup=False)
+        if json:
+            emit_json({"state": "unknown", "why": str(error)})
+        return int(ExitCode.SAFETY)
+    screen.print(f"{settings.name}: disarmed, and it has said so.", markup=False)
+    if json:
+        emit_json({"state": "disarmed"})
+    return 0

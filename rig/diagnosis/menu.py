@@ -1,0 +1,142 @@
+"""The menu of experiments a diagnosis may propose, each a protocol within what the rig has done."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.recording import Recording
+from rig.config import LimitsSection
+from rig.protocol import Protocol
+
+LOADS_A = (0.15, 0.5, 0.9)
+MARGIN = 0.8
+"""Share of a limit that a proposed experiment may use."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What an experiment may use.
+
+    Attributes:
+        open_rad: Spindle angle where the travel begins.
+        travel_rad: Travel from there.
+        loads_a: Loads.
+    """
+
+    open_rad: float
+    travel_rad: float
+    loads_a: tuple[float, ...]
+
+
+def room_of(recordings: Sequence[Recording], limits: LimitsSection) -> Room:
+    """Return the travel the recordings have shown, and loads within the rig's limits."""
+    angles = np.concatenate([r["spindle_angle_rad"] for r in recordings])
+    low, high = (float(v) for v in np.percentile(angles, [1, 99]))
+    reach = MARGIN * limits.spindle_angle_rad
+    low, high = max(low, -reach), min(high, reach)
+    loads = tuple(load for load in LOADS_A if load <= MARGIN * limits.load_command_a)
+    return Room(low, high - low, loads)
+
+
+def within(recordings: Sequence[Recording], limits: LimitsSection) -> bool:
+    """Say whether simulated runs stay away from every limit."""
+    return all(
+        float(np.abs(run[name]).max()) <= MARGIN * limit
+        for run in recordings
+        for name, limit in limits.model_dump().items()
+        if name in run
+    )
+
+
+def menu(room: Room) -> list[Protocol]:
+    """Return the experiments: six short runs each, so that some of them can confirm."""
+    starts = [round(room.open_rad + share * room.travel_rad, 4) for share in (0.05, 0.3)]
+    travel = round(0.6 * room.travel_rad, 4)
+    loads = list(room.loads_a)
+    every = {"loads_a": loads, "jaw_starts_rad": starts}
+    half = {"amplitude_rad": round(0.5 * travel, 4)}
+    ten = {"duration_s": 10.0}
+    entries: list[tuple[str, str, dict[str, object]]] = [
+        (
+            "grasps",
+            "the plain grasps again, at three loads",
+            {"kind": "sine", "frequencies_hz": [0.3], **half, **ten, **every},
+        ),
+        (
+            "speeds",
+            "constant speeds from slow to fast, both ways, at three loads",
+            {
+                "kind": "speed_staircase",
+                "speeds_rad_s": [0.12, 0.3, 0.8, 1.5],
+                "travel_rad": travel,
+                "pause_s": 0.1,
+                **every,
+            },
+        ),
+        (
+            "reversals",
+            "tiny motions to and fro, at three loads",
+            {
+                "kind": "sine",
+                "frequencies_hz": [0.8],
+                "amplitude_rad": round(0.04 * room.travel_rad, 4),
+                **ten,
+                **every,
+            },
+        ),
+        (
+            "holds",
+            "steps that are held, at three loads",
+            {
+                "kind": "step_hold",
+                "levels_rad": [round(share * travel, 4) for share in (0, 0.5, 1, 0.5, 0)],
+                "hold_s": 2.5,
+                **every,
+            },
+        ),
+        (
+            "loads",
+            "grasps while the load climbs and falls",
+            {
+                "kind": "load_staircase",
+                "loads_a": [loads[0], loads[-1], loads[len(loads) // 2], loads[0]],
+                "hold_s": 3.0,
+                "frequencies_hz": [0.15, 0.3, 0.5],
+                "jaw_starts_rad": starts,
+                **half,
+            },
+        ),
+        (
+            "free",
+            "slow and fast sweeps without load",
+            {
+                "kind": "sine",
+                "frequencies_hz": [0.1, 0.25, 0.5],
+                "loads_a": [0.0],
+                "jaw_starts_rad": starts,
+                **half,
+                **ten,
+            },
+        ),
+        (
+            "chirp",
+            "small grasps that become faster and faster",
+            {
+                "kind": "chirp",
+                "low_hz": 0.2,
+                "high_hz": 4.0,
+                "amplitude_rad": round(0.06 * room.travel_rad, 4),
+                **every,
+            },
+        ),
+        (
+            "dwells",
+            "moves after rests of different length",
+            {"kind": "dwell", "dwells_s": [0.2, 4.0, 1.0, 0.2, 2.0], "travel_rad": travel, **every},
+        ),
+    ]
+    return [
+        Protocol.model_validate({"name": name, "description": what, "runs": [table]})
+        for name, what, table in entries
+    ]

@@ -1,0 +1,148 @@
+"""The next experiment of a diagnosis: the menu played on the simulated twin, the best one taken."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from estimation.derived import measured_channels
+from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.design import DesignError, prepare, targets
+from estimation.diagnosis.diagnose import Story
+from estimation.diagnosis.maps import PROJECTED_LOAD, projection
+from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
+from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.diagnosis.twin import coarse
+from estimation.files import write_text_atomic
+from estimation.recording import Recording
+from rig.config import load_config
+from rig.diagnosis.menu import menu, room_of, within
+from rig.protocol import Protocol, protocol_toml
+from rig.simulation.twin import Twin
+
+SEED = 7_000_000
+"""Far from the seeds of the twins that prove a finding."""
+
+
+MADE = ("time_s", PROJECTED_LOAD)
+"""Channels that preparing a run makes by itself."""
+
+
+def propose(
+    diagnosis: Diagnosis,
+    stories: Mapping[str, Story],
+    recordings: Sequence[Recording],
+    twin: Twin | None,
+) -> dict[str, Any] | None:
+    """Return the next experiment in plain JSON types, or None where every name is unique.
+
+    Without a twin, it is what the rivals themselves say tells them apart, in words, and no
+    protocol.
+
+    Args:
+        diagnosis: The answer.
+        stories: The stories behind it.
+        recordings: The runs.
+        twin: Simulates the declared models, or None.
+    """
+    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    for finding in diagnosis.findings:
+        story = stories[finding.balance]
+        rivals = rivals_of(story, finding, measured)
+        if len(rivals) < 2:
+            continue
+        if twin is None:
+            return _in_words(finding, rivals)
+        scored = _scored(story, finding, rivals, recordings, twin)
+        if scored:
+            return _described(finding, rivals, scored)
+        return _in_words(finding, rivals)
+    return None
+
+
+def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
+    """Write the next experiment as a protocol file; return what to tell a person."""
+    proposed = diagnosis.next_experiment
+    if proposed is None:
+        return "No next experiment: there are no rivals to tell apart."
+    if proposed["protocol"] is None:
+        return f"No protocol for the next experiment; by hand: {proposed['description']}."
+    write_text_atomic(path, protocol_toml(Protocol.model_validate(proposed["protocol"])))
+    return f"Next: rig record --protocol {path}"
+
+
+def _scored(
+    story: Story,
+    finding: Finding,
+    rivals: Sequence[Candidate],
+    recordings: Sequence[Recording],
+    twin: Twin,
+) -> list[tuple[Protocol, Worth]]:
+    limits = load_config().limits
+    balance = story.balance
+    known = list(balance.runs[0].channels)
+    whole = projection(balance)
+    # old and new runs are thinned alike
+    old = [coarse(run) for run in balance.runs]
+    thin = replace(balance, runs=old, target=targets(old, balance.model), tables_of={})
+    scored = []
+    for protocol in menu(room_of(recordings, limits)):
+        plans = protocol.plans()
+        played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
+        if not within(played, limits):
+            continue
+        wanted = [name for name in known if _played(name, played[0])]
+        others = [*rivals, *beside(story, finding)]
+        read = {channel for one in others for _, channel in one.channels}
+        if not read <= {*wanted, *MADE}:
+            continue  # a rival reads what a simulated run does not have, such as campaign time
+        runs = []
+        for run in played:
+            try:
+                runs.append(coarse(whole(prepare(run, wanted, balance.model))))
+            except DesignError:
+                continue  # a run that only rests tells nothing of this balance
+        if runs:
+            seconds = sum(plan.duration_s for plan in plans)
+            told = worth(thin, beside(story, finding), rivals, protocol.name, runs, seconds)
+            scored.append((protocol, told))
+    return sorted(scored, key=lambda pair: -pair[1].net)
+
+
+def _played(name: str, run: Recording) -> bool:
+    """Say whether a simulated run has a channel, or what it is made from."""
+    return name not in MADE and all(source in run for source in measured_channels([name]))
+
+
+def _described(
+    finding: Finding, rivals: Sequence[Candidate], scored: Sequence[tuple[Protocol, Worth]]
+) -> dict[str, Any]:
+    protocol, best = scored[0]
+    return {
+        "name": protocol.name,
+        "description": protocol.description,
+        "balance": finding.balance,
+        "between": [rival.family for rival in rivals],
+        "discrimination": best.discrimination,
+        "others": {other.name: told.discrimination for other, told in scored[1:]},
+        "seconds": best.seconds,
+        "protocol": {
+            "name": protocol.name,
+            "description": protocol.description,
+            "runs": [table.model_dump(exclude_unset=True) for table in protocol.runs],
+        },
+    }
+
+
+def _in_words(finding: Finding, rivals: Sequence[Candidate]) -> dict[str, Any]:
+    advice = dict.fromkeys(r.effect.told_apart_by for r in rivals if r.effect.told_apart_by)
+    return {
+        "name": "by hand",
+        "description": "; ".join(advice),
+        "balance": finding.balance,
+        "between": [rival.family for rival in rivals],
+        "discrimination": None,
+        "others": {},
+        "seconds": None,
+        "protocol": None,
+    }

@@ -1,0 +1,77 @@
+"""Twins for a diagnosis: which balances can be played by the simulated rig, and from what fits."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.errors import EstimationError
+from estimation.fitting import fit
+from estimation.model import Model
+from estimation.recording import Recording
+from rig.errors import RigError
+from rig.simulation.twin import Twin, build_twin
+
+PLAYED = ("motor", "gearbox", "cable", "stretch")
+"""Balances of the simulated rig's own parts."""
+
+Maker = Callable[[Model, Sequence[Recording]], Twin]
+
+
+@dataclass(frozen=True)
+class Twins:
+    """What simulates the declared models, or why nothing can.
+
+    Attributes:
+        twin: Seed to one campaign with the references of the runs that discover; None if none.
+        balances: Balances it plays.
+        note: Why some balance has none, in words; empty when all have.
+    """
+
+    twin: Twin | None
+    balances: tuple[str, ...] = ()
+    note: str = ""
+
+    @property
+    def makers(self) -> Mapping[str, Maker]:
+        """Balance to what `estimation.diagnosis.diagnose` asks for its twin."""
+        twin = self.twin
+        return {} if twin is None else {name: lambda *_: twin for name in self.balances}
+
+
+def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
+    """Fit every balance the simulated rig has and build one twin that plays them all.
+
+    A balance that is not diagnosed is taken from the shipped models: the plant needs all its parts.
+
+    Args:
+        models: Declared models that are diagnosed.
+        discover: Runs that discover; confirm runs have no part in a twin.
+    """
+    declared = {model.balance: model for model in _shipped()}
+    declared |= {model.balance: model for model in models}
+    fitted, lost = [], []
+    campaign = Campaign.of(discover)
+    for balance in PLAYED:
+        if balance not in declared:
+            continue
+        try:
+            fitted.append(fit(declared[balance], campaign, bootstrap=0))
+        except EstimationError:
+            lost.append(balance)
+    asked = [model.balance for model in models]
+    played = tuple(b for b in asked if b in {model.balance for model in fitted})
+    if not played:
+        return Twins(None, (), "The simulated rig plays none of these balances.")
+    try:
+        twin = build_twin(fitted, campaign)
+    except (RigError, EstimationError) as error:
+        return Twins(None, (), f"No simulated twin could be made. {error}")
+    left = [balance for balance in asked if balance not in played]
+    note = f"The simulated rig does not play {', '.join(left)}: no twins there." if left else ""
+    return Twins(twin, played, note)
+
+
+def _shipped() -> list[Model]:
+    read = [model_file.read(place) for place in model_file.shipped().values()]
+    return [model for model in read if model.name == model.balance]

@@ -1,0 +1,121 @@
+"""The ports of this computer: who holds them, who may open them, what talks to them unasked."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.transport.serial_port import port_holders
+from rig.doctor.finding import Finding, Level
+from rig.doctor.udev import INSTALL, USB, has_rule
+
+ROOT = Path("/")
+CAN_LINK_TYPE = "280"
+"""ARPHRD_CAN of Linux's if_arp.h."""
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """One serial port.
+
+    Attributes:
+        path: Device path.
+        usb: `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB.
+        name: What it says of itself.
+    """
+
+    path: str
+    usb: str
+    name: str
+
+
+def serial_ports() -> list[Port]:
+    """Return the serial ports of this computer."""
+    from serial.tools import list_ports
+
+    return [
+        Port(
+            str(port.device),
+            f"{port.vid:04x}:{port.pid:04x}:{port.serial_number or ''}"
+            if port.vid is not None and port.pid is not None
+            else "",
+            str(port.description or ""),
+        )
+        for port in sorted(list_ports.comports(), key=lambda found: str(found.device))
+    ]
+
+
+def can_interfaces(root: Path = ROOT) -> list[str]:
+    """Return the names of the CAN interfaces of this computer."""
+    kinds = (root / "sys/class/net").glob("*/type")
+    return sorted(k.parent.name for k in kinds if k.read_text().strip() == CAN_LINK_TYPE)
+
+
+def port_findings(ports: Sequence[Port], root: Path = ROOT) -> list[Finding]:
+    """Return what is to be said of the ports that are the rig's by their USB identity."""
+    ours = [port for port in ports if port.usb[:9] in USB]
+    findings = [one for port in ours for one in _port_findings(port, root)]
+    if ours and _runs("ModemManager", root) and not all(has_rule(p.usb, root) for p in ours):
+        findings.append(
+            Finding(
+                "this computer",
+                "ModemManager",
+                Level.WARNING,
+                "ModemManager runs and talks to every new serial port for some seconds.",
+                INSTALL,
+            )
+        )
+    return findings
+
+
+def _port_findings(port: Port, root: Path) -> list[Finding]:
+    findings = []
+    holders = port_holders(port.path)
+    if holders:
+        number = holders[0].split()[1]
+        findings.append(
+            Finding(
+                port.path,
+                "free",
+                Level.WARNING,
+                f"It is held by {', '.join(holders)}.",
+                f"Let that program end, or: kill -TERM {number}",
+            )
+        )
+    allowed = os.access(port.path, os.R_OK | os.W_OK)
+    rule = has_rule(port.usb, root)
+    if not allowed:
+        findings.append(
+            Finding(port.path, "permission", Level.ERROR, "You may not open it.", INSTALL)
+        )
+    if not rule:
+        findings.append(
+            Finding(port.path, "udev rule", Level.WARNING, "No udev rule names it.", INSTALL)
+        )
+    findings += _latency_findings(port, root)
+    if not findings:
+        findings.append(Finding(port.path, "port", Level.OK, f"{port.usb} is free and yours."))
+    return findings
+
+
+def _latency_findings(port: Port, root: Path) -> list[Finding]:
+    """An FTDI adapter waits 16 ms for more bytes unless told otherwise."""
+    timer = root / "sys/bus/usb-serial/devices" / Path(port.path).name / "latency_timer"
+    try:
+        milliseconds = int(timer.read_text())
+    except (OSError, ValueError):
+        return []
+    if milliseconds <= 1:
+        return []
+    what = f"Its latency timer is {milliseconds} ms; answers come late."
+    return [Finding(port.path, "latency", Level.WARNING, what, f"echo 1 | sudo tee {timer}")]
+
+
+def _runs(name: str, root: Path) -> bool:
+    def is_it(comm: Path) -> bool:
+        try:
+            return comm.read_text().strip() == name
+        except OSError:
+            return False  # ended meanwhile
+
+    return any(is_it(comm) for comm in (root / "proc").glob("[0-9]*/comm"))

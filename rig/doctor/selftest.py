@@ -1,0 +1,163 @@
+"""The acceptance test of a bench: every device, and that the board really makes itself safe.
+
+Nothing moves: the board is armed without a setpoint, so the motors stay without current throughout.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import CalibrationError
+from calibration.zero import drift_verdicts, measure_zeros
+from drivers.errors import CommandRefusedError, DriverError
+from drivers.teensy.driver import SampleBatch, TeensyLogger
+from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Limits, Trip
+from rig.config import Config
+from rig.devices import openers
+from rig.doctor.finding import Level
+from rig.doctor.stream import device_findings
+from rig.logger import open_logger
+from rig.safety import board_limits
+
+ZERO_S = 1.0
+APART_S = 3.0
+SETTLE_S = 0.2
+LATEST_TRIP_S = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What came of one check.
+
+    Attributes:
+        name: What was checked.
+        passed: Whether it holds.
+        detail: Numbers, or what went wrong.
+    """
+
+    name: str
+    passed: bool
+    detail: str
+
+
+def selftest(config: Config) -> Iterator[Check]:
+    """Yield the checks of the acceptance test as they are made.
+
+    Args:
+        config: The rig. Its motors may be powered; nothing is asked of them.
+    """
+    for name, open_it in openers(config):
+        findings = device_findings(name, open_it)
+        bad = [f"{f.check}: {f.what}" for f in findings if f.level is not Level.OK]
+        yield Check(f"{name} answers and streams", not bad, " ".join(bad) or findings[0].what)
+    for name, check in BOARD_CHECKS.items():
+        yield _on_the_board(name, check, config)
+
+
+def _on_the_board(
+    name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
+) -> Check:
+    try:
+        with TeensyLogger(open_logger(config)) as logger:
+            logger.identify()
+            logger.start()
+            passed, detail = check(logger, config)
+            logger.disarm()
+            logger.stop()
+    except (DriverError, CalibrationError) as error:
+        return Check(name, False, str(error))
+    return Check(name, passed, detail)
+
+
+def _zero_drift(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
+    calibrations = config.calibration_set()
+    before = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
+    _read(logger, APART_S)
+    after = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
+    drifts = drift_verdicts(before, after, calibrations, config.drift_limits)
+    detail = ", ".join(f"{d.channel} {d.after - d.before:+.2g} {d.unit}" for d in drifts)
+    return all(d.passes for d in drifts), f"in {APART_S:g} s: {detail or 'no tared channel'}"
+
+
+def _travel_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
+    """Arm with a travel that ends before where the spindle stands: the board must trip at once."""
+    here = int(_read(logger, SETTLE_S).samples["spindle"][-1])
+    limits = dataclasses.replace(_limits(config), min_spindle=here + 100, max_spindle=here + 200)
+    return _must_trip(logger, config, limits, Trip.SPINDLE_TRAVEL, SETTLE_S)
+
+
+def _setpoint_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
+    limits = _limits(config)
+    logger.arm(config.controller.gains(), limits)
+    try:
+        logger.queue(np.array([limits.max_spindle + 1]), np.array([0]))
+    except CommandRefusedError as error:
+        return True, error.what
+    return False, "A setpoint beyond the travel was taken."
+
+
+def _watchdog(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
+    """Arm and fall silent: the board must trip when its patience is over, not before, not late."""
+    limits = _limits(config)
+    passed, detail = _must_trip(
+        logger, config, limits, Trip.HOST_SILENT, 2 * limits.watchdog_us * 1e-6
+    )
+    late_s = (logger.trip().late_us - limits.watchdog_us) * 1e-6
+    return passed and 0 <= late_s <= LATEST_TRIP_S, f"{detail}, {late_s * 1e3:.3g} ms late"
+
+
+def _stop(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
+    """Arm, disarm, and read back: what `rig stop` and every way out rely on."""
+    logger.arm(config.controller.gains(), _limits(config))
+    logger.disarm()
+    status = int(_read(logger, SETTLE_S).samples["status"][-1])
+    return not status & STATUS_ARMED, f"status {status:#06x} read back after disarming"
+
+
+BOARD_CHECKS: dict[str, Callable[[TeensyLogger, Config], tuple[bool, str]]] = {
+    "zeros stay where they are": _zero_drift,
+    "the board trips at a travel limit": _travel_limit,
+    "the board refuses a setpoint beyond the travel": _setpoint_limit,
+    "the board makes itself safe when the host falls silent": _watchdog,
+    "the board disarms and says so": _stop,
+}
+"""Checks on the logger alone, each on a fresh link."""
+
+
+def _limits(config: Config) -> Limits:
+    """Return the configured limits, but none that a rig at rest may already be beyond."""
+    limits = board_limits(config, config.calibration_set())
+    wide = Limits.widest()
+    return dataclasses.replace(
+        limits, max_proximal=wide.max_proximal, max_distal=wide.max_distal, stale_ticks=2**31 - 1
+    )
+
+
+def _must_trip(
+    logger: TeensyLogger, config: Config, limits: Limits, trip: Trip, within_s: float
+) -> tuple[bool, str]:
+    logger.arm(config.controller.gains(), limits)
+    status = int(_read(logger, within_s).samples["status"][-1])
+    told = Trip(status >> TRIP_SHIFT)
+    return told is trip, f"status {status:#06x}: {told.name.lower().replace('_', ' ')}"
+
+
+def _read(logger: TeensyLogger, duration_s: float) -> SampleBatch:
+    """Read for a while by the board's clock, without a heartbeat.
+
+    Raises:
+        DriverError: Nothing comes.
+    """
+    parts: list[SampleBatch] = []
+    while not parts or parts[-1].tick_us[-1] - parts[0].tick_us[0] < duration_s * 1e6:
+        batch = logger.read(1.0)
+        if not len(batch.samples):
+            raise DriverError("The logger sends nothing.", fix="Run: rig doctor")
+        parts.append(batch)
+    return SampleBatch(
+        np.concatenate([part.samples for part in parts]),
+        np.concatenate([part.tick_us for part in parts]),
+        parts[-1].lost,
+    )

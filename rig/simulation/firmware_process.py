@@ -1,0 +1,58 @@
+"""The firmware as a process of its own, in real time, at the other end of a pseudo-terminal."""
+
+import subprocess
+from pathlib import Path
+
+from drivers.teensy.firmware_fake import FirmwareMissingError
+from drivers.transport import Transport, open_transport
+
+PROGRAM = Path(__file__).parents[2] / "firmware" / "build" / "rig_firmware"
+ENDS_S = 2.0
+
+
+class FirmwareProcess:
+    """A transport to a firmware process that it starts, and ends when it is closed.
+
+    Raises:
+        FirmwareMissingError: The program is not built.
+    """
+
+    def __init__(self, program: Path = PROGRAM) -> None:
+        if not program.is_file():
+            raise FirmwareMissingError(
+                "The firmware is not built.", f"There is no {program}.", "Run: make -C firmware"
+            )
+        self.process = subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True)  # noqa: S603
+        assert self.process.stdout is not None  # noqa: S101
+        self.path = self.process.stdout.readline().strip()
+        self._port: Transport = open_transport(self.path)
+
+    @property
+    def url(self) -> str:
+        """Name for messages."""
+        return f"sim://pty ({self.path})"
+
+    @property
+    def now_s(self) -> float:
+        """The host's monotonic clock, seconds."""
+        return self._port.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the bytes that are there, waiting at most `timeout_s` for the first."""
+        return self._port.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        """Let go of the terminal and end the process."""
+        self._port.close()
+        self.process.terminate()
+        try:
+            self.process.wait(ENDS_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()

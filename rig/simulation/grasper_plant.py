@@ -1,0 +1,221 @@
+"""The simulated 3-DOF grasper: one motor an axis behind a gearhead, friction with memory, contact.
+
+All quantities are seen at the joint, closing positive; N is the ratio of the gearhead:
+
+    N^2 J q'' = N K i - friction - contact
+    friction = (Fc + mu |contact|) s + b q'
+    s' = q' (1 - s sgn q') / delta - (s - rho sgn s) / tau    where |s| > rho
+    contact = k max(q - q0, 0)
+
+s is the state of a bristle (Dahl 1968) that, held, relaxes to the share rho: plastic journal
+bearings let go of a part of their friction in seconds. That is an assumption; it gives what Zhao
+and Nelson 2016 show in their Figures 11 to 14: a peak on loading, a slow decay, an error after two
+seconds that grows with the load, and after half a minute one that does not. The motor follows the
+master by a position controller with integral action, sampled at 2 kHz.
+"""
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+RATE_HZ = 2000.0
+SUBSTEPS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisParameters:
+    """One axis of the simulated grasper, SI units, at the joint.
+
+    Attributes:
+        gearhead_ratio: 66 in the paper.
+        torque_constant_n_m_a: Of the motor; data sheet of the Faulhaber 2224U012SR.
+        rotor_inertia_kg_m2: 2.7 g cm2 in the paper.
+        coulomb_n_m: Friction without load.
+        load_friction_ratio: Friction a unit of contact torque.
+        viscous_n_m_s_rad: Viscous friction.
+        presliding_rad: Travel over which friction builds up.
+        relaxed_ratio: Share of its friction that a held bearing keeps.
+        relaxation_s: Time constant of letting go.
+        contact_n_m_rad: Stiffness of what is grasped, with cable and jaw.
+        contact_rad: Angle of first contact.
+        arm_m: From the joint to where the force acts. Assumed.
+        current_offset_a: Of the current sensor.
+        current_noise_a: Standard deviation of one sample.
+        force_noise_n: Standard deviation of one sample of the force sensor.
+    """
+
+    gearhead_ratio: float = 66.0
+    torque_constant_n_m_a: float = 14.6e-3
+    rotor_inertia_kg_m2: float = 2.7e-7
+    coulomb_n_m: float = 4e-3
+    load_friction_ratio: float = 0.4
+    viscous_n_m_s_rad: float = 5e-3
+    presliding_rad: float = 4e-3
+    relaxed_ratio: float = 0.6
+    relaxation_s: float = 3.0
+    contact_n_m_rad: float = 0.3
+    contact_rad: float = 0.1
+    arm_m: float = 0.010
+    current_offset_a: float = 0.0
+    current_noise_a: float = 2e-3
+    force_noise_n: float = 5e-3
+
+
+HIDDEN = (
+    "coulomb_n_m",
+    "load_friction_ratio",
+    "viscous_n_m_s_rad",
+    "presliding_rad",
+    "relaxed_ratio",
+    "relaxation_s",
+)
+"""Parameters that differ from grasper to grasper and that no estimator is told."""
+
+
+def vary(axis: AxisParameters, seed: int, spread: float) -> AxisParameters:
+    """Return an axis as another grasper of the same make would have it.
+
+    Args:
+        axis: Parameters to start from.
+        seed: Seed of the draw.
+        spread: Standard deviation of each hidden parameter's logarithm.
+    """
+    random = np.random.default_rng(seed)
+    factors = np.exp(spread * np.clip(random.standard_normal(len(HIDDEN)), -3, 3))
+    changed = {n: getattr(axis, n) * float(f) for n, f in zip(HIDDEN, factors, strict=True)}
+    changed["relaxed_ratio"] = min(changed["relaxed_ratio"], 0.95)
+    return replace(axis, **changed)
+
+
+KP, KI, KD = 12.0, 5.0, 0.15
+"""Gains of the position controller at the joint, N m/rad, N m/(rad s), N m s/rad."""
+LIMIT_A = 0.6
+
+
+@numba.njit(cache=True)
+def _run(p: Any, target: Any, kp: float, ki: float, kd: float, limit_a: float) -> Any:
+    n = target.shape[0]
+    out = np.empty((n, 4))
+    inertia = p[0] * p[0] * p[2]
+    gain = p[0] * p[1]
+    h = 1.0 / RATE_HZ / SUBSTEPS
+    q = target[0]
+    w = 0.0
+    s = 0.0
+    total = 0.0
+    last = q
+    for k in range(n):
+        error = target[k] - q
+        command = kp * error + ki * total - kd * (q - last) * RATE_HZ
+        last = q
+        i = min(max(command / gain, -limit_a), limit_a)
+        if abs(i) < limit_a:
+            total += error / RATE_HZ
+        contact = p[9] * max(q - p[10], 0.0)
+        out[k, 0] = i
+        out[k, 1] = q
+        out[k, 2] = contact
+        out[k, 3] = s
+        for _ in range(SUBSTEPS):
+            contact = p[9] * max(q - p[10], 0.0)
+            level = p[3] + p[4] * contact
+            ds = w / p[6] * (1.0 - s * np.sign(w))
+            if abs(s) > p[7]:
+                ds -= (s - p[7] * np.sign(s)) / p[8]
+            s += h * ds
+            s = min(max(s, -1.0), 1.0)
+            w += h / inertia * (gain * i - level * s - p[5] * w - contact)
+            q += h * w
+    return out
+
+
+def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[str, FloatArray]:
+    """Return what one axis measures while its motor follows the master.
+
+    Args:
+        axis: Parameters.
+        target_rad: Master's angle at 2 kHz, shape (n,).
+        seed: Seed of the noise.
+
+    Returns:
+        `motor_current_a`, `motor_angle_rad` (of the shaft), `joint_angle_rad` and `force_n`, each
+        of shape (n,).
+    """
+    values = np.array(astuple(axis), dtype=np.float64)
+    out = _run(values, np.ascontiguousarray(target_rad, np.float64), KP, KI, KD, LIMIT_A)
+    random = np.random.default_rng(seed)
+    n = len(target_rad)
+    return {
+        "motor_current_a": out[:, 0]
+        + axis.current_offset_a
+        + axis.current_noise_a * random.standard_normal(n),
+        "motor_angle_rad": out[:, 1] * axis.gearhead_ratio,
+        "joint_angle_rad": out[:, 1],
+        "force_n": out[:, 2] / axis.arm_m + axis.force_noise_n * random.standard_normal(n),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Prototype:
+    """A simulated grasper: the axes whose mean current gives each degree of freedom's force.
+
+    Attributes:
+        name: Name.
+        axes: Degree of freedom to its axes: both jaws for grasp, the touching jaw for pitch.
+    """
+
+    name: str
+    axes: Mapping[str, tuple[AxisParameters, ...]]
+
+
+def _prototype(
+    name: str, jaw_1: AxisParameters, jaw_2: AxisParameters, yaw: AxisParameters
+) -> Prototype:
+    return Prototype(name, {"grasp": (jaw_1, jaw_2), "pitch": (jaw_1,), "yaw": (yaw,)})
+
+
+def _axis(
+    coulomb: float, load: float, kept: float, viscous: float, time_s: float, offset_a: float = 0.0
+) -> AxisParameters:
+    return AxisParameters(
+        coulomb_n_m=coulomb,
+        load_friction_ratio=load,
+        relaxed_ratio=kept,
+        viscous_n_m_s_rad=viscous,
+        relaxation_s=time_s,
+        current_offset_a=offset_a,
+    )
+
+
+THIRD = _prototype(
+    "third prototype",
+    _axis(3.44e-3, 0.579, 0.532, 40.7e-3, 3.26),
+    _axis(6.56e-3, 0.389, 0.656, 5.2e-3, 4.62),
+    _axis(0.70e-3, 0.721, 0.763, 29.2e-3, 5.82, -1.08e-3),
+)
+"""Journal bearings in the tool tip, steel tube. The numbers were chosen so that the paper's method
+gives the paper's Tables 2 to 4 on it; nothing was measured."""
+
+BALL = _prototype(
+    "ball bearings",
+    _axis(3.4e-3, 0.05, 0.8, 20e-3, 3.0),
+    _axis(4.0e-3, 0.05, 0.8, 5e-3, 3.0),
+    _axis(1.0e-3, 0.05, 0.8, 15e-3, 3.0),
+)
+"""The first prototype: hardly any friction that grows with the load. Assumed."""
+
+JOURNAL = _prototype(
+    "journal bearings",
+    _axis(4.5e-3, 0.5, 0.6, 40e-3, 3.5),
+    _axis(6.0e-3, 0.45, 0.65, 10e-3, 4.5),
+    _axis(1.0e-3, 0.7, 0.75, 30e-3, 5.5),
+)
+"""The second prototype, small and on a wooden platform. Assumed."""
+
+PROTOTYPES = {"third": THIRD, "journal": JOURNAL, "ball": BALL}

@@ -1,0 +1,139 @@
+"""What tripped, in words: what happened, how late, how to clear it; and the host's own watch."""
+
+import numpy as np
+
+from calibration.linear import CalibrationSet
+from drivers.teensy.guard import Drive, first_crossing
+from drivers.teensy.protocol import (
+    INPUT_NAMES,
+    STATUS_ARMED,
+    STATUS_HOLDING,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_WATCHDOG_TRIPPED,
+    TRIP_SHIFT,
+    Limits,
+    Trip,
+    TripReport,
+)
+from estimation.channels import unit_of
+from rig.errors import SafetyTripError
+from rig.reading import Reading, has_status
+
+WORDS: dict[Trip, tuple[str, str]] = {
+    Trip.HOST_SILENT: (
+        "The board heard nothing from this computer for too long",
+        "Look for what kept this computer busy; [safety] watchdog_s says how long it may be.",
+    ),
+    Trip.OVER_CURRENT: (
+        "The motor current crossed its limit",
+        "Find out what the motor works against; the limit is [limits] motor_current_a.",
+    ),
+    Trip.PROXIMAL_TORQUE: (
+        "The torque at the spindle crossed its limit",
+        "Find out what the jaw met; the limit is [limits] proximal_torque_n_m.",
+    ),
+    Trip.DISTAL_TORQUE: (
+        "The torque at the jaw crossed its limit",
+        "Find out what the jaw met; the limit is [limits] distal_torque_n_m.",
+    ),
+    Trip.SPINDLE_TRAVEL: (
+        "The spindle went beyond its travel",
+        "Turn it back by hand; the limit is [limits] spindle_angle_rad.",
+    ),
+    Trip.JAW_TRAVEL: (
+        "The jaw went beyond its travel",
+        "Move it back by hand; the limits are [safety] jaw_open_rad and jaw_closed_rad.",
+    ),
+    Trip.OVER_SPEED: (
+        "The motor turned too fast",
+        "Look for a broken cable or a load that let go; the limit is [safety] motor_speed_rad_s.",
+    ),
+    Trip.OVERHEATED: (
+        "The motor current was too high for too long",
+        "Let the motor cool; see [safety] continuous_current_a and heat_a2_s.",
+    ),
+    Trip.STALLED: (
+        "The motor had current and did not move",
+        "Look for what blocks the drive; see [safety] stall_current_a and stall_s.",
+    ),
+    Trip.SENSOR_SATURATED: (
+        "A sensor stayed at the end of its range",
+        "Check its wiring and amplifier, and that the load fits it; see [safety] saturated_s.",
+    ),
+    Trip.SENSOR_STALE: (
+        "A sensor's reading stopped changing",
+        "Check its wiring and supply; see [safety] stale_s.",
+    ),
+    Trip.SENSOR_MISSING: (
+        "A sensor gave no reading",
+        "Check its wiring and supply.",
+    ),
+}
+"""What each trip is, and what to do before arming again."""
+
+_CHANNEL_OF = {
+    "motor": "motor_angle_rad",
+    "spindle": "spindle_angle_rad",
+    "jaw": "jaw_angle_rad",
+    "proximal": "proximal_torque_n_m",
+    "distal": "distal_torque_n_m",
+    "current": "motor_current_a",
+}
+_IN_UNITS = (
+    *(Trip.OVER_CURRENT, Trip.PROXIMAL_TORQUE, Trip.DISTAL_TORQUE),
+    *(Trip.SPINDLE_TRAVEL, Trip.JAW_TRAVEL),
+)
+"""Trips whose value and limit are counts of their channel."""
+
+
+def trip_error(report: TripReport, calibrations: CalibrationSet, state: str) -> SafetyTripError:
+    """Return the error of a trip: what, how far and how late, and how to clear it."""
+    what, fix = WORDS[report.code]
+    details = [f"code {int(report.code)}"]
+    if report.channel:
+        details.append(_numbers(report, calibrations))
+    details.append(f"{report.late_us / 1000:g} ms after it began")
+    return SafetyTripError(f"{what} ({', '.join(details)}).", state, f"{fix} Arming clears it.")
+
+
+def _numbers(report: TripReport, calibrations: CalibrationSet) -> str:
+    name = _CHANNEL_OF[report.channel]
+    line = calibrations.channels.get(name)
+    if line is None or report.code not in _IN_UNITS:
+        return f"{report.channel} at {report.value} counts"
+    unit = unit_of(name)
+    value, limit = (abs(count * line.slope) for count in (report.value, report.limit))
+    return f"{name} = {value:.3g} {unit}, limit {limit:.3g} {unit}"
+
+
+def tripped(reading: Reading) -> tuple[Trip, bool] | None:
+    """Return what the board tripped over and whether it holds, None where it did not."""
+    newest = int(reading.counts["status"][-1])
+    if not newest & (STATUS_LIMIT_TRIPPED | STATUS_WATCHDOG_TRIPPED):
+        return None
+    return Trip(newest >> TRIP_SHIFT), bool(newest & STATUS_HOLDING)
+
+
+class HostWatch:
+    """The board's limits held once more, on the samples as they arrived.
+
+    Args:
+        limits: What the board was armed with.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits.as_array()
+        self._guard = Drive().guard
+
+    def check(self, reading: Reading) -> TripReport | None:
+        """Return the first crossing in the armed samples, None when there is none."""
+        armed = has_status(reading.counts["status"], STATUS_ARMED)
+        if not armed.any():
+            return None
+        samples = reading.counts[armed]
+        rows = np.stack([samples[name].astype(np.int32) for name in INPUT_NAMES], axis=1)
+        row, code, channel, value, limit, late_us = first_crossing(rows, self._guard, self._limits)
+        if code == Trip.NONE:
+            return None
+        tick_us = int(samples["tick_us"][row])
+        return TripReport(Trip(code), INPUT_NAMES[channel], value, limit, tick_us, late_us)

@@ -1,0 +1,258 @@
+"""Effects that remember, and those that came with them: what was put in is what a fit finds."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.derived import zero_phase_channels
+from estimation.diagnosis.diagnose import diagnose
+from estimation.diagnosis.search import Gates
+from estimation.diagnosis.split import split
+from estimation.effects import effect
+from estimation.fitting import fit
+from estimation.model import Model, Term, predict
+from estimation.recording import Recording
+from estimation.stream import Stream
+from tests.estimation import synthetic
+
+TRUE = {
+    "change.step": ((7.0, 2.0), [0.02]),
+    "change.step.campaign": ((100.0, 2.0), [0.02]),
+    "change.step.offset": ((7.0,), [0.02]),
+    "coupling.kinematic": ((), [0.3]),
+    "coupling.torque": ((), [0.2]),
+    "friction.capstan": ((0.5, 2.0), [0.3]),
+    "friction.capstan.wrist": ((0.3, 2.0), [0.3]),
+    "friction.dwell": ((1.0, 1.5, 1.0), [0.02]),
+    "friction.position": ((2.0,), [0.02, -0.03, 0.01]),
+    "friction.warmup": ((4.0, 2.0), [0.02]),
+    "friction.warmup.campaign": ((120.0, 2.0), [-0.02]),
+    "hysteresis.bouc_wen": ((0.15, 2.0), [0.02]),
+    "hysteresis.bouc_wen.twist": ((0.03, 1.5), [0.004]),
+    "hysteresis.presliding": ((0.1,), [0.02]),
+    "hysteresis.presliding.lugre": ((0.05, 0.8, 4.0), [0.02]),
+    "hysteresis.presliding.maxwell": ((0.02,), [0.01, 0.004, 0.02]),
+    "spring.end_stop": ((0.95,), [0.1]),
+    "spring.end_stop.opening": ((0.3,), [0.1]),
+    "transmission.backlash": ((0.01, 0.02), [0.006]),
+    "transmission.backlash.play": ((0.06,), [0.05]),
+    "transmission.relaxation": ((0.8,), [0.2]),
+    "transmission.relaxation.prony": ((0.15,), [0.2, 0.1]),
+    "transmission.stiffening": ((0.05,), [0.1]),
+    "transmission.stiffening.asymmetric": ((), [0.05]),
+    "transmission.stiffening.cubic": ((), [2.0]),
+}
+"""Shape and amplitudes put in."""
+
+EVERY = pytest.mark.parametrize("name", TRUE)
+
+
+def slow_motion(k: int, rate_hz: float = 1000.0, seconds: float = 12.0) -> dict[str, np.ndarray]:
+    """Return one run's channels: slow sweeps, rests between them, loads of both signs."""
+    t = np.arange(round(seconds * rate_hz)) / rate_hz
+    # a rest after each half turn of the sweep: 0.5 s, 1.1 s, ... of standing still
+    pace = 0.5 + 0.5 * np.tanh(4 * np.sin(2 * np.pi * (0.21 + 0.02 * k) * t + 0.6 * k))
+    phase = 2 * np.pi * 0.5 * np.cumsum(pace) / rate_hz
+    angle = (0.5 - 0.05 * k) * np.sin(phase) + 0.15 * np.sin(0.37 * phase + k)
+    return {
+        "time_s": t,
+        "campaign_time_s": t + 60.0 * k,
+        "motor_angle_rad": 35 * angle,
+        "spindle_angle_rad": angle,
+        "jaw_angle_rad": 0.913 * angle + 0.65,
+        "wrist_pitch_rad": 0.6 * np.sin(2 * np.pi * 0.05 * t + k),
+        "proximal_torque_n_m": 0.1 * np.sin(2 * np.pi * 0.33 * t + 2 * k) + 0.03 * k,
+        "distal_torque_n_m": 0.1 * np.sin(2 * np.pi * 0.29 * t + k) + 0.02 * k,
+        "joint_1_torque_n_m": 0.3 * np.sin(2 * np.pi * 0.4 * t + k),
+    }
+
+
+@cache
+def runs() -> tuple[Recording, ...]:
+    recordings = []
+    for k in range(4):
+        channels = slow_motion(k)
+        time_s = channels.pop("time_s")
+        recordings.append(Recording(f"run{k}", time_s, channels))
+    return tuple(recordings)
+
+
+def inputs_of(kind, channels) -> dict[str, np.ndarray]:
+    channels = dict(channels)
+    step_s = channels["time_s"][1] - channels["time_s"][0]
+    channels["motor_velocity_rad_s"] = np.gradient(channels["motor_angle_rad"], step_s)
+    return {role: channels[name] for role, name in kind.roles.items()}
+
+
+@EVERY
+def test_a_fit_finds_what_was_put_in(name):
+    kind = effect(name)
+    shape, amplitudes = TRUE[name]
+    made = []
+    for recording in runs():
+        channels = zero_phase_channels(recording, [*kind.roles.values(), "motor_angle_rad"])
+        torque = Term(kind).columns(channels, shape) @ np.array(amplitudes)
+        made.append(recording.with_columns(made_torque_n_m=torque))
+    model = Model("one effect", "motor", "made_torque_n_m", (Term(kind),), run_offsets=False)
+    fitted = fit(model, Campaign.of(made), every=20, bootstrap=0)
+    values = [v.value for v in fitted.terms[0].values.values()]
+    if name == "change.step.campaign":  # between two runs one moment is as good as another
+        assert 72 < values[1] <= 120
+        values[1] = shape[0]
+    assert values == pytest.approx([*amplitudes, *shape], rel=0.05, abs=1e-3)
+
+
+@EVERY
+def test_columns_do_not_depend_on_the_rate_of_the_samples(name):
+    kind = effect(name)
+    shape, _ = TRUE[name]
+    fast = inputs_of(kind, slow_motion(2))
+    thinned = {role: values[::10] for role, values in fast.items()}
+    expected = kind.columns(fast, shape)[::10]
+    error = kind.columns(thinned, shape) - expected
+    assert np.sqrt(np.mean(error**2)) < 0.01 * np.abs(expected).max()
+
+
+@EVERY
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0])
+def test_a_rig_that_stands_still_gives_finite_columns(name, value):
+    kind = effect(name)
+    still = {role: np.full(50, value) for role in kind.roles}  # the clock too: the same sample
+    for place in (0.0, 1.0):
+        shape = [p.grid()[round(place * (p.points - 1))] for p in kind.shape]
+        assert np.isfinite(kind.columns(still, shape)).all()
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in TRUE if n.startswith("hysteresis") and n != "hysteresis.bouc_wen.twist"]
+)
+def test_friction_with_memory_takes_work_out_of_a_closed_path(name):
+    kind = effect(name)
+    shape, amplitudes = TRUE[name]
+    inputs = inputs_of(kind, slow_motion(0))
+    t = np.arange(4000) * 1e-3
+    inputs["travel"] = 0.3 * np.sin(2 * np.pi * t)
+    if "speed" in inputs:
+        inputs["speed"] = 35 * 0.3 * 2 * np.pi * np.cos(2 * np.pi * t)
+    torque = kind.columns(inputs, shape) @ np.array(amplitudes)
+    assert np.sum(torque[1000:-1] * np.diff(inputs["travel"])[1000:]) > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "balance", "side"),
+    [
+        ("hysteresis.bouc_wen.twist", "gearbox", 1),
+        ("hysteresis.bouc_wen.twist", "stretch", -1),  # the jaw's angle is what stretch takes away
+        ("hysteresis.presliding", "gearbox", 1),
+        ("transmission.relaxation", "gearbox", 1),
+        ("transmission.relaxation", "stretch", -1),
+    ],
+)
+def test_a_loop_of_deflection_against_load_takes_work_too(name, balance, side):
+    kind = effect(name)
+    shape, amplitudes = TRUE[name]
+    t = np.arange(4000) * 1e-3
+    load = 0.1 * np.sin(2 * np.pi * t)
+    inputs = dict.fromkeys(kind.roles, load) | ({"clock": t} if "clock" in kind.roles else {})
+    deflection = side * kind.balances[balance] * (kind.columns(inputs, shape) @ amplitudes)
+    assert np.sum(load[1000:-1] * np.diff(deflection)[1000:]) > 0
+
+
+def test_relaxation_answers_a_step_by_the_exact_exponential_at_any_rate():
+    kind = effect("transmission.relaxation")
+    time_s = np.array([0.0, 0.5, 0.5001, 0.7, 1.4, 3.0])
+    load = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    left = kind.columns({"load": load, "clock": time_s}, (0.8,))[:, 0]
+    assert left[2:] == pytest.approx(np.exp(-(time_s[2:] - 0.50005) / 0.8), rel=1e-4)
+
+
+def test_break_away_is_higher_after_a_longer_rest_and_is_worn_off_by_sliding():
+    kind = effect("friction.dwell")
+    peaks = []
+    for rest_s in (0.1, 1.0, 5.0):
+        t = np.arange(0.0, 4.0 + rest_s, 1e-3)
+        speed = np.where((t < 2.0) | (t > 2.0 + rest_s), 10.0, 0.0)
+        column = kind.columns({"speed": speed, "clock": t}, (1.0, 3.0, 1.0))[:, 0]
+        peaks.append(column[t > 2.0 + rest_s][0])
+        assert column[-1] < 0.5
+    assert peaks == sorted(peaks)
+    assert peaks[-1] > 0.95
+
+
+def test_a_straight_wrist_adds_no_wrap():
+    kind = effect("friction.capstan.wrist")
+    still = {"speed": np.ones(3), "load": np.ones(3), "other_angle": np.array([0.0, 0.5, -0.5])}
+    lost = kind.columns(still, (0.5, 0.1))[:, 0]
+    assert lost[0] == 0.0
+    assert lost[1] == lost[2] > 0
+
+
+def started(recording: Recording, start_s: float | None) -> Recording:
+    columns = {k: v for k, v in recording.columns.items() if k != "campaign_time_s"}
+    start_ns = None if start_s is None else 1_700_000_000_000_000_000 + round(start_s * 1e9)
+    return replace(recording, columns=columns, started_at_ns=start_ns)
+
+
+def test_a_campaign_whose_starts_are_known_has_a_clock_of_its_own():
+    recordings = [started(r, s) for r, s in zip(runs(), (90.0, 30.0, 0.0, 200.0), strict=True)]
+    timed = list(Campaign.of(recordings).timed())
+    firsts = [recording["campaign_time_s"][0] for recording in timed]
+    assert firsts == pytest.approx([90.0, 30.0, 0.0, 200.0])
+    assert np.ptp(timed[0]["campaign_time_s"]) == pytest.approx(recordings[0].duration_s)
+    unknown = Campaign.of([*recordings[:3], started(recordings[3], None)])
+    assert all("campaign_time_s" not in recording for recording in unknown.timed())
+
+
+def test_a_model_of_warm_up_is_fitted_on_the_campaign_and_runs_live():
+    kind = effect("friction.warmup.campaign")
+    made = [
+        recording.with_columns(
+            made_torque_n_m=0.02
+            * np.exp(-recording["campaign_time_s"] / 120.0)
+            * np.tanh(np.gradient(recording["motor_angle_rad"], recording.time_s) / 2.0)
+        )
+        for recording in runs()
+    ]
+    bare = [started(recording, 60.0 * k) for k, recording in enumerate(made)]
+    declared = Model("warm-up", "motor", "made_torque_n_m", (Term(kind),), run_offsets=False)
+    fitted = fit(declared, Campaign.of(bare), every=20, bootstrap=0)
+    assert fitted.terms[0].values["time"].value == pytest.approx(120.0, rel=0.05)
+    live = Stream(fitted, 1000.0)
+    assert live.channels == ("motor_angle_rad",)
+    first = made[0]  # the campaign's clock starts with it, as the live one with its first sample
+    there = {name: first[name] for name in live.channels}
+    steps = [
+        live.step(first.time_s[part], {name: values[part] for name, values in there.items()})
+        for part in (slice(0, 1), slice(1, 700), slice(700, None))
+    ]
+    offline = predict(fitted, first, causal=True)
+    assert np.concatenate(steps) == pytest.approx(offline, rel=1e-9, abs=1e-12)
+
+
+def test_a_change_between_runs_is_found_by_the_diagnosis():
+    def rubs(motor_rad, speed_rad_s, load_n_m):
+        return 0.01 * np.tanh(speed_rad_s / 3.0)
+
+    recordings = []
+    for k in range(12):
+        run = synthetic.run(
+            f"run{k:02d}",
+            0.2 + 0.15 * (k % 3),
+            0.05 * (1 + k // 3),
+            seed=k,
+            seconds=4.0,
+            extra=rubs if k >= 5 else None,
+        )
+        recordings.append(started(run, 60.0 * k))
+    motor = model_file.read(Path("motor"))
+    sealed = split(recordings, 1)
+    diagnosis, _ = diagnose(recordings, [motor], sealed, gates=Gates(surrogates=59))
+    assert [finding.family for finding in diagnosis.findings] == ["change.step"]
+    (finding,) = diagnosis.findings
+    assert 240 < finding.parameters["since"].value <= 300
+    assert finding.rmse_after < 0.5 * finding.rmse_before

@@ -1,0 +1,85 @@
+"""The residual watch on the analytic rig: quiet while the model fits, and the right run after."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.fitting import fit
+from estimation.model import Model
+from estimation.recording import Recording
+from estimation.watch import FIRST, ResidualWatch
+from tests.estimation import synthetic
+
+
+def rough(motor_rad, speed_rad_s, load_n_m):
+    """Ripple that comes with a chipped tooth."""
+    return 8e-4 * np.sin(4 * motor_rad)
+
+
+def runs(first: int, count: int, extra=None) -> list[Recording]:
+    return [
+        synthetic.run(
+            f"run {k}",
+            0.25 + 0.1 * (k % 3),
+            0.05 * (1 + k % 4),
+            seed=k,
+            seconds=4.0,
+            noise_n_m=1e-3,
+            extra=extra,
+        )
+        for k in range(first, first + count)
+    ]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Model:
+    return fit(model_file.read(Path("motor")), Campaign.of(runs(100, 8)), bootstrap=0)
+
+
+def test_the_fit_tells_how_much_runs_differ_and_the_file_keeps_it(fitted: Model) -> None:
+    assert fitted.evidence is not None
+    assert 0 < fitted.evidence.run_spread < 0.5
+    again = model_file.parse(model_file.to_toml(fitted))
+    assert again.evidence == fitted.evidence
+
+
+def test_runs_that_the_model_fits_raise_no_alarm(fitted: Model) -> None:
+    watch = ResidualWatch(fitted)
+    sights = [watch.see(run) for run in runs(0, 24)]
+    assert all(sight is not None and sight.fits for sight in sights)
+
+
+def test_an_effect_that_begins_is_dated_to_its_run(fitted: Model) -> None:
+    watch = ResidualWatch(fitted)
+    for run in runs(0, 6):
+        assert watch.see(run).fits
+    later = [watch.see(run) for run in runs(6, 6, rough)]
+    assert later[-1].since in ("run 6", "run 7")
+    assert later[-1].rmse > later[-1].usual
+
+
+def test_one_odd_run_is_no_change(fitted: Model) -> None:
+    watch = ResidualWatch(fitted)
+    odd = synthetic.run("odd", 0.3, 0.1, seed=5, seconds=4.0, noise_n_m=50e-3)
+    for run in [*runs(0, 3), odd, *runs(3, 8)]:
+        assert watch.see(run).fits
+
+
+def test_a_model_without_evidence_learns_from_the_first_runs(fitted: Model) -> None:
+    bare = Model(
+        fitted.name, fitted.balance, fitted.target, fitted.terms, "", fitted.low_pass, True, None
+    )
+    watch = ResidualWatch(bare)
+    learning = [watch.see(run) for run in runs(0, FIRST)]
+    assert all(sight.usual is None for sight in learning)
+    later = [watch.see(run) for run in runs(FIRST, 6, rough)]
+    assert later[-1].since == f"run {FIRST}"
+
+
+def test_a_run_at_rest_says_nothing(fitted: Model) -> None:
+    still = runs(0, 1)[0]
+    still = still.with_columns(motor_angle_rad=np.zeros(len(still)))
+    assert ResidualWatch(fitted).see(still) is None

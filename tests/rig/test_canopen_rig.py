@@ -1,0 +1,140 @@
+"""A rig whose motor is an EPOS4: the session and the recorder run on it unchanged."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.epos4.fake import Epos4Fake
+from drivers.epos4.faults import DriveFaultError
+from drivers.epos4.protocol import State
+from drivers.errors import DriverError
+from drivers.transport.simulated_can import SimulatedCanBus
+from rig.canopen_logger import CanopenLogger
+from rig.companions import topic
+from rig.config import Config, load_config
+from rig.errors import SafetyTripError
+from rig.log.check import check_log
+from rig.log.reader import read_log
+from rig.protocol import Protocol
+from rig.record import open_campaign_folder, record_campaign
+from rig.session import Session
+from rig.simulation.canopen import open_simulated_canopen
+
+ANGLE = np.linspace(-1.0, -0.8, 600)
+NO_LOAD = np.zeros(600)
+
+
+def config(**changes: object) -> Config:
+    return load_config(Path("canopen_simulated")).changed(**changes)
+
+
+def drive_of(link: CanopenLogger) -> Epos4Fake:
+    """The fake at the far end of a simulated rig."""
+    bus = link._bus
+    assert isinstance(bus, SimulatedCanBus)
+    (drive,) = bus._nodes
+    assert isinstance(drive, Epos4Fake)
+    return drive
+
+
+def test_the_spindle_follows_its_target_and_the_drive_ends_without_power() -> None:
+    settings = config(devices={})
+    link = open_simulated_canopen(settings)
+    with Session(settings, link) as session:
+        next(session.rest(0.1))
+        session.settle()
+        start = session.spindle_angle_rad
+        readings = list(session.play(start + np.linspace(0, 0.2, 600), NO_LOAD))
+        assert drive_of(link).state is State.OPERATION_ENABLED
+    setpoint = np.concatenate([r.setpoint for r in readings])
+    assert np.array_equal(setpoint[setpoint >= 0], np.arange(600))
+    columns = readings[-1].columns
+    assert abs(columns["spindle_angle_rad"][-1] - columns["target_angle_rad"][-1]) < 0.03
+    assert drive_of(link).state is State.SWITCH_ON_DISABLED
+    assert drive_of(link).torque_n_m == 0
+
+
+def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it() -> None:
+    drive = Epos4Fake()
+    drive.state = State.OPERATION_ENABLED
+    from drivers.epos4.driver import Epos4
+
+    bus = SimulatedCanBus([drive])
+    CanopenLogger(Epos4(bus), bus).close()
+    assert drive.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_fault_of_the_drive_ends_the_session_in_its_own_words() -> None:
+    settings = config(devices={})
+    link = open_simulated_canopen(settings)
+    with pytest.raises(DriveFaultError, match=r"2310"), Session(settings, link) as rig:  # noqa: PT012
+        for k, _ in enumerate(rig.play(np.full(3000, -1.04), np.zeros(3000))):
+            if k == 5:
+                drive_of(link).fail(0x2310, 2)
+    assert drive_of(link).torque_n_m == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"limits": {"motor_current_a": 0.05}}, "current|motor_current_a"),
+        ({"safety": {"motor_speed_rad_s": 2.0}}, "turned too fast"),
+        ({"safety": {"watchdog_s": 0.005}}, "heard nothing"),
+    ],
+)
+def test_the_guards_of_the_board_hold_here_too(change: dict, message: str) -> None:
+    settings = config(devices={}, **change)
+    link = open_simulated_canopen(settings)
+    with pytest.raises(SafetyTripError, match=message), Session(settings, link) as session:
+        for _ in session.play(np.linspace(-1.04, 0.0, 900), np.zeros(900)):
+            pass
+    assert drive_of(link).state is State.SWITCH_ON_DISABLED
+
+
+def test_load_is_refused_before_anything_moves() -> None:
+    settings = config(devices={})
+    with Session(settings, open_simulated_canopen(settings)) as session:  # noqa: SIM117
+        with pytest.raises(SafetyTripError, match="load_command_a"):
+            next(session.play(ANGLE, np.full(600, 0.1)))
+
+
+def silent(receive: Callable[[object], None]) -> Callable[[object], None]:
+    return lambda frame: None
+
+
+def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settings = config(devices={})
+    link = open_simulated_canopen(settings)
+    unsafe = pytest.raises((SafetyTripError, DriverError), match=r"not confirm")
+    with unsafe, Session(settings, link) as session:
+        for k, _ in enumerate(session.play(np.full(3000, -1.04), np.zeros(3000))):
+            if k == 5:
+                monkeypatch.setattr(drive_of(link), "transmit", list)
+
+
+def test_a_campaign_is_recorded_with_the_further_devices_on_the_loggers_time(
+    tmp_path: Path,
+) -> None:
+    fakes = {"jaw_force": "ati-can", "torque_cell": "qia128"}
+    devices = {name: {"driver": driver, "url": "sim://"} for name, driver in fakes.items()}
+    settings = config(devices=devices)
+    table = {"kind": "sine", "frequencies_hz": [1.0], "loads_a": [0.0], "duration_s": 1.0}
+    protocol = Protocol.model_validate({"name": "short", "runs": [table]})
+    todo = open_campaign_folder(tmp_path / "runs", protocol, settings, resume=False)
+    with Session(settings, open_simulated_canopen(settings)) as session:
+        (result,) = record_campaign(session, todo, tmp_path / "runs")
+    assert result.complete
+    assert check_log(result.path).verdict.exit_code == 0
+    log = read_log(result.path)
+    assert log.run is not None
+    assert "clock_residual_s_logger" in log.run.details
+    for name, rate_hz in (("jaw_force", 200), ("torque_cell", 1300)):
+        rows = log.topics[topic(name)].rows
+        assert abs(len(rows) - rate_hz) <= 0.02 * rate_hz + 60
+        np.testing.assert_allclose(np.diff(rows["time_s"]), 1 / rate_hz, rtol=1e-3)
+        assert 0 <= rows["time_s"][0] < 0.02
+        assert (rows["flags"] == 0).all()

@@ -1,0 +1,138 @@
+"""`rig calibrate` on the simulated rig: what was put in is found, and nothing is half done."""
+
+import json
+import shutil
+
+import pytest
+
+from calibration.fsr import ZHANG_2022
+from calibration.store import CalibrationStore
+from rig.cli.main import main
+from rig.config import SIMULATED
+from rig.simulation.parameters import PlantParameters
+
+
+@pytest.fixture
+def calibrate(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words, yes=True):
+        asked = ["--yes"] if yes else []
+        code = main(["calibrate", *words, "--operator", "Ada", *asked, "--json"])
+        return code, json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def by_channel(said):
+    return {r["channel"]: r["fit"]["parameters"] for r in said["records"].values()}
+
+
+def hidden(tmp_path, words):
+    path = tmp_path / "hidden.toml"
+    path.write_text(SIMULATED.read_text().replace("seed = 0", f"seed = 0\nhidden = {words}"))
+    return str(path)
+
+
+def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, capsys):
+    code, said = calibrate("torque", "--masses-g", "50,100,150", "--use", "--out", "raw")
+    assert code == 0
+    assert by_channel(said)["proximal_torque_n_m"]["slope"] == pytest.approx(3.9811e-5, rel=2e-3)
+    (record,) = CalibrationStore(tmp_path / "store").active().values()
+    assert len(record.raw) == len(list((tmp_path / "raw").glob("*.mcap"))) == 7
+    assert record.operator == "Ada"
+    assert record.figure_svg.startswith("<svg xmlns")
+    assert main(["cal", "check"]) == 0
+    assert main(["log", "check", "raw"]) == 0
+    capsys.readouterr()
+    # the same raw logs give the same numbers
+    again = calibrate("torque", "--from", "raw", "--out", "again", yes=False)[1]
+    assert by_channel(again) == by_channel(said)
+
+
+def test_current_finds_the_plant(calibrate):
+    _, said = calibrate("current", "--loads-a", "0.1,0.5,0.9")
+    plant = PlantParameters()
+    fit = by_channel(said)["spindle_torque_n_m"]
+    gain = plant.torque_constant_n_m_a * plant.gear_ratio
+    assert fit["torque_constant_n_m_a"] == pytest.approx(gain, rel=0.01)
+    assert fit["friction_n_m"] == pytest.approx(plant.motor_friction_n_m * 35, rel=0.03)
+    driver = by_channel(said)["motor_current_a"]
+    assert driver["gain_a"] == pytest.approx(plant.command_full_scale_a, rel=0.01)
+
+
+@pytest.mark.parametrize("strength", [0.0, 1.0])
+def test_gearbox_finds_stiffness_and_the_gap_that_is_there(calibrate, tmp_path, strength):
+    config = hidden(tmp_path, f"{{ gear_backlash = {strength} }}")
+    _, said = calibrate("gearbox", "--config", config)
+    fit = by_channel(said)["gear_twist_rad"]
+    assert fit["stiffness_n_m_rad"] == pytest.approx(5.4, rel=0.01)
+    assert fit["backlash_rad"] == pytest.approx(0.015 * strength, abs=2e-4)
+    assert said["found"]["backlash"].startswith("told" if strength else "not told")
+
+
+def test_encoder_finds_the_wave_that_is_there(calibrate, tmp_path):
+    config = hidden(tmp_path, "{ jaw_encoder_wave = 1.0 }")
+    _, said = calibrate("encoder", "--which", "jaw", "--config", config)
+    assert said["found"]["wave"] == "17 periods a turn"
+    assert said["found"]["wave_amplitude_rad"] == pytest.approx(5e-3, rel=0.05)
+
+
+def test_ft_finds_the_tool_and_reads_the_devices_counts(calibrate):
+    _, said = calibrate("ft", "--jaw-mm", "0,0,300")
+    tool = by_channel(said)["contact_wrench"]
+    assert tool["mass_kg"] == pytest.approx(0.215, rel=1e-3)
+    assert tool["centre_z_m"] == pytest.approx(0.031, abs=1e-4)
+    assert tool["jaw_z_m"] == 0.3
+    assert said["found"]["counts_per_n"] == pytest.approx(1e6)
+
+
+def test_fsr_finds_the_cubic_its_hysteresis_and_its_creep(calibrate):
+    _, said = calibrate("fsr", "--presses", "5", "--hold-s", "15")
+    fit = by_channel(said)["fsr_force_n"]
+    assert said["found"]["degree"] == "3"
+    found = [fit[f"c{k}"] for k in range(4)]
+    # what a single curve cannot hold is modelled, and some of it is left in the coefficients
+    for volts in (0.2, 0.5, 0.8):
+        force = sum(c * volts**k for k, c in enumerate(found))
+        assert force == pytest.approx(float(ZHANG_2022.force_n(volts)), abs=0.03)
+    assert said["found"]["loading_gap"] == "modelled"
+    assert fit["creep_ratio"] == pytest.approx(0.01, rel=0.1)
+    assert said["found"]["held_out_rmse_with_gap_n"] < 0.6 * said["found"]["held_out_rmse_n"]
+
+
+def test_a_refused_or_unattended_session_leaves_nothing(calibrate, tmp_path):
+    code, said = calibrate("torque", "--masses-g", "50,100,150", "--arm-mm", "0.001")
+    assert code == 5
+    assert "changes by" in said["error"]["what"]
+    code, said = calibrate("torque", yes=False)
+    assert code == 2
+    assert "no terminal" in said["error"]["what"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_leaves_nothing(calibrate, tmp_path, monkeypatch):
+    from rig.calibrate.hands import SimulatedHands
+
+    prepare, seen = SimulatedHands.prepare, []
+
+    def interrupted(self, step):
+        seen.append(step.name)
+        if len(seen) == 4:
+            raise KeyboardInterrupt
+        prepare(self, step)
+
+    monkeypatch.setattr(SimulatedHands, "prepare", interrupted)
+    assert main(["calibrate", "torque", "--operator", "Ada", "--yes"]) == 130
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_raw_logs_of_another_kind_are_refused(calibrate):
+    calibrate("ft", "--out", "raw")
+    code, said = calibrate("torque", "--from", "raw")
+    assert code == 2
+    assert said["error"]["fix"] == "Type `rig calibrate ft`."
+    shutil.rmtree("raw")
+    code, said = calibrate("ft", "--from", "raw")
+    assert code == 2

@@ -1,0 +1,243 @@
+"""`rig doctor`, `devices`, `udev`, `stop`, `firmware`: what is found, and what to type."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.device import Batch, Device, SampleFlag
+from drivers.registry import fakes
+from drivers.teensy.device import TeensyDevice
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake_device import HandMovedBench
+from drivers.transport.faulty import Fault, Faults
+from drivers.transport.simulated import SimulatedTransport
+from rig import firmware
+from rig.cli.main import main
+from rig.config import load_config
+from rig.doctor.examine import examine
+from rig.doctor.finding import Finding, Level, worst
+from rig.doctor.ports import Port, can_interfaces, port_findings
+from rig.doctor.stream import device_findings
+from rig.doctor.udev import USB, has_rule, udev_rules
+from rig.errors import ExitCode, UsageError
+from tests.rig.simulated import simulated
+
+
+def by_check(findings: list[Finding]) -> dict[str, Finding]:
+    return {finding.check: finding for finding in findings}
+
+
+def test_a_healthy_simulated_rig_has_no_complaint() -> None:
+    assert worst(examine(simulated())) is Level.OK
+
+
+@pytest.mark.parametrize("name", sorted(fakes()))
+def test_every_fake_is_healthy_and_at_its_rate(name: str) -> None:
+    findings = device_findings(name, lambda: fakes()[name](Faults()))
+    assert worst(findings) is Level.OK, findings
+    assert by_check(findings)["sample rate"].what.count("Hz") == 2
+
+
+def test_a_bad_cable_is_a_warning_with_numbers() -> None:
+    faults = Faults(rates={Fault.CORRUPT: 0.3})
+    finding = by_check(device_findings("logger", lambda: fakes()["teensy"](faults)))["link"]
+    assert finding.level is Level.WARNING
+    assert "crc_errors" in finding.what
+    assert "cable" in finding.fix
+
+
+def test_another_firmware_is_told_with_the_command_that_fixes_it() -> None:
+    board = TeensyFake(HandMovedBench(), protocol_hash=0xDEADBEEF)
+    (finding,) = device_findings("logger", lambda: TeensyDevice(SimulatedTransport(board)))
+    assert (finding.check, finding.level) == ("firmware", Level.ERROR)
+    assert finding.fix == "Run: rig firmware flash"
+
+
+class Changed:
+    """A device whose batches go through a function."""
+
+    def __init__(self, device: Device, change: object) -> None:
+        self._device, self._change = device, change
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._device, name)
+
+    def read(self, timeout_s: float) -> Batch:
+        return self._change(self._device.read(timeout_s))  # type: ignore[operator,no-any-return]
+
+
+def stuck(batch: Batch) -> Batch:
+    columns = {**batch.columns, "proximal_count": np.full(len(batch), 5.0)}
+    return Batch(columns, batch.time_s, batch.clock, batch.sequence, batch.flags, batch.lost)
+
+
+def saturated(batch: Batch) -> Batch:
+    flags = batch.flags | np.uint8(SampleFlag.SATURATED)
+    return Batch(batch.columns, batch.time_s, batch.clock, batch.sequence, flags, batch.lost)
+
+
+def slow(batch: Batch) -> Batch:
+    time_s = batch.time_s * 1.1
+    return Batch(batch.columns, time_s, batch.clock, batch.sequence, batch.flags, batch.lost)
+
+
+@pytest.mark.parametrize(
+    ("change", "check", "level", "words"),
+    [
+        (stuck, "stuck", Level.WARNING, "proximal_count did not change"),
+        (saturated, "saturation", Level.ERROR, "Saturated in"),
+        (slow, "sample rate", Level.ERROR, "909.1 Hz"),
+    ],
+)
+def test_what_a_stream_may_have(change: object, check: str, level: Level, words: str) -> None:
+    findings = device_findings("logger", lambda: Changed(fakes()["teensy"](Faults()), change))
+    finding = by_check(findings)[check]
+    assert finding.level is level
+    assert words in finding.what
+    assert finding.fix
+
+
+def test_a_device_that_sends_nothing_is_an_error() -> None:
+    def nothing(batch: Batch) -> Batch:
+        empty = {name: values[:0] for name, values in batch.columns.items()}
+        few = (batch.time_s[:0], batch.clock, batch.sequence[:0], batch.flags[:0], batch.lost)
+        return Batch(empty, *few)
+
+    device = Changed(fakes()["usb520"](Faults()), nothing)
+    finding = by_check(device_findings("torque", lambda: device))["sample rate"]
+    assert finding.level is Level.ERROR
+    assert "sends nothing" in finding.what
+
+
+def computer(root: Path, rule: bool, modem_manager: bool) -> Path:
+    """A file system as far as the doctor looks into one."""
+    process = root / "proc" / "42"
+    process.mkdir(parents=True)
+    (process / "comm").write_text("ModemManager\n" if modem_manager else "bash\n")
+    rules = root / "etc" / "udev" / "rules.d"
+    rules.mkdir(parents=True)
+    if rule:
+        (rules / "70-rig.rules").write_text(udev_rules())
+    return root
+
+
+@pytest.mark.parametrize(("rule", "modem_manager"), [(a, b) for a in (0, 1) for b in (0, 1)])
+def test_rules_and_modem_manager(tmp_path: Path, rule: bool, modem_manager: bool) -> None:
+    device = tmp_path / "ttyACM0"
+    device.touch()
+    root = computer(tmp_path / "root", rule, modem_manager)
+    findings = by_check(port_findings([Port(str(device), "16c0:0483:123", "")], root))
+    assert ("udev rule" in findings) == (not rule)
+    assert ("ModemManager" in findings) == (modem_manager and not rule)
+    for finding in findings.values():
+        assert finding.level is Level.OK or "rig udev | sudo tee" in finding.fix
+
+
+def test_who_holds_a_port_is_named(tmp_path: Path) -> None:
+    device = tmp_path / "ttyACM0"
+    device.touch()
+    root = computer(tmp_path / "root", True, False)
+    port = Port(str(device), "16c0:0483:123", "")
+    with device.open() as held:
+        holder = subprocess.Popen(["sleep", "60"], stdin=held)
+    try:
+        finding = by_check(port_findings([port], root))["free"]
+    finally:
+        holder.terminate()
+        holder.wait()
+    assert f"PID {holder.pid} (sleep)" in finding.what
+    assert finding.fix.endswith(f"kill -TERM {holder.pid}")
+
+
+def test_a_slow_ftdi_adapter_is_told(tmp_path: Path) -> None:
+    root = computer(tmp_path / "root", True, False)
+    timer = root / "sys/bus/usb-serial/devices/ttyUSB7/latency_timer"
+    timer.parent.mkdir(parents=True)
+    timer.write_text("16\n")
+    (tmp_path / "ttyUSB7").touch()
+    port = Port(str(tmp_path / "ttyUSB7"), "0403:6001:A1", "")
+    assert "16 ms" in by_check(port_findings([port], root))["latency"].what
+
+
+def test_other_peoples_ports_are_left_alone(tmp_path: Path) -> None:
+    assert port_findings([Port("/dev/ttyS0", "", "")], computer(tmp_path, False, True)) == []
+
+
+def test_the_rules_name_every_device() -> None:
+    for identity in USB:
+        vendor, product = identity.split(":")
+        assert f'ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}"' in udev_rules()
+    assert "0666" not in udev_rules()
+
+
+def test_no_rule_where_there_is_none(tmp_path: Path) -> None:
+    assert not has_rule("16c0:0483", tmp_path)
+
+
+def test_can_interfaces_are_known_by_their_kind(tmp_path: Path) -> None:
+    for name, kind in (("can0", "280"), ("eth0", "1")):
+        (tmp_path / "sys/class/net" / name).mkdir(parents=True)
+        (tmp_path / "sys/class/net" / name / "type").write_text(f"{kind}\n")
+    assert can_interfaces(tmp_path) == ["can0"]
+
+
+def told(capsys: pytest.CaptureFixture[str], words: list[str]) -> tuple[int, dict]:
+    code = main([*words, "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_the_verbs_speak_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    code, result = told(capsys, ["doctor"])
+    assert code == 0
+    assert all(f["level"] == "ok" for f in result["findings"] if f["subject"] == "logger")
+    code, result = told(capsys, ["devices", "--config", "canopen"])
+    assert code == 0
+    assert result["configured"]["jaw_force"]["driver"] == "ati-can"
+    code, result = told(capsys, ["stop"])
+    assert (code, result["state"]) == (0, "disarmed")
+
+
+def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        (Path(firmware.__file__).parent / "configs" / "reference.toml")
+        .read_text()
+        .replace("usb:16c0:0483", "/dev/nonesuch")
+    )
+    code, result = told(capsys, ["doctor", "-c", str(path)])
+    assert code == ExitCode.FAILED
+    assert result["level"] == "error"
+    assert "no port /dev/nonesuch" in result["findings"][-1]["what"]
+    code, result = told(capsys, ["stop", "-c", str(path)])
+    assert (code, result["state"]) == (ExitCode.SAFETY, "unknown")
+    code, result = told(capsys, ["firmware", "version", "-c", str(path)])
+    assert code == ExitCode.FAILED
+    assert not result["fits"]
+
+
+def test_the_hash_of_the_sources_is_that_of_posix_cksum(library: Path) -> None:
+    assert firmware.posix_cksum(b"123456789") == 930766865
+    versions = firmware.compare(load_config())
+    assert versions.fits
+    assert versions.sources.removeprefix("build ") in versions.board
+    assert versions.remarks == ("Program and board speak one protocol.",)
+
+
+def test_a_build_of_other_sources_is_told(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(firmware, "source_hash", lambda: 1)
+    assert any("rig firmware flash" in r for r in firmware.compare(load_config()).remarks)
+
+
+def test_flashing_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UsageError, match="teensy41 or teensy35"):
+        firmware.flash("uno")
+    monkeypatch.setattr(firmware.shutil, "which", lambda tool: None)
+    with pytest.raises(UsageError, match="platformio"):
+        firmware.flash("teensy41")
+    with pytest.raises(UsageError, match="make is not installed"):
+        firmware.build()

@@ -1,0 +1,101 @@
+"""The firmware as a process on a pseudo-terminal, in real time; asserted is its own clock."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.errors import LinkLostError
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.firmware_fake import FirmwareMissingError
+from drivers.teensy.protocol import STATUS_ARMED, Trip
+from drivers.transport import open_transport
+from rig.config import load_config
+from rig.errors import SafetyTripError
+from rig.logger import open_logger
+from rig.session import Session
+from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
+
+HOST = """
+import sys
+import numpy as np
+from pathlib import Path
+from drivers.transport import open_transport
+from rig.config import load_config
+from rig.session import Session
+
+config = load_config(Path("pty")).changed(safety={"watchdog_s": 0.05, "safe_state": sys.argv[2]})
+with Session(config, open_transport(sys.argv[1])) as session:
+    for reading in session.play(np.full(60000, -1.04), np.full(60000, 0.1)):
+        if reading.setpoint.max() > 0:
+            print("playing", flush=True)
+"""
+
+
+@pytest.fixture
+def program(library: Path) -> Path:
+    if not PROGRAM.is_file():
+        pytest.skip("the firmware process is built on Linux only")
+    return PROGRAM
+
+
+def test_a_session_runs_on_it_unchanged(program: Path) -> None:
+    config = load_config(Path("pty"))
+    angle = np.linspace(-1.04, -0.9, 500)
+    with Session(config, open_logger(config)) as session:
+        assert session.identity.serial == "PTY-0001"
+        session.take_zeros(0.3)
+        readings = list(session.play(angle, np.zeros(500)))
+    setpoint = np.concatenate([reading.setpoint for reading in readings])
+    assert np.array_equal(setpoint[setpoint >= 0], np.arange(500))
+    assert readings[-1].lost == 0
+    moved = np.concatenate([r.columns["spindle_angle_rad"] for r in readings])
+    assert moved[-1] - moved[0] > 0.05
+
+
+@pytest.mark.parametrize("safe_state", ["release", "hold"])
+def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(
+    program: Path, safe_state: str
+) -> None:
+    with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
+        assert board.stdout is not None
+        path = board.stdout.readline().strip()
+        with subprocess.Popen(
+            [sys.executable, "-c", HOST, path, safe_state], stdout=subprocess.PIPE, text=True
+        ) as host:
+            assert host.stdout is not None
+            assert host.stdout.readline().strip() == "playing"
+            host.kill()
+        with TeensyLogger(open_transport(path)) as logger:
+            logger.identify()
+            logger.start()
+            while True:  # until the watchdog's patience is over
+                status = int(logger.read(1.0).samples["status"][-1])
+                if not status & STATUS_ARMED:
+                    break
+            report = logger.trip()
+        board.terminate()
+    assert report.code is Trip.HOST_SILENT
+    assert 50_000 < report.late_us <= 52_000
+
+
+def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:
+    config = load_config(Path("pty"))
+    link = open_logger(config)
+    assert isinstance(link, FirmwareProcess)
+    unsafe = pytest.raises(SafetyTripError, match="did not confirm")
+    with unsafe as left, Session(config, link) as session:
+        next(session.rest(0.1))
+        link.process.kill()
+        with pytest.raises(LinkLostError):
+            for _ in session.watch():
+                pass
+    assert "Cut the motor supply" in left.value.fix
+    assert link.process.poll() is not None
+
+
+def test_a_missing_program_says_what_to_type(tmp_path: Path) -> None:
+    with pytest.raises(FirmwareMissingError, match="make -C firmware"):
+        FirmwareProcess(tmp_path / "none")

@@ -1,0 +1,142 @@
+"""Keys of the live display, its recordings, and what it says of calibrations."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from calibration.linear import shipped_calibration_set
+from calibration.record import Validity, record_of_line
+from calibration.store import CalibrationStore
+from rig.live.block import DeviceStatus
+from rig.live.keys import pressed_keys
+from rig.live.options import ShowOptions
+from rig.live.session_blocks import session_blocks
+from rig.live.state import LiveState
+from rig.live.until import until
+from rig.live.view import View
+from rig.log.reader import read_log
+from tests.rig.simulated import short_protocol, simulated, transport
+
+
+def watched(config, keys, tmp_path, duration_s=2.0, plans=()):
+    script = iter(keys)
+    stream = session_blocks(
+        config, lambda: transport(config), plans, None, lambda: next(script, ""), tmp_path
+    )
+    return list(until(stream, duration_s))
+
+
+def status(block, name):
+    return next((d for d in block.devices if d.name == name), None)
+
+
+def test_keys_start_mark_and_stop_a_recording_that_is_whole(tmp_path, monkeypatch):
+    blocks = watched(simulated(), ["", "r", "", "m", "r", ""], tmp_path)
+    (path,) = tmp_path.glob("*.mcap")
+    log = read_log(path)
+    recorded = blocks[1:4]
+    assert log.end.clean
+    assert len(log.topics["/rig/sample"]) == sum(len(block) for block in recorded)
+    assert [mark.text for mark in log.marks] == ["mark 1"]
+    assert log.run.zeros_before
+    assert status(blocks[0], "recording") is None
+    assert [status(block, "recording").state for block in blocks[1:5]] == ["on"] * 3 + ["off"]
+
+
+def test_a_recording_that_nobody_stops_is_closed_with_the_stream(tmp_path):
+    watched(simulated(), ["r"], tmp_path, duration_s=0.5)
+    (path,) = tmp_path.glob("*.mcap")
+    assert read_log(path).end.clean
+
+
+def test_a_tare_takes_the_zero_of_a_rig_at_rest_only(tmp_path):
+    *_, after = watched(simulated(), ["", "t", ""], tmp_path)
+    assert status(after, "recording") == DeviceStatus("recording", "off", "tared")
+    assert abs(after.columns["distal_torque_n_m"].mean()) < 1e-3
+    moving = watched(simulated(), ["", "t"], tmp_path, plans=short_protocol(1).plans())
+    assert "no tare while the rig moves" in status(moving[-1], "recording").detail
+
+
+def test_q_leaves_and_a_mark_without_a_recording_says_so(tmp_path):
+    blocks = watched(simulated(), ["m", "", "q"], tmp_path, duration_s=60.0)
+    assert len(blocks) == 2
+    assert "r starts one" in status(blocks[0], "recording").detail
+
+
+@pytest.mark.parametrize(
+    ("low", "days_old", "state", "words"),
+    [
+        (-1e6, 3, "ok", "1 records, oldest 3 days (proximal_torque_n_m)"),
+        (-1e6, 12, "stale", "12 days old, good for 10"),
+        (5e5, 3, "suspect", "outside its range: proximal_torque_n_m"),
+    ],
+)
+def test_age_and_range_of_calibrations_are_shown(tmp_path, low, days_old, state, words):
+    from datetime import UTC, datetime, timedelta
+
+    store = CalibrationStore(tmp_path / "store")
+    record = record_of_line(
+        shipped_calibration_set("reference").channels["proximal_torque_n_m"],
+        kind="torque",
+        made_at=(datetime.now(UTC) - timedelta(days=days_old)).isoformat(timespec="seconds"),
+        operator="Ada",
+        validity=Validity(low, 1e6, 10),
+    )
+    store.use(store.add(record), "2026-01-01T00:00:00+00:00", "Ada")
+    config = simulated().model_copy(update={"calibration_store": str(store.folder)})
+    (block, *_) = watched(config, [], tmp_path, duration_s=0.2)
+    said = status(block, "calibration")
+    assert said.state == state
+    assert words in said.detail
+
+
+def test_the_interval_and_the_keys_fit_80_columns(tmp_path):
+    state = LiveState(("distal_torque_n_m",))
+    blocks = watched(simulated(), ["", "r", "m"], tmp_path, duration_s=1.0)
+    from dataclasses import replace
+
+    for block in blocks:
+        state.feed(
+            replace(block, estimates={"distal_torque_n_m": block.columns["distal_torque_n_m"]})
+        )
+    view = View(state.snapshot(), "rig live", 0.012, "t tare  m mark", half_width=0.033)
+    lines = [line.plain for line in view.lines(79, 23)]
+    assert "±33.0 mN m" in lines[1]
+    assert lines[-1] == "t tare  m mark"
+    assert max(len(line) for line in lines if "traces" not in line) <= 120
+    assert ShowOptions("x").half_width is None
+
+
+def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
+    import pty
+    import termios
+
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "r+b", buffering=0) as terminal:
+        monkeypatch.setattr(sys, "stdin", Terminal(terminal))
+        before = termios.tcgetattr(theirs)
+        with pressed_keys() as keys:
+            assert keys() == ""
+            os.write(ours, b"rM")
+            assert keys() == "rm"
+        assert termios.tcgetattr(theirs) == before
+    os.close(ours)
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        with pressed_keys() as keys:
+            assert keys is None
+
+
+class Terminal:
+    """A stdin that is a pseudo-terminal."""
+
+    def __init__(self, raw):
+        self.raw = raw
+
+    def isatty(self):
+        return True
+
+    def fileno(self):
+        return self.raw.fileno()

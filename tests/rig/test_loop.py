@@ -1,0 +1,145 @@
+"""`rig loop --sim`: rounds until the name is unique, with the diagnosis standing in where told."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.diagnosis.split import Sealed
+from rig.cli.main import main
+from rig.config import load_config
+from rig.diagnosis import loop as looping
+from rig.diagnosis.loop import NO_RIVALS, NOTHING, SPENT, UNIQUE, Budget, run_loop
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
+from rig.protocol import load_protocol
+from rig.simulation.hidden import NAMES, UnknownHiddenEffectError, chosen
+from tests.rig.simulated import short_protocol, simulated
+
+NEXT = {
+    "name": "small",
+    "protocol": {
+        "name": "small",
+        "runs": [
+            {"kind": "sine", "frequencies_hz": [1.0], "loads_a": [0.2, 0.4], "duration_s": 1.0}
+        ],
+    },
+}
+
+
+def answer(verdict: str, proposed=None) -> Diagnosis:
+    finding = Finding("motor", "friction.load", verdict, 1.0, 0.5, 1, 1)
+    return Diagnosis(
+        (finding,), {}, {}, {}, {}, Sealed((), (), 0, "", ""), next_experiment=proposed
+    )
+
+
+@pytest.fixture
+def diagnosed(monkeypatch):
+    """What the diagnoses say, one a round, and the names of the runs each was given."""
+    told = SimpleNamespace(answers=[], seen=[])
+
+    def stand_in(path, models, ledger, **_):
+        told.seen.append(open_campaign(path).names)
+        return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1])
+
+    monkeypatch.setattr(looping, "run_diagnosis", stand_in)
+    return told
+
+
+def rounds(folder, budget=Budget(5, 60.0), **options):  # noqa: B008 - frozen
+    first = short_protocol(2)
+    return list(run_loop(folder, simulated(seed=1), [], budget, first=first, **options))
+
+
+def test_rivals_are_told_apart_by_a_second_campaign_read_with_the_first(tmp_path, diagnosed):
+    diagnosed.answers = [answer("one_of", NEXT), answer("identified")]
+    made = rounds(tmp_path)
+    assert [r.stopped for r in made] == ["", UNIQUE]
+    assert [r.experiment for r in made] == ["short", "small"]
+    assert [len(names) for names in diagnosed.seen] == [2, 4]
+    assert {name.split("/")[0] for name in diagnosed.seen[1]} == {"round-1", "round-2"}
+    kept = load_protocol(str(tmp_path / "round-2.protocol.toml"))
+    assert kept.name == "small"
+
+
+def test_noise_differs_between_rounds(tmp_path, diagnosed):
+    same = {"name": "short", "protocol": short_protocol(2).model_dump(exclude_unset=True)}
+    diagnosed.answers = [answer("one_of", same), answer("identified")]
+    rounds(tmp_path)
+    torques = [
+        run.recording()["proximal_torque_n_m"]
+        for run in open_campaign(tmp_path / "runs").runs
+        if run.name.endswith("000-sine-1Hz-0.1A")
+    ]
+    assert len(torques) == 2
+    assert not (torques[0] == torques[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "why"),
+    [
+        (answer("identified"), UNIQUE),
+        (replace(answer("identified"), findings=()), NOTHING),
+        (answer("depends_on"), NO_RIVALS),
+        (answer("one_of", {"name": "by hand", "protocol": None}), NO_RIVALS),
+    ],
+)
+def test_a_loop_ends_where_nothing_more_can_be_told(tmp_path, diagnosed, first, why):
+    diagnosed.answers = [first]
+    assert [r.stopped for r in rounds(tmp_path)] == [why]
+
+
+def test_a_loop_ends_with_its_budget(tmp_path, diagnosed):
+    diagnosed.answers = [answer("one_of", NEXT)] * 3
+    assert [r.stopped for r in rounds(tmp_path / "a", Budget(2, 60.0))] == ["", SPENT]
+    ticks = iter([0.0, 100.0])
+    diagnosed.seen.clear()
+    made = rounds(tmp_path / "b", Budget(5, 1.0), clock=lambda: next(ticks))
+    assert [r.stopped for r in made] == [SPENT]
+
+
+def test_a_real_rig_a_full_folder_and_an_empty_budget_are_refused(tmp_path, capsys):
+    real = load_config().changed(logger={"url": "socket://nowhere:1"})
+    with pytest.raises(UsageError, match="real rig"):
+        list(run_loop(tmp_path, real, [], Budget()))
+    (tmp_path / "there").write_text("")
+    with pytest.raises(UsageError, match="not empty"):
+        list(run_loop(tmp_path, simulated(), [], Budget()))
+    with pytest.raises(UsageError, match="allows nothing"):
+        Budget(0)
+    assert main(["loop"]) == 2
+    assert "--sim" in capsys.readouterr().err
+
+
+def test_what_is_hidden_is_chosen_by_name_by_seed_or_not_at_all():
+    assert chosen(["motor_ripple", "jaw_mass=0.5"], 0) == {"motor_ripple": 1.0, "jaw_mass": 0.5}
+    assert chosen(["none"], 0) == {}
+    (drawn,) = chosen(None, 3)
+    assert drawn in NAMES
+    assert chosen(None, 3) == chosen(None, 3)
+    with pytest.raises(UnknownHiddenEffectError):
+        chosen(["motor_riple"], 0)
+    with pytest.raises(UnknownHiddenEffectError):
+        chosen(["motor_ripple=much"], 0)
+
+
+def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys, monkeypatch):
+    from estimation.diagnosis import diagnose as diagnosing
+    from tests.rig.rippled import PROTOCOL, few
+
+    monkeypatch.setattr(diagnosing, "pool", few)
+    protocol = tmp_path / "first.toml"
+    from rig.protocol import protocol_toml
+
+    protocol.write_text(protocol_toml(PROTOCOL))
+    words = ["loop", "--sim", "--hide", "motor_ripple=0.5", "--balance", "motor", "--quick"]
+    words += ["--protocol", str(protocol), "--out", str(tmp_path / "loop"), "--seed", "1"]
+    assert main([*words, "--rounds", "1", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["hidden"] == {"motor_ripple": 0.5}
+    (only,) = said["rounds"]
+    assert only["diagnosis"]["findings"][0]["family"] == "ripple.motor"
+    assert (tmp_path / "loop" / "round-1" / "diagnosis.html").exists()

@@ -1,0 +1,173 @@
+"""Everything the rig is watched for: by the board first, by the host again, told in words."""
+
+import dataclasses
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from calibration.linear import shipped_calibration_set
+from drivers.teensy.protocol import STATUS_ARMED, TOP, Limits, SafeState, Trip, TripReport
+from drivers.transport.simulated import SimulatedTransport
+from rig.errors import ExitCode, SafetyTripError, exit_code_of
+from rig.safety import board_limits, check_samples
+from rig.session import Session
+from rig.trips import WORDS, HostWatch, trip_error
+from tests.rig.simulated import Wrapped, is_armed, simulated, transport
+
+HOLD = np.full(3000, -1.0)
+CLOSE = np.concatenate([np.linspace(-1.0, 0.0, 1500), np.zeros(1500)])
+LOAD = np.full(3000, 0.6)
+
+
+def test_every_trip_has_words():
+    assert set(WORDS) == set(Trip) - {Trip.NONE}
+    for trip, (what, fix) in WORDS.items():
+        error = trip_error(
+            TripReport(trip, "", 1, 1, 0, 3000), shipped_calibration_set("reference"), ""
+        )
+        assert what in error.what
+        assert f"code {int(trip)}" in error.what
+        assert "3 ms" in error.what
+        assert fix in error.fix
+        assert exit_code_of(error) == ExitCode.SAFETY
+
+
+def test_limits_reach_the_board_in_its_own_counts():
+    config = simulated().changed(
+        safety={"jaw_open_rad": -0.5, "jaw_closed_rad": 1.0, "stale_s": 0, "safe_state": "hold"}
+    )
+    limits = board_limits(config, config.calibration_set())
+    assert limits.valid
+    assert limits.max_current == 600
+    assert limits.i2t == 500_000  # 0.5 A^2 s at 1 mA a count
+    assert (limits.min_jaw, limits.max_jaw) == (-318, 637)
+    assert limits.max_motor_step == 587  # 0.9 rad a tick
+    assert limits.stale_ticks == TOP
+    assert limits.safe_state == SafeState.HOLD
+    assert limits.min_spindle == -limits.max_spindle == -3911
+
+
+def test_a_channel_the_rig_does_not_have_is_not_limited():
+    config = simulated()
+    limits = board_limits(config, shipped_calibration_set("canopen"))
+    assert limits.valid
+    assert limits.max_proximal == limits.max_distal == TOP
+
+
+CROSSINGS = {
+    Trip.OVERHEATED: ({"continuous_current_a": 0.05, "heat_a2_s": 0.01}, {}),
+    Trip.STALLED: ({"stall_current_a": 0.1, "stall_s": 0.2, "stall_motor_angle_rad": 3.0}, {}),
+    Trip.OVER_SPEED: ({"motor_speed_rad_s": 5.0}, {}),
+    Trip.JAW_TRAVEL: ({"jaw_closed_rad": -0.9}, {}),
+    Trip.PROXIMAL_TORQUE: ({}, {"proximal_torque_n_m": 0.08}),
+    Trip.OVER_CURRENT: ({}, {"motor_current_a": 0.1}),
+}
+
+
+@pytest.mark.parametrize("trip", list(CROSSINGS), ids=lambda trip: trip.name)
+def test_a_crossing_ends_the_session_safe_and_says_what_and_how_late(trip):
+    safety, limits = CROSSINGS[trip]
+    config = simulated().changed(safety=safety, limits=limits)
+    link = transport(config)
+    what = WORDS[trip][0]
+    with pytest.raises(SafetyTripError, match=what) as caught, Session(config, link) as session:
+        for _ in session.play(CLOSE, LOAD):
+            pass
+    assert "ms after it began" in caught.value.what
+    assert "Arming clears it" in caught.value.fix
+    assert not is_armed(link.board)
+
+
+def test_with_hold_the_board_keeps_the_spindle_and_disarming_lets_go():
+    config = simulated().changed(
+        safety={
+            "stall_current_a": 0.1,
+            "stall_s": 0.2,
+            "stall_motor_angle_rad": 3.0,
+            "safe_state": "hold",
+        }
+    )
+    link = transport(config)
+    with pytest.raises(SafetyTripError, match="holds the spindle"), Session(config, link) as rig:
+        for _ in rig.play(CLOSE, LOAD):
+            pass
+    with Session(config, transport(config)) as rig:
+        assert not next(rig.watch()).armed
+
+
+def test_the_host_repeats_what_the_board_is_blind_to():
+    """A board that does not trip has wide limits; the host holds the configured ones."""
+    config = simulated()
+    link = transport(config)
+    with Session(config, link) as session:
+        readings = session.play(HOLD[:600], LOAD[:600])
+        reading = next(r for r in readings if len(r) and (r.counts["status"] & STATUS_ARMED).any())
+    narrow = dataclasses.replace(Limits.widest(), max_current=1)
+    crossing = HostWatch(narrow).check(reading)
+    assert crossing is not None
+    assert crossing.code is Trip.OVER_CURRENT
+    assert HostWatch(Limits.widest()).check(reading) is None
+
+
+def test_the_hosts_watch_carries_on_from_reading_to_reading():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        reading = next(session.rest(0.2))
+    counts = reading.counts.copy()
+    counts["status"] |= STATUS_ARMED
+    counts["proximal"] = 77
+    stuck = dataclasses.replace(reading, counts=counts)
+    watch = HostWatch(dataclasses.replace(Limits.widest(), stale_ticks=len(counts) + 50))
+    assert watch.check(stuck) is None
+    crossing = watch.check(stuck)
+    assert crossing is not None
+    assert (crossing.code, crossing.channel) == (Trip.SENSOR_STALE, "proximal")
+
+
+def test_a_value_that_is_no_number_is_beyond_every_limit():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        reading = next(session.rest(0.1))
+    columns = {**reading.columns, "proximal_torque_n_m": np.full(len(reading), np.nan)}
+    with pytest.raises(SafetyTripError, match="proximal_torque_n_m reached nan"):
+        check_samples(config.limits, dataclasses.replace(reading, columns=columns))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_ctrl_c_does_not_break_into_the_way_out(number):
+    """The second comes while the board is being disarmed, which must go on all the same."""
+    config = simulated()
+    link = transport(config)
+    leaving = False
+
+    def strike(data: bytes) -> bytes:
+        if leaving:
+            os.kill(os.getpid(), number)
+        return data
+
+    handler = signal.getsignal(number)
+    paced = SimulatedTransport(Wrapped(link.board, strike))
+    with pytest.raises(KeyboardInterrupt), Session(config, paced) as session:  # noqa: PT012
+        next(session.play(HOLD, LOAD))
+        leaving = True
+        os.kill(os.getpid(), number)
+        for _ in session.watch():
+            pass
+    leaving = False
+    assert not is_armed(link.board)
+    assert signal.getsignal(number) is handler
+
+
+def test_a_cut_cable_is_said_as_unknown_and_the_board_makes_itself_safe():
+    config = simulated().changed(safety={"watchdog_s": 0.05})
+    link = transport(config)
+    unsafe = pytest.raises(SafetyTripError, match="did not confirm")
+    with unsafe as left, Session(config, link) as session:
+        next(session.play(HOLD, LOAD))
+        link.close()
+        next(session.watch())
+    assert "Cut the motor supply" in left.value.fix
+    link.board.advance(51)
+    assert not is_armed(link.board)

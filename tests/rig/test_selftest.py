@@ -1,0 +1,73 @@
+"""The acceptance test of a bench: on fakes here, on a real one where RIG_BENCH names it."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from drivers.framing import encode_frame
+from drivers.teensy.protocol import encode_ping
+from drivers.transport.simulated import SimulatedTransport
+from rig.cli.main import main
+from rig.config import Config, load_config
+from rig.config_check import refuse_problems
+from rig.doctor.selftest import selftest
+from tests.rig.simulated import Wrapped, simulated, transport
+
+
+@pytest.mark.bench
+def test_the_bench_passes_its_acceptance_test() -> None:
+    named = os.environ.get("RIG_BENCH")
+    if named is None:
+        pytest.skip("no bench: set RIG_BENCH to a configuration, as for `rig selftest -c`")
+    config = load_config(Path(named))
+    refuse_problems(config)
+    checks = list(selftest(config))
+    assert checks
+    assert all(check.passed for check in checks), [c for c in checks if not c.passed]
+
+
+@pytest.mark.parametrize("firmware", [False, True])
+def test_the_simulated_rig_passes_with_every_kind_of_device(firmware: bool, library: Path) -> None:
+    devices = {
+        name.replace("-", "_"): {"driver": name, "url": "sim://"}
+        for name in (("usb520", "ati-can", "amt21") if firmware else ("qia128", "ati-net", "epos4"))
+    }
+    config = simulated(firmware=firmware).changed(devices=devices)
+    checks = list(selftest(config))
+    assert len(checks) == 9
+    assert all(check.passed for check in checks), [c for c in checks if not c.passed]
+
+
+def failing(config: Config, monkeypatch: pytest.MonkeyPatch, change: object) -> list[str]:
+    """The checks that fail on a board whose output goes through a function."""
+
+    def opened(config: Config, step_s: float | None = None) -> SimulatedTransport:
+        link = transport(config)
+        return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))  # type: ignore[operator]
+
+    monkeypatch.setattr("rig.doctor.selftest.open_logger", opened)
+    monkeypatch.setattr("rig.devices.open_logger", opened)
+    return [check.name for check in selftest(config) if not check.passed]
+
+
+def test_a_board_whose_watchdog_sleeps_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fed(board: object, data: bytes) -> bytes:
+        if len(data) > 1000:  # samples, so that the pongs do not keep time from passing
+            board.receive(encode_frame(encode_ping(60000, 0)))  # type: ignore[attr-defined]
+        return data
+
+    failed = failing(simulated(), monkeypatch, fed)
+    assert "the board makes itself safe when the host falls silent" in failed
+
+
+def test_a_board_that_says_nothing_fails_everything(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(failing(simulated(), monkeypatch, lambda board, data: b"")) == 6
+
+
+def test_selftest_speaks_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["selftest", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["passed"]
+    assert {"name", "passed", "detail"} == set(told["checks"][0])
