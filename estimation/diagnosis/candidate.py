@@ -58,6 +58,9 @@ FAMILIES = [
 
 UNKNOWN = "unknown"
 
+ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
+"""Roles that a wave's order counts the turns of."""
+
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
 
@@ -109,6 +112,20 @@ class Candidate:
             not p.linear and value > step(p, p.upper, -0.5)
             for p, value in zip(self.effect.shape, self.shape, strict=True)
         )
+
+    def turns(self, spans: Mapping[str, float]) -> float:
+        """Return how many periods of its wave the widest run covers; infinite without a wave.
+
+        Less than one is no wave: any slow change with the angle would look like it.
+
+        Args:
+            spans: Channel to the widest range that a run covers.
+        """
+        names = [p.name for p in self.effect.shape]
+        if "order" not in names:
+            return math.inf
+        angle = next(channel for role, channel in self.channels if role in ANGLE_ROLES)
+        return self.shape[names.index("order")] * spans[angle] / (2 * math.pi)
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""

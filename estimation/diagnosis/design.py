@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.candidate import ANGLE_ROLES, Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -144,6 +144,13 @@ def columns_at(run: Run, candidate: Candidate) -> FloatArray:
     if candidate.effect.start():
         return run.thin(candidate.columns(run.channels))
     return candidate.columns(run.sampled)
+
+
+def covered(wanted: Sequence[Candidate], runs: Sequence[Run]) -> list[Candidate]:
+    """Return the candidates but waves of which no run covers a whole period."""
+    angles = {channel for c in wanted for role, channel in c.channels if role in ANGLE_ROLES}
+    spans = {angle: max(float(np.ptp(run.channels[angle])) for run in runs) for angle in angles}
+    return [c for c in wanted if c.turns(spans) >= 1.0]
 
 
 def tables(

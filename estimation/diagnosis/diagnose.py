@@ -12,7 +12,7 @@ from estimation.campaign import Campaign, with_campaign_time
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
-from estimation.diagnosis.design import DesignError, Run, prepare
+from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, samples_of, squares
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
@@ -187,6 +187,7 @@ def _balance(
     mapper = map if executor is None else executor.map
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
+    tried = covered(tried, runs)
     told = instrumented(runs, tried, fitted.target)
     balance = lay_out(fitted, [told(run) for run in runs], mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))

@@ -11,7 +11,7 @@ from rig.cli.output import JsonFlag, console
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
-    from rig.live.estimator import ModelEstimator
+    from rig.live.replay import EstimateStream
 
 
 def replay(
@@ -37,6 +37,7 @@ def replay(
     """
     from rig.errors import ExitCode, UsageError
     from rig.importers.registry import open_campaign
+    from rig.live.estimator import ModelEstimator
     from rig.live.options import ShowOptions
     from rig.live.replay import replay_blocks
     from rig.live.run import show
@@ -58,7 +59,7 @@ def replay(
         json=json_,
     )
     blocks = replay_blocks(recording, estimator, speed or None)
-    if estimator is not None:
+    if isinstance(estimator, ModelEstimator):
         blocks = watched(blocks, estimator.model)
     summary = show(blocks, options, console())
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
@@ -98,7 +99,7 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _estimator(path: Path, recording: "Recording") -> "ModelEstimator":
+def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
     """Read a model file and begin a stream of its estimates at the recording's rate."""
     from rig.live.estimator import ModelEstimator
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimation.derived import measured_channels
-from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.design import DesignError, prepare, targets
+from estimation.diagnosis.candidate import Candidate, projected
+from estimation.diagnosis.design import DesignError, Run, prepare, targets
 from estimation.diagnosis.diagnose import Story
+from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import PROJECTED_LOAD, projection
 from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
 from estimation.diagnosis.result import Diagnosis, Finding
@@ -20,12 +20,10 @@ from rig.diagnosis.menu import menu, room_of, within
 from rig.protocol import Protocol, protocol_toml
 from rig.simulation.twin import Twin
 
+CAMPAIGN_TIME = "campaign_time_s"
+
 SEED = 7_000_000
 """Far from the seeds of the twins that prove a finding."""
-
-
-MADE = ("time_s", PROJECTED_LOAD)
-"""Channels that preparing a run makes by itself."""
 
 
 def propose(
@@ -56,7 +54,6 @@ def propose(
         scored = _scored(story, finding, rivals, recordings, twin)
         if scored:
             return _described(finding, rivals, scored)
-        return _in_words(finding, rivals)
     return None
 
 
@@ -81,6 +78,9 @@ def _scored(
     limits = load_config().limits
     balance = story.balance
     known = list(balance.runs[0].channels)
+    made = {"time_s", PROJECTED_LOAD, *(projected(name) for name in known)}
+    others = beside(story, finding)
+    told = instrumented(balance.runs, [*others, *rivals], balance.model.target)
     whole = projection(balance)
     # old and new runs are thinned alike
     old = [coarse(run) for run in balance.runs]
@@ -91,27 +91,28 @@ def _scored(
         played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
         if not within(played, limits):
             continue
-        wanted = [name for name in known if _played(name, played[0])]
-        others = [*rivals, *beside(story, finding)]
-        read = {channel for one in others for _, channel in one.channels}
-        if not read <= {*wanted, *MADE}:
-            continue  # a rival reads what a simulated run does not have, such as campaign time
+        if CAMPAIGN_TIME in known:
+            played = _after(balance.runs, played)
+        wanted = [name for name in known if name not in made]
         runs = []
         for run in played:
             try:
-                runs.append(coarse(whole(prepare(run, wanted, balance.model))))
+                runs.append(coarse(whole(told(prepare(run, wanted, balance.model)))))
             except DesignError:
                 continue  # a run that only rests tells nothing of this balance
         if runs:
             seconds = sum(plan.duration_s for plan in plans)
-            told = worth(thin, beside(story, finding), rivals, protocol.name, runs, seconds)
-            scored.append((protocol, told))
+            scored.append((protocol, worth(thin, others, rivals, protocol.name, runs, seconds)))
     return sorted(scored, key=lambda pair: -pair[1].net)
 
 
-def _played(name: str, run: Recording) -> bool:
-    """Say whether a simulated run has a channel, or what it is made from."""
-    return name not in MADE and all(source in run for source in measured_channels([name]))
+def _after(runs: Sequence[Run], played: Sequence[Recording]) -> list[Recording]:
+    """Return played runs on the campaign's clock, a minute apart behind the runs there are."""
+    last = max(float(run.channels[CAMPAIGN_TIME].max()) for run in runs)
+    return [
+        recording.with_columns(**{CAMPAIGN_TIME: last + 60.0 * (k + 1) + recording.time_s})
+        for k, recording in enumerate(played)
+    ]
 
 
 def _described(

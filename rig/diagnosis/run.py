@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from estimation import model_file
+from estimation.diagnosis.clock import steady
 from estimation.diagnosis.diagnose import Story, diagnose
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
 from estimation.diagnosis.result import Diagnosis
@@ -100,7 +101,9 @@ def run_diagnosis(
         EstimationError: Nothing can be decided; says why.
     """
     on_stage("reading the recordings")
-    whole = evidence(open_campaign(path, format_name))
+    whole, lost = steady(evidence(open_campaign(path, format_name)))
+    for reason in lost:
+        on_stage(reason)
     known = ledger.known(whole)
     if len(whole) == PATHS:
         recordings, sealed = split_paths(whole, seed, known)
@@ -118,7 +121,7 @@ def run_diagnosis(
         on_stage=on_stage,
         on_open=lambda: ledger.write(whole, sealed),
     )
-    notes = diagnosis.notes
+    notes = (*lost, *diagnosis.notes)
     if len(whole) == PATHS:
         notes = (claim(sealed), *notes)
     if twins.note:

@@ -14,7 +14,7 @@ from estimation.campaign import Campaign
 from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import Candidate, pool
-from estimation.diagnosis.design import DesignError, Run, prepare
+from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.frozen import Frozen, Part, freeze
 from estimation.diagnosis.search import Gates, Search, Trial
 from estimation.diagnosis.split import Sealed, split
@@ -205,6 +205,7 @@ def _row(
     tried = [c for c in pool(declared, task.measured, task.instead) if c.family not in TIMELESS]
     wanted = [task.target, *declared.channels, *(ch for c in tried for _, ch in c.channels)]
     runs = _prepared(discover, wanted, declared)
+    tried = covered(tried, runs)
     gates = Gates(
         most=task.parameters, parameters=task.parameters, akin=True, surrogates=99, floor=FLOOR
     )

@@ -25,14 +25,14 @@ PROTOCOL = Protocol.model_validate(
         "runs": [
             {
                 "kind": "sine",
-                "frequencies_hz": [0.4, 0.7],
+                "frequencies_hz": [0.25, 0.4],
                 "loads_a": [0.2, 0.5, 0.8],
                 "amplitude_rad": 0.3,
                 "duration_s": 4.0,
             },
             {
                 "kind": "sine",
-                "frequencies_hz": [0.5],
+                "frequencies_hz": [0.3],
                 "loads_a": [0.4],
                 "amplitude_rad": 0.3,
                 "duration_s": 4.0,

@@ -141,6 +141,60 @@ def test_a_missing_channel_exits_5_and_names_nothing(monkeypatch, tmp_path, caps
     assert not ledger.exists()  # the confirm runs were not opened
 
 
+def jumping(recording):
+    time_s = recording.time_s.copy()
+    time_s[700:] += 0.4
+    return replace(recording, time_s=time_s)
+
+
+def test_runs_whose_clock_jumps_are_left_out_and_named(monkeypatch, tmp_path, capsys):
+    recordings = runs(count=6, seconds=2.0)
+    spoilt = [jumping(recordings[0]), *recordings[1:]]
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(spoilt))
+    found = run(tmp_path, "--balance", "motor", "--quick")
+    assert recordings[0].name not in {*found["runs"]["discover"], *found["runs"]["confirm"]}
+    assert any("jumps by 0.401 s at 0.699 s" in note for note in found["notes"])
+
+
+def test_when_every_clock_jumps_nothing_is_decided(monkeypatch, tmp_path, capsys):
+    spoilt = [jumping(r) for r in runs(spring, count=6, seconds=2.0)]
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(spoilt))
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--ledger", str(tmp_path / "l")]
+    assert main(words) == 5
+    said = capsys.readouterr().err
+    assert "its clock jumps" in said
+    assert "too few to diagnose" in said
+
+
+def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_says_so(monkeypatch, tmp_path):
+    def periodic(name, seed):
+        one = runs(count=1, seconds=24.0, first_seed=seed)[0]
+        time_s = one.time_s
+        angle = 0.5 * np.sin(np.pi * time_s) + 0.2 * np.cos(1.5 * np.pi * time_s + seed)
+        speed = 35 * np.gradient(angle, time_s)
+        load = 0.05 * (1.2 + np.sin(np.pi * time_s / 2 + seed))
+        noise = 1e-3 * np.random.default_rng(seed).normal(size=len(one))
+        friction = 0.012 * np.tanh(speed / 3) + 2e-5 * np.gradient(speed, time_s)
+        return replace(
+            one.with_columns(
+                motor_angle_rad=35 * angle,
+                spindle_angle_rad=angle,
+                motor_current_a=(load + friction) / 0.94,
+                proximal_torque_n_m=load + noise,
+            ),
+            name=name,
+            conditions={},
+        )
+
+    paths = [periodic("one", 1), periodic("two", 2)]
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(paths))
+    found = run(tmp_path, "--balance", "motor", "--quick")
+    assert len(found["runs"]["discover"]) == len(found["runs"]["confirm"]) == 6
+    assert "Two recorded paths only" in found["notes"][0]
+    assert found["exploratory"] is False
+    assert run(tmp_path, "--balance", "motor", "--quick")["exploratory"] is True
+
+
 def test_an_unknown_balance_is_a_usage_error(tmp_path, capsys):
     assert main(["diagnose", str(tmp_path), "--balance", "elbow"]) == 2
     assert "elbow" in capsys.readouterr().err

@@ -1,0 +1,115 @@
+"""The residual watch where it is used: while recording, and on a live or replayed stream."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.fitting import fit
+from estimation.model import NotFittedError
+from estimation.recording import Recording
+from rig.cli.main import main
+from rig.importers.registry import open_campaign
+from rig.live.replay import replay_blocks
+from rig.live.watching import watched
+from rig.record import open_campaign_folder, record_campaign
+from rig.session import Session
+from rig.watching import watch_runs
+from tests.estimation import synthetic
+from tests.rig.simulated import short_protocol, simulated, transport
+
+SHORT = short_protocol(5, duration_s=3.0)
+
+
+def record(folder: Path, **simulation) -> list[Path]:
+    config = simulated(**simulation)
+    plans = open_campaign_folder(folder, SHORT, config, resume=False)
+    with Session(config, transport(config)) as session:
+        return [result.path for result in record_campaign(session, plans, folder)]
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("fitted")
+    record(folder / "logs", seed=1)
+    fitted = fit(model_file.read(Path("motor")), open_campaign(folder / "logs"), bootstrap=0)
+    path = folder / "motor.model.toml"
+    model_file.write(fitted, path)
+    return path
+
+
+def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path) -> None:
+    watch = watch_runs(model)
+    said = [watch.after(path) for path in record(tmp_path / "before", seed=2)]
+    assert watch.fits
+    hidden = {"motor_ripple": 1.5}
+    said += [watch.after(path) for path in record(tmp_path / "after", seed=3, hidden=hidden)]
+    (news,) = [words for words in said if words]
+    assert "stops fitting, since run 000" in news  # the first run of the second campaign
+    assert said.index(news) >= 5
+    assert not watch.fits
+    assert watch.to_json()["since"].startswith("000")
+
+
+def test_record_tells_what_the_watch_saw(model, tmp_path, capsys) -> None:
+    out = tmp_path / "logs"
+    protocol = tmp_path / "one.toml"
+    table = 'kind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2, 0.3]\nduration_s = 2.0\n'
+    protocol.write_text(f'name = "one"\n[[runs]]\n{table}')
+    words = ["record", "-p", str(protocol), "-o", str(out), "--model", str(model), "--json"]
+    assert main(words) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["model"]["fits"] is True
+    assert len(said["model"]["runs"]) == 2
+
+
+def test_a_model_without_values_cannot_be_watched() -> None:
+    with pytest.raises(NotFittedError, match="not fitted"):
+        watch_runs(Path("motor"))
+
+
+def test_a_stream_says_since_when_its_model_no_longer_fits() -> None:
+    campaign = synthetic.campaign()
+    fitted = fit(model_file.read(Path("motor")), campaign, bootstrap=0)
+
+    def rough(motor_rad, speed_rad_s, load_n_m):
+        late = np.arange(len(motor_rad)) >= 30_000
+        return np.where(late, 6e-3 * np.sin(4 * motor_rad), 0.0)
+
+    run = synthetic.run("long", 0.35, 0.1, seed=3, seconds=60.0, extra=rough)
+    blocks = list(watched(replay_blocks(run, None, None), fitted))
+    states = [(block.time_s[-1], block.devices[-1]) for block in blocks]
+    assert {status.name for _, status in states} == {"model"}
+    early = {status.state for time_s, status in states if time_s < 29}
+    assert early == {"watching", "fits"}
+    assert states[-1][1].state == "no longer fits"
+    # the piece in which it began
+    assert states[-1][1].detail.endswith(("since 25 s", "since 30 s"))
+
+
+def test_a_stream_without_the_models_channels_is_not_watched() -> None:
+    fitted = fit(model_file.read(Path("motor")), synthetic.campaign(), bootstrap=0)
+    time_s = np.arange(7000) * 1e-3
+    bare = Recording("bare", time_s, {"distal_torque_n_m": np.zeros(7000)})
+    last = list(watched(replay_blocks(bare, None, None), fitted))[-1].devices[-1]
+    assert last.state == "not watched"
+    assert "channel" in last.detail or "lacks" in last.detail
+
+
+def test_closing_the_watched_stream_closes_the_rigs() -> None:
+    closed = []
+
+    def stream():
+        try:
+            yield from replay_blocks(synthetic.run("r", 0.3, 0.1, seed=1), None, None)
+        finally:
+            closed.append(True)
+
+    fitted = fit(model_file.read(Path("motor")), Campaign.of(synthetic.campaign()), bootstrap=0)
+    watched_stream = watched(stream(), fitted)
+    next(watched_stream)
+    watched_stream.close()
+    assert closed == [True]
