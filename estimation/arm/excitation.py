@@ -129,11 +129,12 @@ def by_active_set(arm: Arm, first: FloatArray, evaluations: int) -> tuple[FloatA
         The numbers for `fitted`, and their condition number.
     """
     rounds = max(1, evaluations // (len(first) + 2))
+
+    def logarithm(raw: FloatArray) -> float:
+        return float(np.log(condition(arm, fitted(arm, raw))))
+
     found = minimize(
-        lambda raw: float(np.log(condition(arm, fitted(arm, raw)))),
-        first.ravel(),
-        method="SLSQP",
-        options={"maxiter": rounds, "ftol": 1e-6},
+        logarithm, first.ravel(), method="SLSQP", tol=1e-6, options={"maxiter": rounds}
     )
     return found.x, float(np.exp(found.fun))
 
