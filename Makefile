@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint bench blind figures firmware clean
+.PHONY: setup demo test lint site bench blind figures firmware clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -31,6 +31,9 @@ lint: $(VENV)/.developing firmware
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+site: $(VENV)/.developing
+	$(BIN)/mkdocs build --strict
 
 bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks

@@ -3,10 +3,11 @@
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
 and second derivative of `X_angle_rad`, `X_rate_n_m_s` is the first of `X_n_m`; `X_travel_rad` is
 how far that angle has come since its lowest value of the last `TRAVEL_WINDOW_S`, the state of
-hysteresis after a reversal; `gearbox_differential_rad` is the motor's angle behind the gear ratio
-less the spindle's; `motor_load_n_m` is the spindle's torque projected from the current;
-`campaign_time_s` is the time since the campaign's first run began, put beside the measured channels
-by `Campaign.timed`, and live the time since the first sample. Offline they come from a
+hysteresis after a reversal; `X_fall_a` is how far the channel `X_a` (any unit) is below its highest
+value of that window; `gearbox_differential_rad` is the motor's angle behind the gear ratio less the
+spindle's; `motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is
+the time since the campaign's first run began, put beside the measured channels by `Campaign.timed`,
+and live the time since the first sample. Offline they come from a
 zero-phase filter and a noise-robust derivative, live from a causal filter and backward differences:
 the same names, two sources.
 """
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
+from estimation.channels import UNIT_BY_SUFFIX
 from estimation.filters import (
     PAPER,
     CausalFilter,
@@ -26,6 +28,7 @@ from estimation.filters import (
     filter_recording,
     holoborodko_derivative,
 )
+from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
 
@@ -47,6 +50,7 @@ CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
 
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
+FALL = "_fall_"
 RATE = "_rate_n_m_s"
 
 TRAVEL_WINDOW_S = 0.5
@@ -65,6 +69,8 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
             needed |= {"motor_angle_rad", "spindle_angle_rad"}
         elif name.endswith(TRAVEL):
             needed.add(_travelled(name))
+        elif FALL in name:
+            needed.add(_fallen(name))
         elif name == MOTOR_LOAD:
             needed |= {"motor_current_a", "motor_angle_rad"}
         elif name != "time_s":
@@ -74,6 +80,16 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
 
 def _travelled(name: str) -> str:
     return name.removesuffix(TRAVEL) + "_angle_rad"
+
+
+def fall_of(channel: str) -> str:
+    """Return the name of a measured channel's fall: `motor_current_fall_a`."""
+    suffix = next(s for s in UNIT_BY_SUFFIX if channel.endswith(f"_{s}"))
+    return channel.removesuffix(f"_{suffix}") + FALL + suffix
+
+
+def _fallen(name: str) -> str:
+    return name.replace(FALL, "_")
 
 
 def _differentiated(name: str) -> tuple[str, int]:
@@ -101,6 +117,9 @@ def _derive(
             continue
         if name.endswith(TRAVEL):
             channels[name] = travel(filtered[_travelled(name)])
+            continue
+        if FALL in name:
+            channels[name] = travel(-filtered[_fallen(name)])
             continue
         if name == MOTOR_LOAD:
             direction = np.tanh(derivative(filtered["motor_angle_rad"]) / LOAD_WIDTH_RAD_S)
@@ -207,12 +226,19 @@ class CausalChannels:
     of more than `LONGEST_GAP_S` the filter starts anew. A sample in which a needed channel is not
     finite counts as lost, and its derived values are NaN. The result does not depend on how the
     samples are cut into batches.
+
+    Speeds and accelerations are backward differences of the filtered angle; `tracked` ones come
+    from the angle as it was measured, by the Kalman filter of `estimation.kalman`, with less lag.
     """
 
     LONGEST_GAP_S = 0.25
 
     def __init__(
-        self, names: Iterable[str], sample_rate_hz: float, low_pass: LowPass = PAPER
+        self,
+        names: Iterable[str],
+        sample_rate_hz: float,
+        low_pass: LowPass = PAPER,
+        tracked: bool = False,
     ) -> None:
         self.names = tuple(dict.fromkeys(names))
         self.measured = measured_channels(name for name in self.names if name not in CLOCKS)
@@ -221,9 +247,17 @@ class CausalChannels:
         self._first_time_s: float | None = None
         self._last_time_s: float | None = None
         self._last_row: FloatArray = np.empty(0)
-        travels = any(name.endswith(TRAVEL) for name in self.names)
+        travels = any(name.endswith(TRAVEL) or FALL in name for name in self.names)
         self._kept = max(2, _window(sample_rate_hz) if travels else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
+        derived = {name: _differentiated(name) for name in self.names if tracked}
+        self._tracked = {
+            name: (self.measured.index(angle), times)
+            for name, (angle, times) in derived.items()
+            if times and angle in self.measured and angle.endswith("_angle_rad")
+        }
+        self._tracker = tracker(sample_rate_hz) if self._tracked else None
+        self._motion: dict[int, FloatArray] = {}  # the tracker's state of each measured angle
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
         """Take the next samples and return the channels for them.
@@ -281,13 +315,27 @@ class CausalChannels:
         )
         derived = _derive(
             dict(zip(self.measured, lined.T, strict=True)),
-            [name for name in self.names if name not in CLOCKS],
+            [name for name in self.names if name not in CLOCKS and name not in self._tracked],
             self._backward,
             lambda values: _travel(values, _window(self._rate_hz)),
         )
         at = ticks[1:] + self._kept - 1  # tick 1 is the first row after the history
         channels = {name: values[at] for name, values in derived.items()}
+        channels |= self._track(filled, first, ticks[1:] - 1)
         return {**channels, "time_s": time} if "time_s" in self.names else channels
+
+    def _track(
+        self, filled: FloatArray, first: bool, at: NDArray[np.int64]
+    ) -> dict[str, FloatArray]:
+        """Return the tracked channels of the samples at some ticks of the gap-free rows."""
+        if self._tracker is None:
+            return {}
+        motion = {}
+        for column in {column for column, _ in self._tracked.values()}:
+            if first:
+                self._motion[column] = self._tracker.start(filled[0, column])
+            motion[column] = self._tracker.track(filled[:, column], self._motion[column])[at]
+        return {name: motion[column][:, times] for name, (column, times) in self._tracked.items()}
 
     def _backward(self, values: FloatArray) -> FloatArray:
         # the first value is made of one sample too few, and is never handed out
@@ -295,15 +343,21 @@ class CausalChannels:
 
 
 def causal_channels(
-    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
+    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER, tracked: bool = False
 ) -> Recording:
     """Return a recording of the named channels as they would have come live.
+
+    Args:
+        recording: Measured channels.
+        names: Channels wanted, measured or derived.
+        low_pass: Filter of every measured channel.
+        tracked: Take speeds and accelerations from a Kalman filter, see `CausalChannels`.
 
     Raises:
         MissingChannelError: A measured channel is not in the recording.
     """
     wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
-    source = CausalChannels(wanted, recording.sample_rate_hz, low_pass)
+    source = CausalChannels(wanted, recording.sample_rate_hz, low_pass, tracked)
     clocks = [name for name in wanted if name == CAMPAIGN_TIME]
     measured = {name: recording[name] for name in (*source.measured, *clocks)}
     return replace(recording, columns=source.step(recording.time_s, measured))

@@ -1,7 +1,7 @@
 """One interface for everything that estimates a channel: fit, predict, step, save, load.
 
-An estimator is an unchanging object. What fits one is a recipe: `ModelRecipe`, `NetworkRecipe` and
-`ResidualRecipe` hold their settings and turn a campaign into an estimator.
+An estimator is an unchanging object. What fits one is a recipe: `ModelRecipe`, `BankRecipe`,
+`NetworkRecipe` and `ResidualRecipe` hold their settings and turn a campaign into an estimator.
 """
 
 from collections.abc import Mapping
@@ -60,20 +60,23 @@ class Recipe(Protocol):
 
 
 def load(path: Path) -> Estimator:
-    """Read an estimator: a model file (`.toml`) or a network with what belongs to it (`.npz`).
+    """Read an estimator: a model file (`.toml`), a state estimator or a network (`.npz`).
 
     Raises:
         ModelFileError: A model file cannot be read.
-        NetworkError: A network's file cannot be read.
+        NetworkError: An NPZ file cannot be read.
     """
+    from estimation.estimators.bank import BankEstimator
     from estimation.estimators.model import ModelEstimator
     from estimation.estimators.network import NetworkEstimator
     from estimation.estimators.residual import ResidualEstimator
     from estimation.model_file import read
-    from estimation.networks.network import read_arrays
+    from estimation.networks.network import read_arrays, schema_of
 
     if path.suffix == ".toml":
         return ModelEstimator(read(path))
+    if schema_of(path) == BankEstimator.SCHEMA:
+        return BankEstimator.load(path)
     arrays = read_arrays(path, NetworkEstimator.SCHEMA)
     if "model" in arrays:
         return ResidualEstimator.from_arrays(arrays)

@@ -34,6 +34,9 @@ LEAD_S = 0.3
 
 TICKS_A_SECOND = 1_000_000 // TICK_US
 
+UNENDING = 2**62
+"""Number of setpoints while it is not known how many there will be."""
+
 READ_TIMEOUT_S = 0.2
 """Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
 
@@ -148,23 +151,48 @@ class Session:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        limits = self.config.limits
-        check_setpoints(limits, target_angle_rad, load_command_a)
-        targets = self._to_counts("target_angle_rad", target_angle_rad)
-        loads_ma = self._to_counts("load_command_a", load_command_a)
+        check_setpoints(self.config.limits, target_angle_rad, load_command_a)
+        cuts = range(0, target_angle_rad.size, MAX_SETPOINTS)
+        blocks = [slice(cut, cut + MAX_SETPOINTS) for cut in cuts]
+        yield from self.follow((target_angle_rad[b], load_command_a[b]) for b in blocks)
+
+    def follow(
+        self, setpoints: Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    ) -> Iterator[Reading]:
+        """Arm the rig and play setpoints that are decided while it goes, until there are no more.
+
+        A piece is asked for `LEAD_S` before it is played, so what a reading tells can change what
+        comes so much later.
+
+        Args:
+            setpoints: Pieces of spindle angle (rad) and load current (A) at 1 kHz, each of shape
+                (n,), n from 1 to `MAX_SETPOINTS`.
+
+        Raises:
+            SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
+            LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
+        """
         lead = round(LEAD_S * TICKS_A_SECOND)
         board = board_limits(self.config, self.calibrations)
         self._watch = HostWatch(board)
         self._logger.arm(self.config.controller.gains(), board)
         queued = played = 0
+        is_over = False
         newest_sequence: int | None = None
-        while played < targets.size:
-            while queued < min(played + lead, targets.size):
-                block = slice(queued, min(queued + MAX_SETPOINTS, targets.size))
-                self._queue(targets[block], loads_ma[block])
-                queued = block.stop
+        while not is_over or played < queued:
+            while not is_over and queued < played + lead:
+                piece = next(setpoints, None)
+                if piece is None:
+                    is_over = True
+                    break
+                check_setpoints(self.config.limits, *piece)
+                targets = self._to_counts("target_angle_rad", piece[0])
+                self._queue(targets, self._to_counts("load_command_a", piece[1]))
+                queued += targets.size
             reading = self._read()
-            reading = with_setpoints(reading, played, targets.size, newest_sequence)
+            # until the end is known, a queue that ran dry is a setpoint that is missing
+            planned = queued if is_over else UNENDING
+            reading = with_setpoints(reading, played, planned, newest_sequence)
             played = max(played, int(reading.setpoint.max()) + 1)
             newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading

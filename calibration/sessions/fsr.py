@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.fsr import Creep, FsrRun, fit_fsr, measure_creep
-from calibration.fsr_memory import CREEP_START_S, fit_memory
+from calibration.fsr_memory import CREEP_START_S, FsrMemory, fit_memory
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_points
@@ -31,6 +31,7 @@ class FsrSession:
         force_at_zero_n: Force at 0 V, held; fitted if None.
         axis: Channel of the force sensor that presses, rising.
         rail_v: Upper end of the amplifier's range.
+        curve_only: Model neither hysteresis nor creep.
     """
 
     top_n: float = 1.6
@@ -41,6 +42,7 @@ class FsrSession:
     force_at_zero_n: float | None = None
     axis: str = "force_z_n"
     rail_v: float = 3.3
+    curve_only: bool = False
 
     kind = "fsr"
     devices = ("logger", "force_sensor")
@@ -75,20 +77,16 @@ class FsrSession:
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the curve from voltage to force with what it remembers."""
         by_name = {m.recording.name: m for m in measurements}
-        rest = by_name.get("rest")
-        if rest is None:
-            raise BadDataError("points", "There is no reading of the empty sensors.")
-        zero_n = float(rest.recording[self.axis].mean())
-        floor_v = float(rest.recording[FSR].mean() + 5 * rest.recording[FSR].std() + 0.005)
-        presses = [m for name, m in by_name.items() if name.startswith("press")]
-        check_points(len(presses), 3, "presses")
-        runs = [self._run(m, zero_n, floor_v) for m in presses]
+        runs = self.pressed(measurements)
+        zero_n = self._rest(measurements)[0]
         fitted = fit_fsr(
             runs, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
         )
         hysteresis, drift = fitted.hysteresis, fitted.drift
         creep = self._creep(by_name.get("hold"), zero_n)
         memory = fit_memory(fitted.curve, runs, creep)
+        if self.curve_only:
+            memory = FsrMemory(held_out_rmse_n=memory.held_out_rmse_n)
         # the curve in the middle of the loop: what memory adds is taken off, and it is fitted again
         pure = [memory.memoryless(fitted.curve, run) for run in runs]
         fitted = fit_fsr(
@@ -119,7 +117,7 @@ class FsrSession:
             else hysteresis,
             "held_out_rmse_n": memory.held_out_rmse_n[0],
             "held_out_rmse_with_gap_n": memory.held_out_rmse_n[1],
-            "loading_gap": "modelled" if memory.gap_n else "not told apart from none",
+            "loading_gap": self._gap_words(memory),
             "creep": "not measured"
             if creep is None
             else f"{creep.rate:+.2%} a decade +- {creep.standard_error:.2%}",
@@ -131,6 +129,31 @@ class FsrSession:
             found,
             Residuals("voltage, V", "residual, N", series),
         )
+
+    def pressed(self, measurements: Sequence[Measurement]) -> list[FsrRun]:
+        """Return the pressed parts of the presses, the force less its zero.
+
+        Raises:
+            BadDataError: No reading of the empty sensors, too few presses, or a dead resistor.
+        """
+        zero_n, floor_v = self._rest(measurements)
+        presses = [m for m in measurements if m.recording.name.startswith("press")]
+        check_points(len(presses), 3, "presses")
+        return [self._run(m, zero_n, floor_v) for m in presses]
+
+    def _rest(self, measurements: Sequence[Measurement]) -> tuple[float, float]:
+        """Return the force sensor's zero, and the voltage above which the resistor is pressed."""
+        for measurement in measurements:
+            if measurement.recording.name == "rest":
+                volts = measurement.recording[FSR]
+                floor_v = float(volts.mean() + 5 * volts.std() + 0.005)
+                return float(measurement.recording[self.axis].mean()), floor_v
+        raise BadDataError("points", "There is no reading of the empty sensors.")
+
+    def _gap_words(self, memory: FsrMemory) -> str:
+        if self.curve_only:
+            return "left out, as asked for"
+        return "modelled" if memory.gap_n else "not told apart from none"
 
     def _run(self, measurement: Measurement, zero_n: float, floor_v: float) -> FsrRun:
         """Return the pressed part of a run, both channels smoothed alike."""

@@ -297,21 +297,35 @@ def _confirmed(story: Story, gates: Gates) -> Story:
     last = story.before
     for claim in story.claims:
         trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
-        old = squares(last, story.confirm).sum()
-        new = squares(trial, story.confirm).sum()
-        if new <= (1 - gates.floor / 2) * old:
+        reason = _refusal(last, trial, story.confirm, gates)
+        if reason is None:
             kept.append(claim)
             last = trial
         else:
             what = claim.named.candidate.family if claim.named else UNKNOWN
-            refused.append(
-                f"{what}: on the confirm runs the squared error changed by"
-                f" {100 * (new / old - 1):+.1f} %"
-            )
+            refused.append(f"{what}: {reason}")
     values = intervals(story.balance, last.terms, seed=0)
     return replace(
         story, claims=tuple(kept), refused=tuple(refused), after=last, values=tuple(values)
     )
+
+
+def _refusal(before: Frozen, after: Frozen, confirm: Sequence[Run], gates: Gates) -> str | None:
+    """Return why the confirm runs do not bear out what was added, or None where they do."""
+    old, new = squares(before, confirm), squares(after, confirm)
+    change = 100 * (new.sum() / old.sum() - 1)
+    if new.sum() > (1 - gates.floor) * old.sum():
+        return f"on the confirm runs the squared error changed by {change:+.1f} %"
+    better = int(np.count_nonzero(new < old))
+    if better < len(confirm) / 2:
+        return f"it helps in {better} of {len(confirm)} confirm runs"
+    whole = [squares(f, confirm, at_rest=True).sum() for f in (before, after)]
+    if whole[1] > whole[0]:
+        return (
+            f"on the confirm runs in motion the squared error changed by {change:+.1f} %, but over"
+            f" all samples by {100 * (whole[1] / whole[0] - 1):+.1f} %"
+        )
+    return None
 
 
 def _findings(story: Story) -> list[tuple[Finding, Added]]:

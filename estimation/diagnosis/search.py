@@ -283,8 +283,8 @@ class Search:
         )
 
     def _against_twins(self, trial: Trial) -> Trial:
-        """Hold a trial that passes all other gates against the simulated twins."""
-        if self.twin is None or not trial.passes(self.gates):
+        """Hold a trial that stands out from the surrogates against the simulated twins too."""
+        if self.twin is None or not trial.stands_out(self.gates):
             return trial
         samples = sum(len(y) for y in self.balance.target)
         return replace(trial, p_twin=self.twin(trial.worth * self.declared_loss / samples))

@@ -146,7 +146,29 @@ def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
     """Return the roles of a balance."""
     if kind == "joint":
         return _of_joint(int(number))
+    if kind == "calibration":
+        return _IN_CALIBRATION
     return CHANNELS[kind] if kind in CHANNELS else _of_axis(kind)
+
+
+OF_CALIBRATION: Mapping[str, int] = {
+    "hysteresis.presliding": 1,
+    "hysteresis.presliding.maxwell": 1,
+    "sensor.creep": 1,
+    "sensor.drift": 1,
+    "sensor.gain_nonlinear": 1,
+}
+"""Effects that may enter the balance of a calibration, `reference = calibrated`, and their side.
+What makes a sensor lag behind its load adds to the reference while the load rises."""
+
+_CALIBRATED = ("calibrated_n", "calibrated_n_m")
+_IN_CALIBRATION = {
+    "travel": _CALIBRATED,
+    "reading": _CALIBRATED,
+    "creeping": _CALIBRATED,
+    "clock": ("time_s",),
+    "elapsed": ("time_s",),
+}
 
 
 def entries(effect: Effect, balance: str) -> list[Entry]:
@@ -157,7 +179,7 @@ def entries(effect: Effect, balance: str) -> list[Entry]:
         balance: Balance id, such as `motor` or `joint.3`.
     """
     kind, _, number = balance.partition(".")
-    sign = effect.balances.get(kind)
+    sign = OF_CALIBRATION.get(effect.id) if kind == "calibration" else effect.balances.get(kind)
     if sign is None and kind in AXES:  # an axis of the wrist is like the grasp unless stated
         sign = effect.balances.get("grasp")
     if sign is None:

@@ -70,14 +70,24 @@ class Network:
         Raises:
             NetworkError: The rows have another number of columns.
         """
+        nodes = self.nodes(rows)
+        return from_unit(nodes @ self.output[:, :-1].T + self.output[:, -1], self.output_range)
+
+    def nodes(self, rows: ArrayLike) -> FloatArray:
+        """Return the hidden layer's outputs, shape (n, nodes).
+
+        Raises:
+            NetworkError: The rows have another number of columns.
+        """
         x = np.atleast_2d(np.asarray(rows, dtype=np.float64))
         if x.shape[1] != len(self.inputs):
             raise NetworkError(
                 f"The network takes {len(self.inputs)} inputs, not {x.shape[1]}.",
                 f"They are: {', '.join(self.inputs)}.",
             )
-        nodes = expit(to_unit(x, self.input_range) @ self.hidden[:, :-1].T + self.hidden[:, -1])
-        return from_unit(nodes @ self.output[:, :-1].T + self.output[:, -1], self.output_range)
+        unit = to_unit(x, self.input_range)
+        nodes: FloatArray = expit(unit @ self.hidden[:, :-1].T + self.hidden[:, -1])
+        return nodes
 
     def inside(self, rows: ArrayLike) -> np.ndarray:
         """Say of which rows, shape (n, d), every input lies in the range trained on, shape (n,)."""
@@ -159,12 +169,25 @@ def read_arrays(path: Path, schema: str) -> dict[str, np.ndarray]:
     Raises:
         NetworkError: The file is missing, damaged, or of another layout.
     """
+    arrays, found = _content(path)
+    if found != schema:
+        raise NetworkError(f"The file {path} has the layout {found}, not {schema}.")
+    return arrays
+
+
+def schema_of(path: Path) -> str:
+    """Return the name of the layout that `write_arrays` wrote.
+
+    Raises:
+        NetworkError: The file is missing or damaged.
+    """
+    return _content(path)[1]
+
+
+def _content(path: Path) -> tuple[dict[str, np.ndarray], str]:
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
             arrays = {name: content[name] for name in content.files}
     except Exception as error:  # a damaged archive raises one of many
         raise NetworkError(f"The file {path} cannot be read.", str(error)) from error
-    found = str(arrays.pop("schema", "none"))
-    if found != schema:
-        raise NetworkError(f"The file {path} has the layout {found}, not {schema}.")
-    return arrays
+    return arrays, str(arrays.pop("schema", "none"))

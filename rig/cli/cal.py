@@ -211,6 +211,27 @@ def check(
     return int(bad)
 
 
+@cal_app.command()
+def diagnose(
+    record: Hash,
+    seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
+    store: StoreOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Ask the diagnosis what a calibration of a force-sensing resistor lacks, on its raw logs."""
+    from rig.calibrate.diagnose import diagnose_record
+    from rig.reports.diagnosis import sentences
+
+    screen = console()
+    found = diagnose_record(
+        _store(store).get(record), seed, on_stage=lambda what: screen.print(f"{what} ...")
+    )
+    for line in [*sentences(found), *found.notes]:
+        screen.print(line, markup=False)
+    if json:
+        emit_json(found.to_json())
+
+
 def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
     from calibration.rules import judge_range
     from rig.log.reader import read_log

@@ -187,6 +187,9 @@ def fsr(
     ] = None,
     axis: Annotated[str, typer.Option(help="Force sensor's channel.")] = "force_z_n",
     rail_v: Annotated[float, typer.Option(help="Upper end of the amplifier.")] = 3.3,
+    curve_only: Annotated[
+        bool, typer.Option("--curve-only", help="Model neither hysteresis nor creep.")
+    ] = False,
 ) -> "Procedure":
     """Force-sensing resistor against the force sensor: curve, hysteresis, creep."""
     from calibration.sessions.fsr import FsrSession
@@ -199,6 +202,7 @@ def fsr(
         force_at_zero_n=force_at_zero,
         axis=axis,
         rail_v=rail_v,
+        curve_only=curve_only,
     )
 
 

@@ -1,23 +1,78 @@
 """`rig fit`: fit a declared model on a campaign."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.output import JsonFlag, console, emit_json
 
+if TYPE_CHECKING:
+    from estimation.campaign import Campaign
+
+
+def fit_states(
+    campaign: "Campaign",
+    target: str,
+    surrogate: str,
+    live: bool,
+    folds: int,
+    seed: int,
+    out: Path | None,
+    json_: bool,
+) -> None:
+    """Fit products of physical states, and report the error on runs left out."""
+    from estimation.bank.states import LOAD_SCALES, Bank
+    from estimation.estimators.bank import BankRecipe, held_out_score
+    from rig.errors import UsageError
+
+    if surrogate not in LOAD_SCALES:
+        raise UsageError(
+            f"{surrogate} does not stand for the load.",
+            fix=f"Choose one of: {', '.join(LOAD_SCALES)}.",
+        )
+    recipe = BankRecipe(target, Bank(surrogate), causal=live)
+    kept = campaign.evidence
+    estimator = recipe.fit(campaign)
+    error = held_out_score(recipe, kept, min(folds, len(kept)), seed) if len(kept) > 1 else None
+    screen = console()
+    if error is not None:
+        screen.print(
+            f"{target}, closing samples of {len(kept)} runs, each held out once:"
+            f" rmse {error.rmse:.4g}."
+        )
+    if out is not None:
+        estimator.save(out)
+        screen.print(f"Estimator: {out}", markup=False)
+    if json_:
+        emit_json({"target": target, "surrogate": surrogate, "held_out": error, "out": out})
+
 
 def fit(
     path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
     model: Annotated[
-        str, typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name.")
+        str,
+        typer.Option(
+            "--model",
+            "-m",
+            help="Declared model: a file, a shipped one by name, or `states` for products of"
+            " physical states.",
+        ),
     ] = "grip",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Where the fitted model goes.")
     ] = None,
     folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
+    target: Annotated[
+        str, typer.Option(help="Channel to estimate; with --model states.")
+    ] = "proximal_torque_n_m",
+    surrogate: Annotated[
+        str, typer.Option(help="Channel that stands for the load; with --model states.")
+    ] = "motor_current_a",
+    live: Annotated[
+        bool, typer.Option("--live", help="Fit for use live; with --model states.")
+    ] = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
     ] = None,
@@ -33,6 +88,9 @@ def fit(
 
     screen = console()
     campaign = open_campaign(path, format_)
+    if model == "states":
+        fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
+        return
     declared = model_file.read(Path(model))
     fitted = fit_model(declared, campaign, seed=seed)
     error = held_out_error(declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed)

@@ -32,6 +32,14 @@ def live(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder of recordings that a key starts.")
     ] = Path("logs"),
+    grasper: Annotated[
+        bool,
+        typer.Option("--grasper", help="The simulated 3-DOF grasper: grasp, pitch, yaw force."),
+    ] = False,
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Also serve it to Foxglove, on this computer only.")
+    ] = False,
+    foxglove_port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 8765,
     json_: JsonFlag = False,
 ) -> int:
     """Show grip torque, estimate against sensor, as the rig measures it.
@@ -53,6 +61,8 @@ def live(
     from rig.protocol import load_protocol
     from rig.trajectory import SAMPLE_RATE_HZ
 
+    if grasper:
+        return _show_grasper(duration, pace, plain, json_)
     settings = load_config(config)
     refuse_problems(settings)
     if protocol is None and settings.is_simulated:
@@ -69,8 +79,12 @@ def live(
             keys or no_keys,
             out,
         )
-        if estimator is not None:
+        if estimator is not None and estimator.model is not None:
             blocks = watched(blocks, estimator.model)
+        if foxglove:
+            from rig.live.foxglove import published
+
+            blocks = published(blocks, foxglove_port)
         options = ShowOptions(
             title=f"rig live: {settings.name}",
             channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
@@ -81,4 +95,19 @@ def live(
             footer=HELP if keys else "Ctrl-C leaves",
         )
         show(until(blocks, duration), options, console())
+    return 0
+
+
+def _show_grasper(duration: float | None, pace: float, plain: bool, json: bool) -> int:
+    from rig.live.grasper import CHANNELS, master_session
+    from rig.live.options import ShowOptions
+    from rig.live.replay import replay_blocks
+    from rig.live.run import show
+    from rig.live.until import until
+
+    blocks = replay_blocks(master_session(), None, speed=pace or None)
+    options = ShowOptions(
+        title="rig live: simulated 3-DOF grasper", channels=CHANNELS, plain=plain, json=json
+    )
+    show(until(blocks, duration), options, console())
     return 0

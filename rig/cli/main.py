@@ -7,14 +7,17 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
+from rig.cli.grip import grip
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
@@ -39,7 +42,10 @@ app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
+app.command()(grip)
 app.command()(fit)
+app.command()(adapt)
+app.command()(export)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)

@@ -67,7 +67,12 @@ def plain(value: Any) -> Any:
     return value
 
 
+def to_json(value: Any) -> str:
+    """Return a value as one line of JSON."""
+    return json.dumps(plain(value), allow_nan=False) + "\n"
+
+
 def emit_json(value: Any) -> None:
     """Write one JSON object and a newline to stdout."""
-    sys.stdout.write(json.dumps(plain(value), allow_nan=False) + "\n")
+    sys.stdout.write(to_json(value))
     sys.stdout.flush()

@@ -59,7 +59,7 @@ def replay(
         json=json_,
     )
     blocks = replay_blocks(recording, estimator, speed or None)
-    if isinstance(estimator, ModelEstimator):
+    if isinstance(estimator, ModelEstimator) and estimator.model is not None:
         blocks = watched(blocks, estimator.model)
     summary = show(blocks, options, console())
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK

@@ -13,6 +13,7 @@ from rig.cli.study_arm import arm_studies
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
     from rig.studies.oneill_networks import NetworkStudy
+    from rig.studies.oneill_states import StateStudy
 
 study_app = typer.Typer(
     name="study",
@@ -42,6 +43,9 @@ def oneill(
     networks: Annotated[
         bool, typer.Option("--networks", help="Also train the networks: long, can be resumed.")
     ] = False,
+    states: Annotated[
+        bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
+    ] = False,
     minutes: Annotated[
         float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
     ] = None,
@@ -68,20 +72,23 @@ def oneill(
         left_out = result.study.left_out
         training = Training(minutes, every, workers, state)
         deep = _train(source, left_out, data, training, seed)
+    physical = _fit_states(source, result.study.left_out, data, seed) if states else None
+    more = shown.More(deep, physical)
     screen = console()
     screen.print(shown.lead(result.study), markup=False)
-    for note in [f"Data: {source.name}.", *shown.all_notes(result.study, deep)]:
+    for note in [f"Data: {source.name}.", *shown.all_notes(result.study, more)]:
         screen.print(note, markup=False)
-    for table in shown.all_tables(result.study, deep):
+    for table in shown.all_tables(result.study, more):
         screen.print(to_rich(table))
     if out is not None:
-        write_text_atomic(out, shown.markdown(result.study, deep))
+        write_text_atomic(out, shown.markdown(result.study, more))
         screen.print(f"Markdown: {out}", markup=False)
     if report is not None:
-        page = write_report(report / "oneill.html", shown.page(result, deep))
+        page = write_report(report / "oneill.html", shown.page(result, more))
         screen.print(f"Report: {page}", markup=False)
     if json:
-        emit_json({**asdict(result.study), **({"networks": deep} if deep is not None else {})})
+        found = {"networks": deep, "states": physical}
+        emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,24 @@ def _train(
             minutes=float("inf") if training.minutes is None else training.minutes,
             notes=notes,
             on_network=lambda done, total: bar.update(trained, completed=done, total=total),
+        )
+
+
+def _fit_states(
+    source: "Source", left_out: dict[str, str], data: Path | None, seed: int
+) -> "StateStudy":
+    from rig.studies.oneill_states import run_states
+
+    with progress() as bar:
+        task = bar.add_task("closing samples", total=None)
+        fitted = bar.add_task("estimates from states", total=None)
+        return run_states(
+            source.campaign,
+            left_out,
+            data,
+            seed=seed,
+            on_run=lambda name: bar.advance(task),
+            on_row=lambda done, total: bar.update(fitted, completed=done, total=total),
         )
 
 

@@ -1,28 +1,40 @@
-"""A fitted model as the stream of estimates the display shows."""
+"""A fitted estimator as the stream of estimates the display shows."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
 from estimation import model_file
+from estimation.estimator import Stepper, load
+from estimation.estimators.bank import BankEstimator
+from estimation.model import Model
 from estimation.recording import MissingChannelError
 from estimation.stream import Stream
 from rig.live.block import FloatArray
 
 
 class ModelEstimator:
-    """Feeds blocks to a model's causal stream. Satisfies `rig.live.replay.EstimateStream`."""
+    """Feeds blocks to an estimator's causal stream. Satisfies `rig.live.replay.EstimateStream`."""
 
     def __init__(self, path: Path, sample_rate_hz: float) -> None:
-        """Read a model file and begin before the first sample.
+        """Read an estimator and begin before the first sample.
 
         Args:
-            path: Model file.
+            path: Model file, or a state estimator or a network (`.npz`).
             sample_rate_hz: Nominal rate of the device's clock, Hz.
 
         Raises:
-            EstimationError: The file is no model, the model is not fitted, or it cannot run at
+            EstimationError: The file is no estimator, the model is not fitted, or it cannot run at
                 this rate.
         """
+        self.model: Model | None = None  # only a physical model has effects to watch
+        self.half_width: float | None = None
+        self._stream: Stepper
+        if path.suffix == ".npz":
+            estimator = load(path)
+            self._stream, self.target_channel = estimator.stepper(sample_rate_hz), estimator.target
+            if isinstance(estimator, BankEstimator) and estimator.interval is not None:
+                self.half_width = estimator.interval.typical
+            return
         model = model_file.read(path)
         self._stream = Stream(model, sample_rate_hz)
         self.target_channel = model.target

@@ -16,6 +16,9 @@ SHOWN = {"N m": (1e3, "mN m", 1), "rad": (180 / math.pi, "deg", 2), "N": (1.0, "
 NAMES = {
     "distal_torque_n_m": "Grip torque",
     "proximal_torque_n_m": "Spindle torque",
+    "grasp_force_n": "Grasp force",
+    "pitch_force_n": "Pitch force",
+    "yaw_force_n": "Yaw force",
 }
 
 TIP_CHANNEL = "distal_torque_n_m"

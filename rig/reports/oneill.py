@@ -1,5 +1,7 @@
 """The study of O'Neill et al. 2018 as tables for any medium, as Markdown and as a page."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from markupsafe import Markup
 
@@ -7,10 +9,12 @@ from estimation import oneill
 from estimation.scores import Score
 from rig.reports import figures
 from rig.reports import oneill_networks as networks
+from rig.reports import oneill_states as states
 from rig.reports.render import render
 from rig.reports.table import TextTable, to_markdown
 from rig.studies.oneill import PROTOCOLS, PaperRow, Result, Study
 from rig.studies.oneill_networks import NetworkStudy
+from rig.studies.oneill_states import StateStudy
 
 TITLE = "Linear torque surrogates: Table I of O'Neill et al. 2018, made again"
 
@@ -100,25 +104,53 @@ def _held_out_table(study: Study) -> TextTable:
     return TextTable("RMSE by what was held out, mN m", columns, rows, note)
 
 
-def markdown(study: Study, deep: NetworkStudy | None = None) -> str:
-    """Return the study, and that of the networks where there is one, as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, deep)]
-    parts += [to_markdown(table).rstrip() for table in all_tables(study, deep)]
+@dataclass(frozen=True)
+class More:
+    """What goes beyond the linear rows, where it was done.
+
+    Attributes:
+        networks: The network rows.
+        states: The estimates from physical states.
+    """
+
+    networks: NetworkStudy | None = None
+    states: StateStudy | None = None
+
+    @property
+    def notes(self) -> list[str]:
+        """Notes of both."""
+        deep = networks.notes(self.networks) if self.networks is not None else []
+        return [*deep, *(states.notes(self.states) if self.states is not None else [])]
+
+    @property
+    def tables(self) -> list[TextTable]:
+        """Tables of both."""
+        own = states.tables(self.states, self.networks) if self.states is not None else []
+        return [*own, *(networks.tables(self.networks) if self.networks is not None else [])]
+
+
+NOTHING_MORE = More()
+
+
+def markdown(study: Study, more: More = NOTHING_MORE) -> str:
+    """Return the study, and what goes beyond where there is any, as a Markdown page."""
+    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, more)]
+    parts += [to_markdown(table).rstrip() for table in all_tables(study, more)]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
 
-def all_notes(study: Study, deep: NetworkStudy | None) -> list[str]:
-    """Return the notes of the study and of its networks."""
-    return notes(study) + (networks.notes(deep) if deep is not None else [])
+def all_notes(study: Study, more: More) -> list[str]:
+    """Return the notes of the study and of what goes beyond."""
+    return notes(study) + more.notes
 
 
-def all_tables(study: Study, deep: NetworkStudy | None) -> list[TextTable]:
-    """Return the tables of the study and of its networks."""
-    return tables(study) + (networks.tables(deep) if deep is not None else [])
+def all_tables(study: Study, more: More) -> list[TextTable]:
+    """Return the tables of the study and of what goes beyond."""
+    return tables(study) + more.tables
 
 
-def page(result: Result, deep: NetworkStudy | None = None) -> str:
-    """Return the study, and that of the networks where there is one, as a page of HTML."""
+def page(result: Result, more: More = NOTHING_MORE) -> str:
+    """Return the study, and what goes beyond where there is any, as a page of HTML."""
     study = result.study
     return render(
         "study.html",
@@ -126,8 +158,8 @@ def page(result: Result, deep: NetworkStudy | None = None) -> str:
             "title": TITLE,
             "lead": lead(study),
             "source": study.source,
-            "notes": all_notes(study, deep),
-            "tables": all_tables(study, deep),
+            "notes": all_notes(study, more),
+            "tables": all_tables(study, more),
             "figures": _figures(result),
             "provenance": study.provenance,
         },

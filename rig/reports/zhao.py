@@ -54,7 +54,11 @@ def notes(study: Study) -> list[str]:
         for dof, findings in study.findings.items()
     ]
     diagnosis = (
-        ["The diagnosis, on the first grasper, found missing: " + "; ".join(found) + "."]
+        [
+            "The diagnosis, on the first grasper, found missing: " + "; ".join(found) + ". The"
+            " simulated grasper holds friction with memory, drag and inertia, and nothing else: a"
+            " name of another kind is wrong."
+        ]
         if found
         else []
     )
@@ -69,10 +73,9 @@ def notes(study: Study) -> list[str]:
         " than it is reported on.",
         f"Ours: the declared model (torque constant, offset) with {' and '.join(ADDED)}, low-passed"
         f" at {FILTER.cutoff_hz:g} Hz on both sides of the balance, causal, fitted on runs whose"
-        " objects differ. `inertia.missing` is what the diagnosis names in the grasp;"
-        " `hysteresis.bearing` was"
-        " chosen by hand from the shape of what is left at the ends of holds, where the diagnosis"
-        " does not look.",
+        " objects differ. Both additions were"
+        " chosen by hand: the inertia because the paper names its dynamic effect as missing,"
+        " `hysteresis.bearing` from the shape of what is left at the ends of holds.",
         *diagnosis,
     ]
 

@@ -39,7 +39,7 @@ def network_tables(
     tables = {"neutral": closing_table(neutral, CHANNELS, on_run=on_run)}
     notes = []
     for pose in ("pitch", "roll"):
-        runs = _pose_runs(folder, pose)
+        runs = pose_runs(folder, pose)
         if runs is None:
             notes.append(f"No data of experiment 3, {pose}: its rows are left out.")
         else:
@@ -51,7 +51,7 @@ def network_tables(
     return tables, tuple(notes)
 
 
-def _pose_runs(folder: Path | None, pose: str) -> Campaign | None:
+def pose_runs(folder: Path | None, pose: str) -> Campaign | None:
     """Return the runs of the five folders of a pose at the paper's frequency, if all are there."""
     if folder is None or not folder.is_dir():
         return None

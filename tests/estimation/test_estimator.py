@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.derived import TRAVEL_WINDOW_S, causal_channels, zero_phase_channels
 from estimation.estimator import Estimator, Recipe, load
+from estimation.estimators.bank import BankRecipe
 from estimation.estimators.model import ModelRecipe
 from estimation.estimators.network import NetworkEstimator, NetworkRecipe
 from estimation.estimators.residual import ResidualEstimator, ResidualRecipe
@@ -30,6 +32,7 @@ SMALL = Settings(nodes=6, iterations=60)
 RECIPES: dict[str, Recipe] = {
     "linear": ModelRecipe(read(Path("linear"))),
     "physical": ModelRecipe(read(Path("motor"))),
+    "bank": BankRecipe(TARGET, Bank("motor_current_a")),
     "network": NetworkRecipe(PAPER_INPUTS, TARGET, SMALL),
     "states": NetworkRecipe(STATES, TARGET, SMALL),
     "residual": ResidualRecipe(
@@ -37,7 +40,7 @@ RECIPES: dict[str, Recipe] = {
     ),
 }
 KINDS = [
-    pytest.param(kind, marks=() if kind in ("linear", "physical") else torch_only)
+    pytest.param(kind, marks=() if kind in ("linear", "physical", "bank") else torch_only)
     for kind in RECIPES
 ]
 

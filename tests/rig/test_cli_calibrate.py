@@ -136,3 +136,30 @@ def test_raw_logs_of_another_kind_are_refused(calibrate):
     shutil.rmtree("raw")
     code, said = calibrate("ft", "--from", "raw")
     assert code == 2
+
+
+@pytest.mark.parametrize("hysteresis", [0.3, 0.0])
+def test_a_curve_on_data_with_hysteresis_is_told_so(
+    calibrate, monkeypatch, capsys, tmp_path, hysteresis
+):
+    from rig.simulation import press
+
+    made = press.PressedFsr.__init__
+    monkeypatch.setattr(
+        press.PressedFsr,
+        "__init__",
+        lambda self, force, seed: made(self, force, seed, hysteresis, creep_ratio=0.0),
+    )
+    _, said = calibrate("fsr", "--hold-s", "0", "--curve-only")
+    (digest,) = said["records"]
+    assert main(["cal", "diagnose", digest, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["findings"]
+    named = {f["family"] for f in found if f["verdict"] == "identified"}
+    assert named == ({"hysteresis.presliding"} if hysteresis else set())
+
+
+def test_only_an_fsr_record_is_diagnosed_from_its_raw_logs(calibrate, capsys):
+    _, said = calibrate("ft")
+    (digest,) = said["records"]
+    assert main(["cal", "diagnose", digest]) == 2
+    assert "rig diagnose LOGS" in capsys.readouterr().err

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from estimation import model_file
+from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.estimators.bank import BankRecipe
 from estimation.fitting import fit
 from estimation.model import predict
 from estimation.recording import MissingChannelError, Recording
 from rig.live.estimator import ModelEstimator
 from rig.live.replay import replay_blocks
+from tests.estimation.synthetic import campaign
 
 SPINDLE = "proximal_torque_n_m"
 
@@ -48,3 +51,16 @@ def test_a_channel_the_model_lacks_is_named(model_path):
     estimator = ModelEstimator(model_path, 1000.0)
     with pytest.raises(MissingChannelError, match="motor_current_a"):
         list(replay_blocks(run, estimator, speed=None))
+
+
+def test_a_state_estimator_runs_live_as_offline(tmp_path):
+    runs = list(campaign())
+    fitted = BankRecipe(SPINDLE, Bank("motor_current_a"), causal=True).fit(Campaign.of(runs[1:]))
+    path = tmp_path / "states.npz"
+    fitted.save(path)
+    estimator = ModelEstimator(path, runs[0].sample_rate_hz)
+    assert estimator.model is None
+    assert estimator.target_channel == SPINDLE
+    blocks = list(replay_blocks(runs[0], estimator, speed=None))
+    live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
+    np.testing.assert_allclose(live, fitted.predict(runs[0], causal=True), atol=1e-9)

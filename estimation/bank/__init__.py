@@ -1,0 +1,1 @@
+"""Estimates linear in their weights over products of physical states."""

@@ -1,0 +1,201 @@
+"""The states an estimate is made of, and the products of them that get a weight.
+
+Everything known about one instant of the drive is a row of filtered channels. From it come the
+states, numbers of order one; products of states, each with a weight of its own; and the ripple, a
+Fourier series in the spindle's angle whose amplitudes depend on load and speed. No channel looks
+back further than `estimation.derived.TRAVEL_WINDOW_S`.
+
+States, t the motor's travel since the lowest angle of that window:
+
+- `q` spindle angle, `c` surrogate of the load, `v` speed, `a` acceleration, `i` inverse speed, `d`
+  how far the surrogate is below its highest value of the window;
+- `k1` to `k4`: min(t, r) / r, r = 1 to 4 rad, and `n1` to `n3`: the same with r in proportion to
+  the load. Both are Prandtl's stop operators after a reversal, the elements of a Maxwell-slip model
+  of presliding friction; the second ones for friction that grows with the cable's tension;
+- `p` pose of the wrist, where there is one.
+
+Sources: F. Al-Bender, V. Lampaert, J. Swevers, "The generalized Maxwell-slip model", IEEE
+Transactions on Automatic Control 50 (2005); orders of the ripple: the gearhead's meshes and their
+side bands lie between 0.2 and 5 a motor turn.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimation.derived import GEAR_RATIO, fall_of
+from estimation.recording import FloatArray
+
+STATES = ("q", "c", "v", "a", "i", "d", "k1", "k2", "k3", "k4", "n1", "n2", "n3", "p")
+CLIPS = ("k1", "k2", "k3", "k4", "n1", "n2", "n3")
+
+LOAD_SCALES = {"motor_command_ratio": 0.1, "motor_current_a": 0.21, "proximal_torque_n_m": 0.1}
+"""Middle of each surrogate's range on the reference rig, in its own unit."""
+
+POSITION_CENTRE_RAD, POSITION_SCALE_RAD = -0.5, 0.5
+ACCELERATION_SCALE_RAD_S2 = 1000.0
+SLOWEST_RAD_S = 0.2
+LIGHTEST = 0.2
+"""Load below which the travel of a load-proportional state shrinks no further."""
+
+ORDERS = 29
+RIPPLE_STEP = 0.17
+"""Orders of the ripple, a motor turn: 29 multiples of 0.17. A stroke of the rig is 6 turns, so
+orders closer together cannot be told apart."""
+
+Product = tuple[str, ...]
+
+
+def _grid(positions: int, loads: int) -> list[Product]:
+    return [("q",) * i + ("c",) * j for i in range(positions + 1) for j in range(loads + 1)]
+
+
+NEUTRAL: list[Product] = [
+    *_grid(3, 2), ("c",) * 3, ("q",) + ("c",) * 3, ("q",) * 4, ("q",) * 4 + ("c",), ("q",) * 5,
+    ("v",), ("v", "v"), ("c", "v"), ("q", "v"), ("i",), ("c", "i"),
+    ("a",), ("q", "a"), ("v", "a"),
+    ("d",), ("q", "d"), ("d", "d"),
+    *[
+        product
+        for clip in CLIPS
+        for product in [
+            (clip,), (clip, "c"), (clip, "q"), (clip, "q", "c"), (clip, "q", "q"), (clip, "v"),
+            (clip, "a"), (clip, "c", "c"),
+        ]
+    ],
+]  # fmt: skip
+"""Products for any pose."""
+
+POSED: list[Product] = [
+    ("p",) * power + rest
+    for power in (1, 2, 3, 4)
+    for rest in [
+        *_grid(2, 1), ("c", "c"), ("q", "c", "c"), ("q", "q", "q"), ("v",), ("i",), ("a",),
+        *[(clip, *load) for clip in ("k1", "k2", "k4", "n1", "n2") for load in [(), ("c",)]],
+    ]
+]  # fmt: skip
+"""Products that a wrist's pose adds."""
+
+RIPPLE = "ripple"
+
+EFFECTS: dict[str, tuple[str, ...]] = {
+    "speed": ("v", "i"),
+    "acceleration": ("a",),
+    "fall of the load": ("d",),
+    "hysteresis": CLIPS,
+    RIPPLE: (),
+}
+"""Effects that an ablation leaves out, and their states; products of these states go with them."""
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Which channels are read and which products are made of them.
+
+    Attributes:
+        surrogate: Channel that stands for the load; a key of `LOAD_SCALES`.
+        pose: Channel of the wrist's pose in rad, or empty.
+        without: Effects left out, keys of `EFFECTS`.
+    """
+
+    surrogate: str = "motor_command_ratio"
+    pose: str = ""
+    without: tuple[str, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of a row, measured or derived."""
+        drive = ("motor_velocity_rad_s", "motor_acceleration_rad_s2", "motor_travel_rad")
+        own = ("spindle_angle_rad", self.surrogate, *drive, fall_of(self.surrogate))
+        return (*own, self.pose) if self.pose else own
+
+    @cached_property
+    def products(self) -> tuple[Product, ...]:
+        """Products in order; each one but the first, the constant, is an earlier one by a state."""
+        absent = {state for effect in self.without for state in EFFECTS[effect]}
+        wanted = [*NEUTRAL, *(POSED if self.pose else [])]
+        return closed(product for product in wanted if absent.isdisjoint(product))
+
+    @cached_property
+    def tables(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Parent and state of each product: its value is theirs multiplied."""
+        place = {product: k for k, product in enumerate(self.products)}
+        parents = [place[product[:-1]] for product in self.products[1:]]
+        states = [STATES.index(product[-1]) for product in self.products[1:]]
+        return np.array([0, *parents]), np.array([0, *states])
+
+    @property
+    def orders(self) -> int:
+        """Orders of the ripple."""
+        return 0 if RIPPLE in self.without else ORDERS
+
+    @property
+    def size(self) -> int:
+        """Number of weights."""
+        return len(self.products) + 6 * self.orders
+
+    def design(self, rows: FloatArray) -> FloatArray:
+        """Return what the weights multiply, shape (n, size), for rows of channels, (n, channels).
+
+        A value that is not finite makes its row so.
+        """
+        design = np.empty((len(rows), self.size))
+        fill(np.ascontiguousarray(rows), LOAD_SCALES[self.surrogate], *self.tables, design)
+        return design
+
+
+def closed(products: Iterable[Product]) -> tuple[Product, ...]:
+    """Return products after all those they are made of, the constant first, none twice."""
+    found: dict[Product, None] = {(): None}
+    for product in products:
+        for length in range(1, len(product) + 1):
+            found.setdefault(product[:length])
+    return tuple(found)
+
+
+@njit(cache=True)
+def fill(
+    rows: FloatArray,
+    load_scale: float,
+    parents: NDArray[np.int64],
+    factors: NDArray[np.int64],
+    design: FloatArray,
+) -> None:
+    """Write the products and the ripple of each row of channels."""
+    state = np.zeros(14)
+    count = len(parents)
+    orders = (design.shape[1] - count) // 6
+    for n in range(len(rows)):
+        angle, surrogate, speed = rows[n, 0], rows[n, 1], rows[n, 2] / GEAR_RATIO
+        travel, load = rows[n, 4], surrogate / load_scale
+        state[0] = (angle - POSITION_CENTRE_RAD) / POSITION_SCALE_RAD
+        state[1] = load - 1.0
+        state[2] = speed - 1.0
+        state[3] = rows[n, 3] / ACCELERATION_SCALE_RAD_S2
+        state[4] = 1.0 / max(abs(speed), SLOWEST_RAD_S)
+        state[5] = rows[n, 5] / load_scale
+        for r in range(4):
+            state[6 + r] = min(travel / (r + 1.0), 1.0) - 0.5
+        for r in range(3):
+            state[10 + r] = min(travel / ((r + 1.0) * max(load, LIGHTEST)), 1.0) - 0.5
+        if rows.shape[1] > 6:
+            state[13] = rows[n, 6]
+        out = design[n]
+        out[0] = 1.0
+        for k in range(1, count):
+            out[k] = out[parents[k]] * state[factors[k]]
+        if orders:
+            turn = GEAR_RATIO * RIPPLE_STEP * angle
+            sine, cosine = np.sin(turn), np.cos(turn)
+            s, c = 0.0, 1.0
+            at = count
+            for _ in range(orders):
+                s, c = s * cosine + c * sine, c * cosine - s * sine
+                out[at], out[at + 1] = s, c
+                out[at + 2], out[at + 3] = s * state[1], c * state[1]
+                out[at + 4], out[at + 5] = s * state[2], c * state[2]
+                at += 6

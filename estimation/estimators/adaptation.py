@@ -1,0 +1,168 @@
+"""An estimator fitted on one instrument, made to fit another one with a run or a few.
+
+The weights of the source are the mean of a Gaussian prior; how far each may move depends on what
+differs between instruments. Of a state estimator, the zero and the spring of the cables and wrist,
+functions of position alone, differ most and move easily; the gain of the load, which is the
+motor's, hardly; the rest somewhat. A single run at one load cannot tell a zero from a gain, so this
+order decides. Of a network the hidden layer is kept and the output layer moves, as in transfer
+learning for instruments of the da Vinci: J. Zhang, N. Yilmaz, U. Tumerdem, P. Kazanzides,
+"Learning based estimation of 7 DOF instrument and environment interaction forces on the da Vinci
+Research Kit" (2022), where a network of another instrument is trained on with a little data.
+
+The stiffnesses of states were chosen on two instruments of the public data set
+MRDLab/mis-tool-characterization.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.bank.fitting import Normal, Settings, pull, spread
+from estimation.bank.states import Bank
+from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
+from estimation.estimators.network import NetworkEstimator
+from estimation.networks import training
+from estimation.networks.network import NetworkError, to_unit
+from estimation.oneill import is_closing, processed
+from estimation.recording import FloatArray, Recording
+
+Adaptable = BankEstimator | NetworkEstimator
+
+POSITION, LOAD, REST = 1e-3, 10.0, 3.0
+"""Stiffness of the weights of products of position alone, of those with the load, of the others."""
+
+OUTPUT = 0.1
+"""Stiffness of the weights of a network's output layer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Closing samples of one run of another instrument.
+
+    Attributes:
+        rows: Filtered channels the estimator reads, shape (n, channels).
+        truth: The target, shape (n,).
+        valid: Samples without a flag, shape (n,); only they are fitted.
+    """
+
+    rows: FloatArray
+    truth: FloatArray
+    valid: np.ndarray
+
+    @property
+    def flagged(self) -> int:
+        """Number of flagged samples."""
+        return int((~self.valid).sum())
+
+    @property
+    def fitted(self) -> tuple[FloatArray, FloatArray]:
+        """Rows and target that are fitted: every fourth valid sample."""
+        kept = np.flatnonzero(self.valid)[::EVERY]
+        return self.rows[kept], self.truth[kept]
+
+    def estimate(self, estimator: Adaptable) -> FloatArray:
+        """Return an estimator's estimates, shape (n,)."""
+        if isinstance(estimator, BankEstimator):
+            return estimator.of_rows(self.rows).value
+        return estimator.network(self.rows)[:, 0]
+
+
+def _channels(estimator: Adaptable) -> tuple[str, ...]:
+    if isinstance(estimator, BankEstimator):
+        return estimator.bank.channels
+    return estimator.network.inputs
+
+
+def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
+    """Reduce a raw run to what an estimator reads; None where it has no valid closing sample.
+
+    Raises:
+        MissingChannelError: The run lacks a channel.
+    """
+    names = _channels(estimator)
+    run = processed(recording, [*names, estimator.target], estimator.low_pass)
+    kept = is_closing(run)
+    if not (kept & run.valid).any():
+        return None
+    rows = np.column_stack([run[name][kept] for name in names])
+    return Evidence(rows, run[estimator.target][kept], run.valid[kept])
+
+
+def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
+    """Return the source's estimator adapted to the runs of another instrument.
+
+    Its interval is not known: a few runs do not show how runs differ.
+
+    Args:
+        source: Fitted on another instrument.
+        runs: Runs of the new one.
+
+    Raises:
+        NetworkError: There is no run.
+    """
+    if not runs:
+        raise NetworkError("There is no closing sample to adapt the estimator with.")
+    if isinstance(source, BankEstimator):
+        return _adapted_bank(source, _reduced(source, runs))
+    return _adapted_network(source, runs)
+
+
+def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
+    """Return an estimator of the same kind fitted on these runs alone.
+
+    Raises:
+        NetworkError: There is no run, or torch is missing.
+    """
+    if isinstance(like, BankEstimator):
+        return fit_runs(_reduced(like, runs), like.bank, like.target, Settings())
+    rows, truth = (np.concatenate(part) for part in zip(*(r.fitted for r in runs), strict=True))
+    nodes = len(like.network.hidden)
+    names = (like.network.inputs, like.network.outputs)
+    settings = training.Settings(nodes=nodes)
+    trained = training.train(rows[::EVERY], truth[::EVERY, None], names, settings)
+    return NetworkEstimator(trained.network, like.low_pass)
+
+
+def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
+    fitted = [run.fitted for run in runs]
+    return [
+        part
+        for rows, truth in fitted
+        for part in RunEvidence.of_rows(source.bank, rows, truth[:, None])
+    ]
+
+
+def _adapted_bank(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
+    normals = [run.normal for run in runs]
+    weights = pull(normals, source.weights, source.scale, stiffness(source.bank))
+    lowest = np.min([source.ranges[0], *(run.ranges[0] for run in runs)], axis=0)
+    highest = np.max([source.ranges[1], *(run.ranges[1] for run in runs)], axis=0)
+    ranges = np.array([lowest, highest])
+    return replace(source, weights=weights, interval=None, ranges=ranges, instrument="")
+
+
+def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> NetworkEstimator:
+    network = source.network
+    normals = []
+    for rows, truth in (run.fitted for run in runs):
+        design = np.column_stack([np.ones(len(rows)), network.nodes(rows)])
+        unit = to_unit(truth[:, None], network.output_range)
+        normals.append(Normal.of(design, unit))
+    prior = np.roll(network.output[0], 1)  # the bias first
+    stiff = np.full(len(prior), OUTPUT)
+    stiff[0] = 0.0
+    moved = np.roll(pull(normals, prior, spread(normals), stiff), -1)
+    return replace(source, network=replace(network, output=moved[None]))
+
+
+def stiffness(bank: Bank) -> FloatArray:
+    """Return how stiffly the prior holds each weight of a bank, shape (size,)."""
+    found = np.full(bank.size, REST)
+    for k, product in enumerate(bank.products):
+        if set(product) == {"q"}:
+            found[k] = POSITION
+        elif set(product) in ({"q", "c"}, {"c"}):
+            found[k] = LOAD
+    found[0] = 0.0  # the zero is free
+    return found

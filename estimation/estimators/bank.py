@@ -1,0 +1,375 @@
+"""Products of physical states as an estimator, with an interval and a range of validity."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.bank.fitting import Normal, Settings, solve, spread
+from estimation.bank.interval import COVERAGE, Interval, calibrate
+from estimation.bank.states import Bank
+from estimation.campaign import Campaign
+from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.errors import EstimationError
+from estimation.filters import PAPER, LowPass
+from estimation.networks.network import NetworkError, read_arrays, write_arrays
+from estimation.oneill import is_closing, processed
+from estimation.recording import FloatArray, Recording, read_only
+from estimation.scores import Score, score
+
+INNER_FOLDS = 5
+EVERY = 4
+"""Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
+
+
+class InstrumentError(EstimationError):
+    """An estimator is asked about an instrument it was not fitted on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Estimates with what is known about their error, each of shape (n,).
+
+    Attributes:
+        value: The estimate, in the target's unit.
+        half_width: Half the width of the interval that covers 95 %, NaN where it is not known.
+        inside: Whether position, load, speed and acceleration lie in the range fitted on.
+    """
+
+    value: FloatArray
+    half_width: FloatArray
+    inside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class BankEstimator:
+    """A fitted sum of products of physical states.
+
+    Attributes:
+        bank: The states and products.
+        target: Channel that is estimated.
+        weights: Weight of each product, shape (size,).
+        interval: What is known of the error; None where too few runs were fitted to know it.
+        ranges: Lowest and highest value of each channel fitted on, shape (2, channels).
+        scale: Spread of each product over the samples fitted on, shape (size,).
+        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
+        low_pass: Filter of every channel.
+    """
+
+    SCHEMA: ClassVar[str] = "rig.bank/1"
+
+    bank: Bank
+    target: str
+    weights: FloatArray
+    interval: Interval | None
+    ranges: FloatArray
+    scale: FloatArray
+    instrument: str = ""
+    low_pass: LowPass = PAPER
+
+    def __post_init__(self) -> None:
+        for name, shape in {
+            "weights": (self.bank.size,),
+            "scale": (self.bank.size,),
+            "ranges": (2, len(self.bank.channels)),
+        }.items():
+            values = read_only(getattr(self, name))
+            if values.shape != shape or np.isnan(values).any():
+                raise NetworkError(
+                    f"The {name} of a state estimator have shape {values.shape} or holds NaN.",
+                    f"They must be {shape} and numbers.",
+                )
+            object.__setattr__(self, name, values)
+
+    def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
+        """Return the estimate for each sample, shape (n,).
+
+        Raises:
+            InstrumentError: The recording is of another instrument.
+            MissingChannelError: The recording lacks a channel.
+            FilterError: The run cannot be filtered.
+        """
+        return self.estimate(recording, causal).value
+
+    def estimate(self, recording: Recording, causal: bool = False) -> Estimates:
+        """Return the estimate for each sample with its interval and its validity.
+
+        Raises:
+            InstrumentError: The recording is of another instrument.
+        """
+        self._require_own(instrument_of(recording))
+        names = self.bank.channels
+        if causal:
+            channels = causal_channels(recording, names, self.low_pass, tracked=True)
+        else:
+            channels = zero_phase_channels(recording, names, self.low_pass)
+        return self.of_rows(rows_of(channels, self.bank))
+
+    def of_rows(self, rows: FloatArray) -> Estimates:
+        """Return the estimates for rows of filtered channels, shape (n, channels)."""
+        design = self.bank.design(rows)
+        width = np.full(len(rows), np.nan)
+        if self.interval is not None:
+            width = self.interval.half_width(design)
+        within = (rows >= self.ranges[0]) & (rows <= self.ranges[1])
+        return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
+
+    def for_any_instrument(self) -> "BankEstimator":
+        """Return the estimator for use on instruments it was not fitted on."""
+        return replace(self, instrument="")
+
+    def _require_own(self, instrument: str) -> None:
+        if self.instrument and instrument and instrument != self.instrument:
+            raise InstrumentError(
+                f"The estimator was fitted on {self.instrument}, the recording is of {instrument}.",
+                "Another instrument has other friction and another zero.",
+                "Adapt it: rig adapt MODEL PATH --runs NAMES.",
+            )
+
+    def stepper(self, sample_rate_hz: float) -> "BankStepper":
+        """Return the estimator as it runs live."""
+        return BankStepper(self, sample_rate_hz)
+
+    def save(self, path: Path) -> None:
+        """Write the estimator as NPZ."""
+        interval = {} if self.interval is None else self.interval.arrays()
+        write_arrays(
+            path,
+            self.SCHEMA,
+            {
+                "surrogate": np.array(self.bank.surrogate),
+                "pose": np.array(self.bank.pose),
+                "without": np.array(self.bank.without, dtype=np.str_),
+                "target": np.array(self.target),
+                "instrument": np.array(self.instrument),
+                "weights": self.weights,
+                "ranges": self.ranges,
+                "scale": self.scale,
+                "low_pass": np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)]),
+                **interval,
+            },
+        )
+
+    @classmethod
+    def load(cls, path: Path) -> "BankEstimator":
+        """Read what `save` wrote; nothing in the file is executed.
+
+        Raises:
+            NetworkError: The file is missing, damaged, or of another layout.
+        """
+        arrays = read_arrays(path, cls.SCHEMA)
+        try:
+            bank = Bank(
+                str(arrays["surrogate"]),
+                str(arrays["pose"]),
+                tuple(str(name) for name in arrays["without"]),
+            )
+            cutoff_hz, order = arrays["low_pass"].tolist()
+            return cls(
+                bank,
+                str(arrays["target"]),
+                arrays["weights"],
+                Interval.from_arrays(arrays),
+                arrays["ranges"],
+                arrays["scale"],
+                str(arrays["instrument"]),
+                LowPass(cutoff_hz, int(order)),
+            )
+        except (KeyError, ValueError) as error:
+            raise NetworkError(f"The file {path} holds no state estimator.", str(error)) from error
+
+
+class BankStepper:
+    """A state estimator as it runs live."""
+
+    def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
+        self._estimator = estimator
+        self._source = CausalChannels(
+            estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
+        )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that `step` needs."""
+        return self._source.measured
+
+    def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
+        """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
+        return self.estimate(time_s, measured).value
+
+    def estimate(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> Estimates:
+        """Take the next samples and return their estimates with interval and validity."""
+        channels = self._source.step(time_s, measured)
+        rows = np.column_stack([channels[name] for name in self._estimator.bank.channels])
+        return self._estimator.of_rows(rows)
+
+
+def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> FloatArray:
+    """Return the rows a bank reads, shape (n, channels)."""
+    return np.column_stack([channels[name] for name in bank.channels])
+
+
+@dataclass(frozen=True, eq=False)
+class RunEvidence:
+    """Samples of one run to fit: every fourth valid closing one.
+
+    Attributes:
+        design: The bank's products, shape (n, size).
+        truth: The target without lag, shape (n,).
+        normal: The run's share in the normal equations.
+        ranges: Lowest and highest value of each channel, shape (2, channels).
+    """
+
+    design: FloatArray
+    truth: FloatArray
+    normal: Normal
+    ranges: FloatArray
+
+    @classmethod
+    def of_rows(cls, bank: Bank, rows: FloatArray, truths: FloatArray) -> "list[RunEvidence]":
+        """Return the evidence for each target; they share what is made of the rows.
+
+        Args:
+            bank: The states and products.
+            rows: Filtered channels of the samples to fit, shape (n, channels).
+            truths: The targets, shape (n, targets).
+        """
+        design = bank.design(rows)
+        ranges = np.array([rows.min(axis=0), rows.max(axis=0)])
+        whole = Normal.of(design, truths)
+        return [
+            cls(design, truth, whole.only(k), ranges)
+            for k, truth in enumerate(np.ascontiguousarray(truths.T))
+        ]
+
+
+def fit_runs(
+    runs: Sequence[RunEvidence],
+    bank: Bank,
+    target: str,
+    settings: Settings,
+    coverage: float = COVERAGE,
+) -> BankEstimator:
+    """Fit weights and, from runs left out in turn, the interval.
+
+    Args:
+        runs: The runs.
+        bank: The bank they were reduced with.
+        target: Channel that is estimated.
+        settings: How weights are found.
+        coverage: Share of the samples of unseen runs that the interval covers.
+
+    Raises:
+        NetworkError: There is no run.
+    """
+    if not runs:
+        raise NetworkError("There is no closing sample to fit a state estimator on.")
+
+    def weights(part: Iterable[RunEvidence]) -> FloatArray:
+        return solve([run.normal for run in part], settings)[:, 0]
+
+    interval = None
+    if len(runs) >= INNER_FOLDS:
+        held_out = [
+            weights(run for k, run in enumerate(runs) if k % INNER_FOLDS != fold)
+            for fold in range(INNER_FOLDS)
+        ]
+        residuals = [
+            run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
+        ]
+        interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
+    lowest = np.min([run.ranges[0] for run in runs], axis=0)
+    highest = np.max([run.ranges[1] for run in runs], axis=0)
+    ranges, scale = np.array([lowest, highest]), spread([run.normal for run in runs])
+    return BankEstimator(bank, target, weights(runs), interval, ranges, scale)
+
+
+@dataclass(frozen=True)
+class BankRecipe:
+    """Fits a state estimator on the closing samples of a campaign.
+
+    Attributes:
+        target: Channel to estimate.
+        bank: The states and products.
+        settings: How weights are found.
+        causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
+        low_pass: Filter of every channel.
+        coverage: Share of the samples of unseen runs that the interval covers.
+    """
+
+    target: str
+    bank: Bank = field(default_factory=Bank)
+    settings: Settings = field(default_factory=Settings)
+    causal: bool = False
+    low_pass: LowPass = PAPER
+    coverage: float = COVERAGE
+
+    def fit(self, campaign: Campaign) -> BankEstimator:
+        """Fit on the valid closing samples of the runs that are not excluded.
+
+        Raises:
+            NetworkError: There is no closing sample.
+            MissingChannelError: A run lacks a channel.
+        """
+        runs, instruments = [], set()
+        for recording in campaign.evidence:
+            run = self.evidence_of(recording)
+            if run is not None:
+                runs.append(run)
+            instruments.add(instrument_of(recording))
+        fitted = fit_runs(runs, self.bank, self.target, self.settings, self.coverage)
+        known = instruments.pop() if len(instruments) == 1 else ""
+        return replace(fitted, instrument=known, low_pass=self.low_pass)
+
+    def evidence_of(self, recording: Recording) -> RunEvidence | None:
+        """Reduce a raw run; None where it has no valid closing sample.
+
+        Which samples close, and the target, are always taken without lag.
+
+        Raises:
+            MissingChannelError: The run lacks a channel.
+        """
+        bank = self.bank
+        run = processed(recording, [*bank.channels, self.target], self.low_pass)
+        kept = np.flatnonzero(is_closing(run) & run.valid)[::EVERY]
+        if not len(kept):
+            return None
+        source = run
+        if self.causal:
+            source = causal_channels(recording, bank.channels, self.low_pass, tracked=True)
+        truths = run[self.target][kept, None]
+        (evidence,) = RunEvidence.of_rows(bank, rows_of(source, bank)[kept], truths)
+        return evidence
+
+
+def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int) -> Score:
+    """Return the error on runs not fitted, each held out once; flagged samples are left out.
+
+    Args:
+        recipe: What is fitted.
+        campaign: The runs; excluded ones are left out.
+        folds: Number of folds, at least 2.
+        seed: Seed of the folds.
+
+    Raises:
+        NetworkError: There is no closing sample to fit.
+    """
+    found = [recipe.evidence_of(recording) for recording in campaign.evidence]
+    runs = [run for run in found if run is not None]
+    order = np.random.default_rng(seed).permutation(len(runs))
+    estimates, truths = [], []
+    for held_out in (order[k::folds] for k in range(folds)):
+        rest = [run for k, run in enumerate(runs) if k not in held_out]
+        weights = fit_runs(rest, recipe.bank, recipe.target, recipe.settings).weights
+        estimates += [runs[k].design @ weights for k in held_out]
+        truths += [runs[k].truth for k in held_out]
+    return score(np.concatenate(estimates), np.concatenate(truths))
+
+
+def instrument_of(recording: Recording) -> str:
+    """Return the model and serial number of a recording's instrument, empty if not known."""
+    own = recording.instrument
+    return " ".join(part for part in (own.model, own.serial) if part)

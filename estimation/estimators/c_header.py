@@ -1,0 +1,176 @@
+"""An estimator as one C header: from raw samples to the estimate, no heap, no library but libm.
+
+Filters and differences are in double: two backward differences at 1 kHz would turn the rounding of
+a float angle into more than the acceleration. All else, weights, products and nodes, is float32.
+The result is that of `predict(recording, causal=True)` for gap-free samples.
+"""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.bank import states
+from estimation.derived import (
+    ACCELERATION,
+    FALL,
+    GEAR_RATIO,
+    GEARBOX,
+    TRAVEL,
+    TRAVEL_WINDOW_S,
+    VELOCITY,
+    measured_channels,
+)
+from estimation.errors import EstimationError
+from estimation.estimators.bank import BankEstimator
+from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK, TRACKER
+from estimation.estimators.network import NetworkEstimator
+from estimation.kalman import tracker
+from estimation.recording import FloatArray
+
+
+class ExportError(EstimationError):
+    """An estimator cannot be written as C."""
+
+
+def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_hz: float) -> str:
+    """Return the header's text.
+
+    Args:
+        estimator: What is written.
+        name: Prefix of everything in the header; a C identifier.
+        sample_rate_hz: Rate at which the step is called.
+
+    Raises:
+        ExportError: The name is no identifier, or a channel cannot be computed in C.
+        FilterError: The filter does not fit the rate.
+    """
+    if re.fullmatch(r"[a-z_][a-z0-9_]*", name) is None:
+        raise ExportError(
+            f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
+        )
+    if isinstance(estimator, BankEstimator):
+        channels, model = estimator.bank.channels, _bank(estimator)
+        motion = _tracker(sample_rate_hz)
+    else:
+        channels, model = estimator.network.inputs, _network(estimator)
+        motion = DIFFERENCES
+    measured = measured_channels(channels)
+    sections = estimator.low_pass.sections(sample_rate_hz)
+    windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
+    text = HEADER
+    for mark, value in {
+        "MOTION": motion,
+        "TARGET": estimator.target,
+        "MEASURED_LIST": ", ".join(measured),
+        "RATE": f"{sample_rate_hz!r}",
+        "MEASURED": str(len(measured)),
+        "ROW": str(len(channels)),
+        "SECTION_COUNT": str(len(sections)),
+        "SECTIONS": _double_rows(np.delete(sections, 3, axis=1)),
+        "WINDOWS": str(max(len(windows), 1)),
+        "WINDOW": str(max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))),
+        "FILL": "\n".join(_channel(k, c, measured, windows) for k, c in enumerate(channels)),
+        "MODEL": model,
+    }.items():
+        text = text.replace(f"@{mark}@", value)
+    return text.replace("NAME", name.upper()).replace("name_", f"{name}_")
+
+
+def _floats(values: FloatArray) -> str:
+    return ", ".join(f"{float(v):.9g}f" if v % 1 else f"{float(v):.1f}f" for v in np.ravel(values))
+
+
+def _double_rows(table: FloatArray) -> str:
+    return ", ".join(f"{{ {', '.join(f'{float(v)!r}' for v in row)} }}" for row in table)
+
+
+def _float_rows(table: FloatArray) -> str:
+    return ", ".join(f"{{ {_floats(row)} }}" for row in table)
+
+
+def _ints(values: Sequence[int] | np.ndarray) -> str:
+    return ", ".join(str(int(v)) for v in values)
+
+
+def _channel(k: int, channel: str, measured: Sequence[str], windows: Sequence[str]) -> str:
+    """Return the statement that computes one channel of a row."""
+
+    def place(name: str) -> int:
+        return measured.index(name)
+
+    if channel in measured:
+        value = f"value[{place(channel)}]"
+    elif channel == GEARBOX:
+        motor, spindle = place("motor_angle_rad"), place("spindle_angle_rad")
+        value = f"value[{motor}] / {GEAR_RATIO} - value[{spindle}]"
+    elif channel in windows:
+        rises = channel.endswith(TRAVEL)
+        source = channel.replace(TRAVEL, "_angle_rad") if rises else channel.replace(FALL, "_")
+        sign = "" if rises else "-"
+        slot = windows.index(channel)
+        value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
+    elif channel.endswith(VELOCITY):
+        value = f"speed[{place(channel.replace(VELOCITY, '_angle_rad'))}]"
+    elif channel.endswith(ACCELERATION):
+        value = f"acceleration[{place(channel.replace(ACCELERATION, '_angle_rad'))}]"
+    else:
+        raise ExportError(f"The channel {channel} cannot be computed in C.")
+    return f"    row[{k}] = (float)({value}); /* {channel} */"
+
+
+def _tracker(sample_rate_hz: float) -> str:
+    found = tracker(sample_rate_hz)
+    text = TRACKER.replace("@PERIOD@", f"{found.period_s!r}")
+    for k, gain in enumerate(found.gain):
+        text = text.replace(f"@GAIN{k}@", f"{float(gain)!r}")
+    return text
+
+
+def _bank(estimator: BankEstimator) -> str:
+    bank, interval = estimator.bank, estimator.interval
+    parents, factors = bank.tables
+    columns = interval.columns if interval is not None else np.zeros(1, np.int64)
+    widths = interval.weights if interval is not None else np.zeros(1)
+    text = BANK
+    for mark, value in {
+        "PRODUCTS": str(len(bank.products)),
+        "ORDERS": str(bank.orders),
+        "SIZE": str(bank.size),
+        "PARENTS": _ints(parents),
+        "FACTORS": _ints(factors),
+        "WEIGHTS": _floats(estimator.weights),
+        "LOWEST": _floats(estimator.ranges[0]),
+        "HIGHEST": _floats(estimator.ranges[1]),
+        "WIDTH_COUNT": str(len(columns)),
+        "WIDTH_COLUMNS": _ints(columns),
+        "WIDTH_WEIGHTS": _floats(widths),
+        "LEAST": f"{interval.least:.9g}f" if interval is not None else "NAN",
+        "CENTRE": f"{states.POSITION_CENTRE_RAD}f",
+        "SCALE": f"{states.POSITION_SCALE_RAD}f",
+        "LOAD": f"{states.LOAD_SCALES[bank.surrogate]}f",
+        "ACCELERATION": f"{states.ACCELERATION_SCALE_RAD_S2}f",
+        "SLOWEST": f"{states.SLOWEST_RAD_S}f",
+        "LIGHTEST": f"{states.LIGHTEST}f",
+        "GEAR": f"{GEAR_RATIO}f",
+        "TURN": f"{GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
+        "POSE": "state[13] = row[6];" if bank.pose else "state[13] = 0.0f;",
+    }.items():
+        text = text.replace(f"@{mark}@", value)
+    return text
+
+
+def _network(estimator: NetworkEstimator) -> str:
+    network = estimator.network
+    text = NETWORK
+    for mark, value in {
+        "NODES": str(len(network.hidden)),
+        "LOWEST": _floats(network.input_range[0]),
+        "HIGHEST": _floats(network.input_range[1]),
+        "HIDDEN": _float_rows(network.hidden),
+        "OUTPUT": _floats(network.output[0]),
+        "LOW": _floats(network.output_range[0, :1]),
+        "HIGH": _floats(network.output_range[1, :1]),
+    }.items():
+        text = text.replace(f"@{mark}@", value)
+    return text

@@ -1,0 +1,56 @@
+"""`rig adapt`: make an estimator of one instrument fit another one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import console, emit_json, progress, to_json
+
+
+def adapt(
+    source: Annotated[Path, typer.Argument(help="Estimator of the source, from rig fit.")],
+    path: Annotated[Path, typer.Argument(help="Recordings of the other instrument.")],
+    runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Where the adapted estimator goes.")
+    ] = None,
+    scratch: Annotated[
+        bool, typer.Option(help="Also fit on the other instrument's runs alone, in folds.")
+    ] = True,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(help="File for the result; - for stdout.")] = None,
+) -> None:
+    """Adapt an estimator with some runs and report its error on the runs not used."""
+    from estimation.estimator import load
+    from estimation.files import write_text_atomic
+    from rig.importers.registry import open_campaign
+    from rig.reports import adapt as shown
+    from rig.reports.table import to_rich
+    from rig.studies.adapt import open_source, run_adaptation
+
+    estimator = open_source(load(source))
+    campaign = open_campaign(path, format_)
+    with progress() as bar:
+        task = bar.add_task("runs", total=len(campaign))
+        result, new = run_adaptation(
+            estimator,
+            source,
+            campaign,
+            [name.strip() for name in runs.split(",") if name.strip()],
+            from_scratch=scratch,
+            seed=seed,
+            on_run=lambda run: bar.advance(task),
+        )
+    screen = console()
+    screen.print(to_rich(shown.table(result)))
+    if out is not None:
+        new.save(out)
+        screen.print(f"Estimator: {out}", markup=False)
+    if json is not None and str(json) != "-":
+        write_text_atomic(json, to_json(result))
+    elif json is not None:
+        emit_json(result)

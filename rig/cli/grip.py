@@ -1,0 +1,80 @@
+"""`rig grip`: hold a grip torque by the estimate from motor current."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json
+
+
+def grip(
+    torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
+    duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
+    config: Annotated[
+        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
+    ] = None,
+    json: JsonFlag = False,
+) -> int:
+    """Hold a grip torque by the estimate from motor current alone; the sensor looks on.
+
+    The rig moves: the jaw goes to and fro a little against its load motor. Exit code 1 when the
+    sensor, which nothing is controlled by, is further from the torque than the estimate's interval,
+    or the load motor cannot give that torque.
+    """
+    import numpy as np
+
+    from rig.config import load_config
+    from rig.errors import UsageError
+    from rig.grip import SHARE, hold_grip
+    from rig.live.estimator import ModelEstimator
+    from rig.logger import open_logger
+    from rig.session import Session
+    from rig.trajectory import SAMPLE_RATE_HZ
+
+    settings = load_config(config)
+    path = model or settings.model_path
+    if path is None:
+        raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
+    estimator = ModelEstimator(path, SAMPLE_RATE_HZ)
+    screen = console()
+    held = []
+    with Session(settings, open_logger(settings)) as session:
+        for period in hold_grip(session, estimator, torque, duration):
+            held.append(period)
+            screen.print(
+                f"{period.time_s:6.1f} s  estimate {period.estimate_n_m * 1e3:6.1f} mN m  "
+                f"sensor {period.sensor_n_m * 1e3:6.1f} mN m  load {period.load_a:.3f} A",
+                markup=False,
+            )
+    late = held[len(held) // 2 :]
+    estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
+    sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
+    allowed = estimator.half_width
+    most_a = SHARE * settings.limits.load_command_a
+    is_reached = late[-1].load_a < most_a
+    if not is_reached:
+        screen.print(f"The load is at its most, {most_a:g} A: the torque was not reached.")
+    agrees = allowed is None or abs(sensor_n_m - torque) <= allowed
+    shown = "unknown" if allowed is None else f"{allowed * 1e3:.1f} mN m"
+    screen.print(
+        f"Second half: estimate {estimate_n_m * 1e3:.1f} mN m, sensor {sensor_n_m * 1e3:.1f} mN m "
+        f"for {torque * 1e3:.1f} mN m asked; interval of the estimate {shown}.",
+        markup=False,
+    )
+    if json:
+        emit_json(
+            {
+                "torque_n_m": torque,
+                "estimate_n_m": estimate_n_m,
+                "sensor_n_m": sensor_n_m,
+                "half_width95_n_m": allowed,
+                "sensor_agrees": agrees,
+                "is_reached": is_reached,
+                "periods": held,
+            }
+        )
+    return 0 if agrees and is_reached else 1

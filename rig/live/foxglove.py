@@ -1,0 +1,114 @@
+"""The live stream on a WebSocket of this computer, for the Foxglove application.
+
+Needs the extra `viz`. The server listens on the loopback address only, and only while asked for.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from rig.errors import UsageError
+from rig.live.block import SampleBlock
+
+HOST, PORT = "127.0.0.1", 8765
+RATE_HZ = 100.0
+"""Samples a second that are sent: a display needs no more."""
+
+SAMPLE, STATUS = "/rig/sample", "/rig/status"
+_NUMBER = {"type": ["number", "null"]}
+
+
+def published(blocks: Iterator[SampleBlock], port: int = PORT) -> Iterator[SampleBlock]:
+    """Yield blocks as they come, and send them to whoever is connected.
+
+    The server starts with the first block asked for and stops when the stream is closed.
+
+    Args:
+        blocks: The stream; closed on the way out.
+        port: TCP port; 0 takes any that is free.
+
+    Raises:
+        UsageError: The extra is not installed, or the port is taken.
+    """
+    server = FoxgloveServer(port)
+    try:
+        for block in blocks:
+            server.send(block)
+            yield block
+    finally:
+        server.close()
+        close = getattr(blocks, "close", None)
+        if close is not None:
+            close()
+
+
+class FoxgloveServer:
+    """A WebSocket server that sends samples and states as JSON with a schema.
+
+    Args:
+        port: TCP port on the loopback address; 0 takes any that is free.
+    """
+
+    def __init__(self, port: int = PORT) -> None:
+        try:
+            import foxglove
+        except ImportError as error:
+            raise UsageError(
+                "Foxglove's library is not installed.",
+                "It is an extra, since the display in the terminal does not need it.",
+                "Type: pip install 'rig[viz]'",
+            ) from error
+        self._context = foxglove.Context()
+        try:
+            self._server = foxglove.start_server(
+                name="rig", host=HOST, port=port, context=self._context
+            )
+        except (RuntimeError, OSError) as error:
+            raise UsageError(
+                f"Port {port} of this computer cannot be listened on.",
+                str(error),
+                "Close the other program, or name another with --foxglove-port.",
+            ) from error
+        self.port = self._server.port
+        self._channel = foxglove.Channel
+        self._channels: dict[str, Any] = {}
+        self._start_ns = time.time_ns()
+        self._last_s = -np.inf
+
+    def send(self, block: SampleBlock) -> None:
+        """Send every tenth sample of a block at 1 kHz, and the states of its devices."""
+        for k in range(len(block)):
+            now_s = float(block.time_s[k])
+            if self._last_s <= now_s < self._last_s + 1.0 / RATE_HZ - 1e-9:
+                continue
+            self._last_s = now_s
+            sample: dict[str, float | None] = {"time_s": now_s}
+            sample |= {name: _plain(values[k]) for name, values in block.columns.items()}
+            sample |= {f"{n}_estimate": _plain(values[k]) for n, values in block.estimates.items()}
+            self._log(SAMPLE, sample, now_s)
+        if len(block):
+            states = {device.name: f"{device.state} {device.detail}" for device in block.devices}
+            self._log(STATUS, {"lost": block.lost, "devices": states}, float(block.time_s[-1]))
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._server.stop()
+
+    def _log(self, topic: str, message: Mapping[str, Any], time_s: float) -> None:
+        if topic not in self._channels:
+            schema = {
+                "type": "object",
+                "title": topic.strip("/").replace("/", "."),
+                "properties": {
+                    name: _NUMBER if not isinstance(value, dict) else {"type": "object"}
+                    for name, value in message.items()
+                },
+            }
+            self._channels[topic] = self._channel(topic, schema=schema, context=self._context)
+        self._channels[topic].log(dict(message), log_time=self._start_ns + round(time_s * 1e9))
+
+
+def _plain(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

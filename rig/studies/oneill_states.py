@@ -1,0 +1,288 @@
+"""Estimates from physical states on the data of O'Neill et al. 2018, on runs that were not fitted.
+
+Every row is of whole runs held out: in five folds, or all runs of one frequency or power level. The
+five folds are those of the network rows, so that both stand side by side.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from estimation import oneill
+from estimation.bank.fitting import Settings
+from estimation.bank.states import EFFECTS, Bank
+from estimation.campaign import Campaign
+from estimation.derived import causal_channels
+from estimation.estimators.bank import EVERY, Estimates, RunEvidence, fit_runs, rows_of
+from estimation.recording import FloatArray, Recording
+from estimation.scores import Score, score
+from rig.studies.oneill_data import pose_runs
+from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
+
+FOLDS = 5
+POSES = {"neutral": "", "pitch": "wrist_pitch_rad", "roll": "wrist_roll_rad"}
+LOADS = {
+    "command": "motor_command_ratio",
+    "current": "motor_current_a",
+    "sensor": PROXIMAL,
+}
+FILTERS = ("zero-phase", "live")
+TARGETS = (PROXIMAL, DISTAL, JAW)
+
+
+@dataclass(frozen=True)
+class StateJob:
+    """One estimator under one protocol.
+
+    Attributes:
+        pose: Key of `POSES`.
+        surrogate: Key of `LOADS`.
+        target: Channel that is estimated.
+        filters: `zero-phase`, or `live` for inputs filtered causally.
+        protocol: `run-wise`, `lofo` or `lopo`.
+        without: Effect left out, a key of `EFFECTS`, or empty.
+    """
+
+    pose: str
+    surrogate: str
+    target: str
+    filters: str = "zero-phase"
+    protocol: str = "run-wise"
+    without: str = ""
+
+    @property
+    def bank(self) -> Bank:
+        """What is fitted."""
+        without = (self.without,) if self.without else ()
+        return Bank(LOADS[self.surrogate], POSES[self.pose], without)
+
+
+@dataclass(frozen=True)
+class StateRow:
+    """Error of one job, in the target's SI unit.
+
+    Attributes:
+        job: What was fitted and held out.
+        runs: Runs held out.
+        score: Errors over all closing samples of the held-out runs.
+        run_offset: Root mean square of the runs' mean errors.
+        covered: Share of the samples inside their interval.
+        covered_median: Median of that share over runs.
+        covered_worst: Smallest share of a run.
+        inside: Share of the samples inside the range that was fitted.
+        rmse_inside: Error over these samples; NaN where there are none.
+    """
+
+    job: StateJob
+    runs: int
+    score: Score
+    run_offset: float
+    covered: float
+    covered_median: float
+    covered_worst: float
+    inside: float
+    rmse_inside: float
+
+
+@dataclass(frozen=True)
+class StateStudy:
+    """Results.
+
+    Attributes:
+        schema: Name of this layout.
+        rows: The rows.
+        weights: Number of weights of the neutral pose's estimator.
+        settings: How weights were found.
+        notes: What a reader must know.
+    """
+
+    schema: str
+    rows: tuple[StateRow, ...]
+    weights: int
+    settings: Settings
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run's closing samples: rows of channels by surrogate's channel and filters, the truth."""
+
+    rows: Mapping[tuple[str, str], FloatArray]
+    truth: Mapping[str, FloatArray]
+    valid: np.ndarray
+    conditions: Mapping[str, float | str]
+
+
+def jobs(poses: Sequence[str]) -> list[StateJob]:
+    """Return the rows of the study."""
+    planned = []
+    for surrogate in ("command", "current"):
+        for filters in FILTERS:
+            for protocol in ("run-wise", "lofo", "lopo"):
+                planned += [
+                    StateJob("neutral", surrogate, target, filters, protocol) for target in TARGETS
+                ]
+    planned += [StateJob("neutral", "sensor", target) for target in (DISTAL, JAW)]
+    planned += [
+        StateJob("neutral", "command", target, without=effect)
+        for effect in EFFECTS
+        for target in TARGETS
+    ]
+    planned += [
+        StateJob(pose, surrogate, target, filters)
+        for pose in ("pitch", "roll")
+        for surrogate in ("command", "current")
+        for filters in FILTERS
+        for target in (DISTAL, JAW)
+    ]
+    return [job for job in planned if job.pose in poses]
+
+
+def run_states(
+    neutral: Campaign,
+    left_out: Mapping[str, str],
+    folder: Path | None,
+    *,
+    settings: Settings | None = None,
+    seed: int = 0,
+    on_run: Callable[[str], None] = lambda name: None,
+    on_row: Callable[[int, int], None] = lambda done, total: None,
+) -> StateStudy:
+    """Fit and score all rows.
+
+    Args:
+        neutral: Runs of experiments 1 and 2.
+        left_out: Runs left out of them, with the reason.
+        folder: Folder that may hold the parts of experiment 3, or lie beside them.
+        settings: How weights are found.
+        seed: Seed of the folds.
+        on_run: Called with each run's name when it has been processed.
+        on_row: Called with the number of rows done and their total.
+
+    Raises:
+        MissingChannelError: A run lacks a channel.
+    """
+    settings = settings or Settings()
+    for name, reason in left_out.items():
+        neutral = neutral.exclude(name, reason)
+    campaigns = {"neutral": neutral}
+    for pose in ("pitch", "roll"):
+        found = pose_runs(folder, pose)
+        if found is not None:
+            campaigns[pose] = found
+    planned = jobs(tuple(campaigns))
+    rows: list[StateRow] = []
+    for pose, campaign in campaigns.items():  # one at a time: a pose fills memory
+        own = [job for job in planned if job.pose == pose]
+        wanted = list(dict.fromkeys((job.surrogate, job.filters) for job in own))
+        runs = []
+        for recording in campaign.evidence:
+            run = _reduced(recording, POSES[pose], wanted)
+            runs += [run] if run.valid.any() else []
+            on_run(recording.name)
+        for kind, alike in groupby(own, key=lambda job: (job.bank, job.filters)):
+            evidence = _evidence(kind, runs)
+            for job in alike:
+                row = _row(job, runs, evidence[job.target], settings, seed)
+                rows += [row] if row is not None else []
+                on_row(len(rows), len(planned))
+    return StateStudy(
+        "rig.study.oneill-states/1",
+        tuple(rows),
+        Bank().size,
+        settings,
+        tuple(f"No data of experiment 3, {p}." for p in POSES if p not in campaigns),
+    )
+
+
+def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> _Run:
+    if pose:
+        angle = float(recording.conditions[pose])
+        recording = recording.with_columns(**{pose: np.full(len(recording), angle)})
+    banks = {surrogate: Bank(LOADS[surrogate], pose) for surrogate, _ in wanted}
+    names = [*TARGETS, *(c for bank in banks.values() for c in bank.channels)]
+    run = oneill.processed(recording, names)
+    sources = {"zero-phase": run}
+    if any(filters == "live" for _, filters in wanted):
+        sources["live"] = causal_channels(recording, names, tracked=True)
+    kept = oneill.is_closing(run)
+    return _Run(
+        {
+            (LOADS[surrogate], filters): rows_of(sources[filters], banks[surrogate])[kept]
+            for surrogate, filters in wanted
+        },
+        {target: run[target][kept] for target in TARGETS},
+        run.valid[kept],
+        dict(recording.conditions),
+    )
+
+
+def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
+    """Return the indices of the runs held out together; empty when it cannot be done."""
+    if protocol == "run-wise":
+        order = np.random.default_rng(seed).permutation(len(runs))
+        return [order[k::FOLDS] for k in range(FOLDS)] if len(runs) >= FOLDS else []
+    condition = {"lofo": "frequency_hz", "lopo": "load_command_a"}[protocol]
+    if any(condition not in run.conditions for run in runs):
+        return []
+    values = np.array([float(run.conditions[condition]) for run in runs])
+    levels = np.unique(values)
+    return [np.flatnonzero(values == level) for level in levels] if len(levels) > 1 else []
+
+
+def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[RunEvidence]]:
+    """Return what is fitted by target; runs without a valid closing sample were left out before."""
+    bank, filters = kind
+    found: dict[str, list[RunEvidence]] = {target: [] for target in TARGETS}
+    for run in runs:
+        kept = np.flatnonzero(run.valid)[::EVERY]
+        truths = np.column_stack([run.truth[target][kept] for target in TARGETS])
+        rows = run.rows[bank.surrogate, filters][kept]
+        for target, evidence in zip(TARGETS, RunEvidence.of_rows(bank, rows, truths), strict=True):
+            found[target].append(evidence)
+    return found
+
+
+def _row(
+    job: StateJob,
+    runs: Sequence[_Run],
+    evidence: Sequence[RunEvidence],
+    settings: Settings,
+    seed: int,
+) -> StateRow | None:
+    bank = job.bank
+    estimates: dict[int, Estimates] = {}
+    for held_out in _splits(runs, job.protocol, seed):
+        rest = [run for k, run in enumerate(evidence) if k not in held_out]
+        estimator = fit_runs(rest, bank, job.target, settings)
+        for k in held_out:
+            estimates[int(k)] = estimator.of_rows(runs[k].rows[bank.surrogate, job.filters])
+    if not estimates:
+        return None
+    order = sorted(estimates)
+    truths = [runs[k].truth[job.target] for k in order]
+    errors = [estimates[k].value - truth for k, truth in zip(order, truths, strict=True)]
+    covered = [np.abs(e) <= estimates[k].half_width for k, e in zip(order, errors, strict=True)]
+    inside = np.concatenate([estimates[k].inside for k in order])
+    shares = [float(np.mean(part)) for part in covered]
+    whole = np.concatenate(errors)
+    return StateRow(
+        job=job,
+        runs=len(order),
+        score=score(np.concatenate([estimates[k].value for k in order]), np.concatenate(truths)),
+        run_offset=float(np.sqrt(np.mean([e.mean() ** 2 for e in errors]))),
+        covered=float(np.mean(np.concatenate(covered))),
+        covered_median=float(np.median(shares)),
+        covered_worst=min(shares),
+        inside=float(inside.mean()),
+        rmse_inside=float(np.sqrt(np.mean(whole[inside] ** 2))) if inside.any() else float("nan"),
+    )
+
+
+def ablated(rows: Sequence[StateRow], target: str) -> dict[str, StateRow]:
+    """Return the ablation's rows of a target by the effect left out; the whole one under ''."""
+    whole = StateJob("neutral", "command", target)
+    return {r.job.without: r for r in rows if replace(r.job, without="") == whole}

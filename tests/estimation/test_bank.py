@@ -1,0 +1,167 @@
+"""Estimates from products of physical states: what they are, what they claim, how they adapt."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.bank.fitting import Normal, Settings, solve
+from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
+from estimation.campaign import Campaign
+from estimation.derived import fall_of, zero_phase_channels
+from estimation.estimators.adaptation import adapted, evidence
+from estimation.estimators.bank import (
+    BankEstimator,
+    BankRecipe,
+    InstrumentError,
+)
+from estimation.networks.network import NetworkError
+from estimation.oneill import closing_samples, processed
+from estimation.recording import Instrument, Recording
+from tests.estimation.synthetic import campaign
+
+TARGET = "proximal_torque_n_m"
+BANK = Bank("motor_current_a")
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Recording]:
+    return list(campaign())
+
+
+@pytest.fixture(scope="module")
+def fitted(runs) -> BankEstimator:
+    return BankRecipe(TARGET, BANK).fit(Campaign.of(runs[1:]))
+
+
+def closing_error(estimator: BankEstimator, run: Recording) -> np.ndarray:
+    estimates = estimator.estimate(run)
+    table = processed(run, [TARGET]).with_columns(
+        estimate_n_m=estimates.value, width_n_m=estimates.half_width
+    )
+    kept = closing_samples(table)
+    return np.array([kept["estimate_n_m"] - kept[TARGET], kept["width_n_m"]])
+
+
+def test_a_design_is_its_products_of_states_and_a_ripple_in_the_angle():
+    row = np.array([[-0.2, 0.3, 42.0, 500.0, 2.5, 0.05]])
+    q, c = (-0.2 + 0.5) / 0.5, 0.3 / 0.21 - 1
+    v, a, i, d = 42 / 35 - 1, 0.5, 35 / 42, 0.05 / 0.21
+    k = [min(2.5 / r, 1) - 0.5 for r in (1, 2, 3, 4)]
+    n = [min(2.5 / (r * 0.3 / 0.21), 1) - 0.5 for r in (1, 2, 3)]
+    state = dict(zip(STATES, [q, c, v, a, i, d, *k, *n, 0.0], strict=True))
+    design = BANK.design(row)[0]
+    for product, value in zip(BANK.products, design, strict=False):
+        assert value == pytest.approx(np.prod([state[name] for name in product]), abs=1e-12)
+    turn = 35 * 0.17 * -0.2
+    series = [
+        part * load
+        for order in range(1, BANK.orders + 1)
+        for load in (1.0, c, v)
+        for part in (np.sin(order * turn), np.cos(order * turn))
+    ]
+    np.testing.assert_allclose(design[len(BANK.products) :], series, atol=1e-12)
+
+
+def test_products_come_after_what_they_are_made_of_and_an_effect_goes_with_all_its_products():
+    products = closed([*NEUTRAL, *POSED])
+    assert len(set(products)) == len(products)
+    for place, product in enumerate(products[1:], start=1):
+        assert product[:-1] in products[:place]
+    for effect, states in EFFECTS.items():
+        bank = Bank(without=(effect,))
+        assert not any(set(states) & set(product) for product in bank.products)
+        assert (bank.orders == 0) == (effect == RIPPLE)
+
+
+def test_the_fall_of_a_channel_is_what_it_lacks_to_its_highest_value_of_the_window(runs):
+    name = fall_of("motor_current_a")
+    assert name == "motor_current_fall_a"
+    found = zero_phase_channels(runs[0], [name, "motor_current_a"])
+    current = found["motor_current_a"]
+    expected = [current[max(k - 499, 0) : k + 1].max() - current[k] for k in range(1500)]
+    np.testing.assert_allclose(found[name][:1500], expected, atol=1e-12)
+
+
+def test_a_run_s_own_offset_does_not_bend_the_slope():
+    draw = np.random.default_rng(0)
+    runs = []
+    for offset, centre in ((5.0, 3.0), (-5.0, -3.0), (0.0, 0.0)):
+        x = centre + draw.normal(size=400)
+        design = np.column_stack([np.ones(400), x])
+        runs.append(Normal.of(design, (2 * x + offset)[:, None]))
+    plain, mixed = (
+        solve(runs, Settings(ridge=1e-9, offset_share=share))[1, 0] for share in (0.0, 0.99)
+    )
+    assert abs(plain - 2) > 1
+    assert mixed == pytest.approx(2, abs=0.2)
+
+
+def test_its_interval_holds_on_a_run_it_has_not_seen(runs):
+    inside = []
+    for k in (0, 4, 8):
+        rest = [run for j, run in enumerate(runs) if j != k]
+        error, width = closing_error(BankRecipe(TARGET, BANK).fit(Campaign.of(rest)), runs[k])
+        inside.append(np.abs(error) <= width)
+        assert np.all(width > 0)
+    assert np.concatenate(inside).mean() > 0.8
+
+
+def test_samples_beyond_what_was_fitted_are_told(fitted, runs):
+    closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3
+    assert fitted.estimate(runs[1]).inside[closing].mean() > 0.9
+    far = runs[1].with_columns(motor_current_a=runs[1]["motor_current_a"] + 5)
+    assert not fitted.estimate(far).inside.any()
+
+
+def test_live_fits_have_a_target_without_lag(runs):
+    live = BankRecipe(TARGET, BANK, causal=True).fit(Campaign.of(runs[1:]))
+    truth = processed(runs[0], [TARGET])
+    both = closing_samples(truth.with_columns(estimate_n_m=live.predict(runs[0], causal=True)))
+    assert np.sqrt(np.mean((both["estimate_n_m"] - both[TARGET]) ** 2)) < 0.01
+
+
+def test_another_instrument_is_refused_unless_told(runs):
+    own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
+    mine = [replace(run, instrument=own) for run in runs[1:5]]
+    fitted = BankRecipe(TARGET, BANK).fit(Campaign.of(mine))
+    assert fitted.instrument == "Maryland 1"
+    foreign = replace(runs[0], instrument=other)
+    with pytest.raises(InstrumentError, match="fitted on Maryland 1"):
+        fitted.predict(foreign)
+    np.testing.assert_array_equal(
+        fitted.for_any_instrument().predict(foreign),
+        fitted.predict(replace(foreign, instrument=own)),
+    )
+
+
+def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, runs):
+    def other(run: Recording) -> Recording:
+        angle = run["spindle_angle_rad"]
+        return run.with_columns(**{TARGET: run[TARGET] + 0.02 + 0.03 * angle})
+
+    one = evidence(fitted, other(runs[1]))
+    assert one is not None
+    new = adapted(fitted, [one])
+    before, after = (
+        np.sqrt(np.mean(closing_error(e, other(runs[6]))[0] ** 2)) for e in (fitted, new)
+    )
+    assert after < 0.5 * before
+    assert isinstance(new, BankEstimator)
+    assert np.isnan(new.estimate(runs[0]).half_width).all()  # one run does not show how runs differ
+    with pytest.raises(NetworkError, match="no closing sample"):
+        adapted(fitted, [])
+
+
+def test_a_damaged_file_is_refused(fitted, tmp_path):
+    path = tmp_path / "e.npz"
+    fitted.save(path)
+    with np.load(path) as content:
+        arrays = {name: content[name] for name in content.files if name != "ranges"}
+    np.savez(path, **arrays)
+    with pytest.raises(NetworkError, match="holds no state estimator"):
+        BankEstimator.load(path)
+    with pytest.raises(NetworkError, match="weights"):
+        replace(fitted, weights=fitted.weights[:-1])
+    with pytest.raises(NetworkError, match="no closing sample"):
+        BankRecipe(TARGET, BANK).fit(Campaign(()))

@@ -1,0 +1,70 @@
+"""`rig grip`: the estimate alone is held, the sensor agrees, and every way out is safe."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.cli.main import main
+from rig.errors import SafetyTripError
+from rig.grip import hold_grip
+from rig.session import Session
+from tests.rig.simulated import is_armed, simulated, transport
+
+
+def test_a_torque_is_held_by_the_estimate_and_the_sensor_agrees(capsys):
+    assert main(["grip", "--torque", "0.06", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["estimate_n_m"] == pytest.approx(0.06, abs=0.003)
+    assert abs(said["sensor_n_m"] - 0.06) < said["half_width95_n_m"]
+    assert [p["time_s"] for p in said["periods"]] == sorted(p["time_s"] for p in said["periods"])
+
+
+@pytest.mark.parametrize("torque", ["1.0", "0", "-0.1", "nan"])
+def test_a_torque_beyond_the_limits_is_refused(torque, capsys):
+    assert main(["grip", "--torque", torque, "--duration", "8"]) == 2
+    assert "cannot be held" in capsys.readouterr().err
+
+
+def test_a_torque_the_load_cannot_give_is_said(capsys):
+    assert main(["grip", "--torque", "0.3", "--duration", "12"]) == 1
+    assert "not reached" in capsys.readouterr().err
+
+
+class Constant:
+    """An estimator that says one number."""
+
+    target_channel = "distal_torque_n_m"
+
+    def __init__(self, torque_n_m):
+        self.torque_n_m = torque_n_m
+
+    def push(self, columns, time_s):
+        return np.full(time_s.size, self.torque_n_m)
+
+
+def test_an_estimate_beyond_the_limit_disarms_the_rig():
+    config = simulated()
+    link = transport(config)
+    with pytest.raises(SafetyTripError, match="estimate"), Session(config, link) as session:
+        list(hold_grip(session, Constant(5.0), 0.05, 8.0))
+    assert not is_armed(link.board)
+
+
+def test_the_load_stays_within_its_share_and_is_off_at_the_end():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        held = list(hold_grip(session, Constant(0.0), 0.3, 12.0))
+        last = next(session.watch())
+        session.safe()
+    assert max(period.load_a for period in held) == pytest.approx(0.8 * 1.2)
+    assert last.columns["load_command_a"][-1] == 0.0
+
+
+def test_pieces_decided_on_the_way_are_each_played_once():
+    config = simulated()
+    pieces = ((np.full(50, -1.04), np.zeros(50)) for _ in range(20))
+    with Session(config, transport(config)) as session:
+        numbers = np.concatenate([r.setpoint for r in session.follow(pieces)])
+    played = numbers[numbers >= 0]
+    np.testing.assert_array_equal(np.unique(played), np.arange(1000))

@@ -1,0 +1,73 @@
+"""The rows of physical states: what is held out, what is claimed, what is shown."""
+
+import numpy as np
+import pytest
+
+from estimation.campaign import Campaign
+from rig.reports import oneill_states as shown
+from rig.studies import oneill_states
+from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
+from rig.studies.oneill_states import StateJob, ablated, run_states
+from tests.estimation.synthetic import campaign
+
+
+@pytest.fixture(scope="module")
+def study():
+    runs = [
+        run.with_columns(**{JAW: 1.2 + run["spindle_angle_rad"] - run[DISTAL] / 2})
+        for run in campaign()
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        kinds = [StateJob("neutral", "current", PROXIMAL, protocol=p) for p in ("run-wise", "lofo")]
+        kinds += [StateJob("neutral", "current", JAW, "live")]
+        kinds += [StateJob("neutral", "command", t, without=e)
+                  for e in ("", "speed") for t in (PROXIMAL, DISTAL, JAW)]  # fmt: skip
+        patch.setattr(oneill_states, "jobs", lambda poses: kinds)
+        done: list[tuple[int, int]] = []
+        found = run_states(
+            Campaign.of(runs), {}, None, on_row=lambda k, total: done.append((k, total))
+        )
+    assert done[-1] == (len(kinds), len(kinds))
+    return found
+
+
+def test_every_run_is_held_out_once_and_the_claims_are_shares(study):
+    for row in study.rows:
+        assert row.runs == 9
+        assert 0 <= row.covered_worst <= row.covered_median <= 1
+        assert 0 <= row.inside <= 1
+        assert row.run_offset <= row.score.rmse * 1.5
+
+
+def test_an_unseen_frequency_is_harder_than_an_unseen_run(study):
+    by = {r.job.protocol: r for r in study.rows if r.job.surrogate == "current"}
+    assert by["lofo"].score.rmse > 0
+    assert by["lofo"].inside < 1.0  # its speed was never fitted
+
+
+def test_what_an_effect_brings_is_seen_by_leaving_it_out(study):
+    rows = ablated(study.rows, PROXIMAL)
+    assert set(rows) == {"", "speed"}
+    assert rows[""].score.rmse < rows["speed"].score.rmse
+
+
+def test_the_tables_hold_the_rows(study):
+    errors, intervals, ablation = shown.tables(study, None)
+    assert len(errors.rows) == 5  # three by command, two by current; frequencies in a column
+    assert len(intervals.rows) == 6
+    assert [row[0] for row in ablation.rows] == ["nothing", "speed"]
+    assert any("No data of experiment 3, pitch" in note for note in shown.notes(study))
+    numbers = np.array([[float(cell) for cell in row[1:]] for row in ablation.rows])
+    assert np.isfinite(numbers).all()
+
+
+def test_the_planned_rows_hold_command_and_current_without_lag_and_live():
+    planned = oneill_states.jobs(("neutral", "pitch"))
+    assert {(j.surrogate, j.filters, j.protocol) for j in planned} >= {
+        (s, f, p)
+        for s in ("command", "current")
+        for f in ("zero-phase", "live")
+        for p in ("run-wise", "lofo", "lopo")
+    }
+    assert len(set(planned)) == len(planned)
+    assert {j.pose for j in planned} == {"neutral", "pitch"}
