@@ -5,6 +5,7 @@ decomposition of the regressor at random motions tells which columns depend on t
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ class Base:
     names: tuple[str, ...]
 
 
+@lru_cache(maxsize=8)
 def base_of(arm: Arm, seed: int = 0) -> Base:
     """Find the base parameters of an arm over its whole range of motion.
 

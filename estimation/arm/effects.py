@@ -1,27 +1,42 @@
 """Effects an arm's torque may hold beyond the thesis' model, each as columns by name.
 
-Hysteresis is a sum of elastic-slip elements (Maxwell slip): each follows the motion until its
-spring slips, so with the thresholds fixed it is linear in its strengths. F. Al-Bender, V. Lampaert,
-J. Swevers, "The generalized Maxwell-slip model", IEEE T-AC 50(11), 2005.
+The rows of the columns are the arm's joints and, where cables couple a gripper to the wrist, the
+gripper: what its motor feels is felt in the wrist, so its torque helps to tell.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
+from estimation.arm.elements import creep, hats, slip
 from estimation.arm.motion import Motion
 from estimation.arm.tables import Arm, Joint
 from estimation.recording import FloatArray
 
-DRIVE_SLIP_RAD = (0.003, 0.01, 0.03, 0.1, 0.3)
-"""Thresholds of the wrist drives' elements: finer than their backlash up to a third of a turn."""
-
 JOINT_SLIP_SHARE = (0.002, 0.006, 0.02)
-"""Thresholds of a joint's elements, as shares of half its range."""
+"""Thresholds of a joint's slip elements, as shares of half its range."""
 
-DRIVE_SIGN_RAD_S = 0.02
+SIGN_SHARE = 0.005
+"""Share of a joint's top speed over which its friction changes sign."""
+
+STRIBECK_SHARE = 0.03
+"""Share of a joint's top speed above which its friction has fallen."""
+
+CREEP_S = (0.2, 1.0)
+"""Time constants of creeping cables and belts."""
+
+TRACK_KNOTS = 20
+"""Knots of a friction that changes along a joint's track: tight spots of a tenth of its range."""
+
+TRACK_OVERHANG = 0.5
+"""Shares of the range that the knots reach beyond it: arms are driven past their table's range."""
+
+RIPPLE_ORDERS = (8, 12, 16, 20, 24, 32)
+"""Periods of a ripple tried in 2 pi rad of a revolute joint: gear and motor orders are unknown."""
+
+TRACK_DAMPING = 100.0
+"""Times the common damping: most of a track's knots are hardly visited."""
 
 
 @dataclass(frozen=True)
@@ -31,177 +46,161 @@ class ArmEffect:
     Attributes:
         name: What it is called, with its joint.
         what: What it is, in one line.
-        columns: Columns along a motion, shape (n, joints, parameters).
+        columns: Columns along a motion, shape (n, rows, parameters).
+        dissipative: Whether physics forbids negative parameters.
+        damping: How many times the common damping its fit gets.
     """
 
     name: str
     what: str
     columns: Callable[[Motion], FloatArray]
+    dissipative: bool = False
+    damping: float = 1.0
 
 
-def candidates(arm: Arm) -> tuple[ArmEffect, ...]:
-    """Return the effects worth trying on an arm, joint by joint."""
-    found = [effect for k in range(len(arm.joints)) for effect in _of_joint(arm, k)]
-    found += [_pull(arm, k, other) for k, other in ((0, 1), (1, 0), (2, 0), (2, 1))]
-    return (*found, *_wrist(arm))
+def row_count(arm: Arm) -> int:
+    """Return the number of rows of the columns: joints, and the gripper if cables couple it."""
+    return max(len(arm.joints), (arm.wrist or 0) + len(arm.wrist_coupling))
+
+
+def of_joints(arm: Arm) -> list[ArmEffect]:
+    """Return the effects worth trying on every joint before the wrist, and between them."""
+    before_wrist = len(arm.joints) if arm.wrist is None else arm.wrist
+    found = [effect for k in range(before_wrist) for effect in _of_joint(arm, k)]
+    for k in range(min(3, before_wrist)):
+        for other in range(min(3, before_wrist)):
+            if other != k:
+                found += _pulls(arm, k, other)
+    return found
 
 
 def _of_joint(arm: Arm, k: int) -> list[ArmEffect]:
-    name = arm.joints[k].name
-    return [
-        ArmEffect(f"presliding J{k + 1}", f"elastic slip in the {name}", _presliding(arm, k)),
+    joint = arm.joints[k]
+    label, name = f"J{k + 1}", joint.name
+
+    def on(values: Callable[[Motion], list[FloatArray]]) -> Callable[[Motion], FloatArray]:
+        return lambda m: on_joint(np.column_stack(values(m)), k, row_count(arm))
+
+    effects = [
         ArmEffect(
-            f"curved spring J{k + 1}",
+            f"presliding {label}",
+            f"elastic slip in the {name}",
+            on(lambda m: _slips(m.position[:, [k]], joint)),
+            dissipative=True,
+        ),
+        ArmEffect(
+            f"Stribeck friction {label}",
+            f"friction of the {name} that falls with speed",
+            on(lambda m: [_sign(m, k, joint) * _slow(m, k, joint)]),
+            dissipative=True,
+        ),
+        ArmEffect(
+            f"curved spring {label}",
             f"elastic torque of the {name} in square and cube of position",
-            _on(arm, k, lambda m: [m.position[:, k] ** p for p in (2, 3)]),
+            on(lambda m: [m.position[:, k] ** p for p in (2, 3)]),
         ),
         ArmEffect(
-            f"uneven spring J{k + 1}",
+            f"uneven spring {label}",
             f"elastic torque of the {name} that swings four times a turn (prismatic: range)",
-            _on(arm, k, lambda m: _four_a_turn(m.position[:, k], arm.joints[k])),
+            on(lambda m: _four_a_turn(m.position[:, k], joint)),
         ),
         ArmEffect(
-            f"curved friction J{k + 1}",
+            f"curved friction {label}",
             f"friction of the {name} in the signed square of speed",
-            _on(arm, k, lambda m: [m.velocity[:, k] * np.abs(m.velocity[:, k])]),
+            on(lambda m: [m.velocity[:, k] * np.abs(m.velocity[:, k])]),
         ),
         ArmEffect(
-            f"friction by position J{k + 1}",
+            f"one-sided friction {label}",
+            f"friction of the {name} that differs with direction",
+            on(lambda m: [np.abs(_sign(m, k, joint)), np.abs(m.velocity[:, k])]),
+        ),
+        ArmEffect(
+            f"friction by position {label}",
             f"Coulomb friction of the {name} that changes along its range",
-            _on(arm, k, lambda m: _by_position(m, k, arm.joints[k].speed)),
+            on(lambda m: [_sign(m, k, joint) * m.position[:, k] ** p for p in (1, 2)]),
+        ),
+        ArmEffect(
+            f"friction along the track {label}",
+            f"tight and loose spots of the {name}: Coulomb friction, linear between knots",
+            on(lambda m: [_sign(m, k, joint)[:, None] * _track(m.position[:, k], joint)]),
+            damping=TRACK_DAMPING,
+        ),
+        ArmEffect(
+            f"late torque {label}",
+            f"a delay between motion and torque of the {name}",
+            on(lambda m: [np.gradient(m.acceleration[:, k], m.period_s)]),
         ),
     ]
+    effects += [
+        ArmEffect(
+            f"creep {time:g} s {label}",
+            f"a damper behind a spring in the {name}",
+            on(lambda m, time=time: [creep(m.velocity[:, k], time, m.period_s)]),  # type: ignore[misc]
+            dissipative=True,
+        )
+        for time in CREEP_S
+    ]
+    if joint.kind == "revolute":
+        effects += [
+            ArmEffect(
+                f"ripple {order} a turn {label}",
+                f"torque ripple or eccentric gear of the {name}",
+                on(lambda m, order=order: _swing(order * m.position[:, k])),  # type: ignore[misc]
+            )
+            for order in RIPPLE_ORDERS
+        ]
+    return effects
 
 
-def _pull(arm: Arm, k: int, other: int) -> ArmEffect:
-    return ArmEffect(
-        f"cable pull J{other + 1} on J{k + 1}",
-        "elastic torque on one joint by the position of another",
-        _on(arm, k, lambda m: [m.position[:, other]]),
-    )
+def _pulls(arm: Arm, k: int, other: int) -> list[ArmEffect]:
+    def on(values: Callable[[FloatArray], FloatArray]) -> Callable[[Motion], FloatArray]:
+        return lambda m: on_joint(values(m.position[:, [other]]), k, row_count(arm))
 
-
-def _wrist(arm: Arm) -> list[ArmEffect]:
-    if arm.wrist is None:
-        return []
-    first = arm.wrist
     return [
         ArmEffect(
-            "wrist drive friction",
-            "Coulomb friction of the wrist's motors, through the coupling",
-            lambda m: _of_drives(arm, m, lambda q, v: [np.tanh(v / DRIVE_SIGN_RAD_S)]),
+            f"cable pull J{other + 1} on J{k + 1}",
+            "elastic torque on one joint by the position of another",
+            on(lambda q: q),
         ),
         ArmEffect(
-            "wrist drive damping",
-            "viscous friction of the wrist's motors, through the coupling",
-            lambda m: _of_drives(arm, m, lambda q, v: [v]),
-        ),
-        ArmEffect(
-            "wrist drive curved friction",
-            "friction of the wrist's motors in the signed root of speed, through the coupling",
-            lambda m: _of_drives(arm, m, lambda q, v: [np.sign(v) * np.sqrt(np.abs(v))]),
-        ),
-        ArmEffect(
-            "wrist drive hysteresis",
-            "elastic slip of the wrist's cables at their motors, through the coupling",
-            lambda m: _of_drives(arm, m, lambda q, v: [slip(q, r) for r in DRIVE_SLIP_RAD]),
-        ),
-        ArmEffect(
-            "wrist cable springs",
-            "elastic torque of the wrist and the gripper on one another",
-            lambda m: np.concatenate(
-                [
-                    on_joint(m.position[:, [i]], j, len(arm.joints))
-                    for i in range(first, first + len(arm.wrist_coupling))
-                    for j in range(first, len(arm.joints))
-                ],
-                axis=2,
-            ),
-        ),
-        ArmEffect(
-            "shaft twist on wrist",
-            "elastic torque of the wrist by the roll that twists its cables",
-            lambda m: np.concatenate(
-                [
-                    on_joint(m.position[:, [first - 1]], j, len(arm.joints))
-                    for j in range(first, len(arm.joints))
-                ],
-                axis=2,
-            ),
+            f"bent cable J{other + 1} on J{k + 1}",
+            "elastic torque on one joint by the square of another's position",
+            on(lambda q: q**2),
         ),
     ]
 
 
-def on_joint(values: FloatArray, joint: int, joints: int) -> FloatArray:
-    """Return columns acting on one joint: (n, k) to (n, joints, k)."""
-    columns = np.zeros((len(values), joints, values.shape[1]))
+def on_joint(values: FloatArray, joint: int, rows: int) -> FloatArray:
+    """Return columns acting on one joint: (n, k) to (n, rows, k)."""
+    columns = np.zeros((len(values), rows, values.shape[1]))
     columns[:, joint] = values
     return columns
 
 
-def slip(position: FloatArray, threshold: float) -> FloatArray:
-    """Return the stretch of elastic-slip elements, as a share of the one at which they slip.
-
-    Args:
-        position: Shape (n, drives); the elements start relaxed, so what they give is history-free
-            only after each has slipped once.
-        threshold: Stretch at which they slip, in the unit of position.
-    """
-    stretch: FloatArray = _stretch(np.ascontiguousarray(position), threshold) / threshold
-    return stretch
+def _slips(position: FloatArray, joint: Joint) -> list[FloatArray]:
+    half = (joint.upper - joint.lower) / 2
+    return [slip(position, share * half)[:, 0] for share in JOINT_SLIP_SHARE]
 
 
-@numba.njit(cache=True)
-def _stretch(position, threshold):  # type: ignore[no-untyped-def]
-    stretch = np.zeros_like(position)
-    for k in range(1, len(position)):
-        for j in range(position.shape[1]):
-            moved = stretch[k - 1, j] + position[k, j] - position[k - 1, j]
-            stretch[k, j] = min(max(moved, -threshold), threshold)
-    return stretch
+def _sign(motion: Motion, k: int, joint: Joint) -> FloatArray:
+    sign: FloatArray = np.tanh(motion.velocity[:, k] / (SIGN_SHARE * joint.speed))
+    return sign
 
 
-def _presliding(arm: Arm, k: int) -> Callable[[Motion], FloatArray]:
-    half = (arm.joints[k].upper - arm.joints[k].lower) / 2
-    return _on(
-        arm, k, lambda m: [slip(m.position[:, [k]], s * half)[:, 0] for s in JOINT_SLIP_SHARE]
-    )
+def _slow(motion: Motion, k: int, joint: Joint) -> FloatArray:
+    share: FloatArray = np.exp(-((motion.velocity[:, k] / (STRIBECK_SHARE * joint.speed)) ** 2))
+    return share
+
+
+def _track(position: FloatArray, joint: Joint) -> FloatArray:
+    over = TRACK_OVERHANG * (joint.upper - joint.lower)
+    return hats(position, joint.lower - over, joint.upper + over, TRACK_KNOTS)
 
 
 def _four_a_turn(position: FloatArray, joint: Joint) -> list[FloatArray]:
     turn = 2 * np.pi if joint.kind == "revolute" else joint.upper - joint.lower
-    phase = 4 * (2 * np.pi / turn) * position
+    return _swing(4 * (2 * np.pi / turn) * position)
+
+
+def _swing(phase: FloatArray) -> list[FloatArray]:
     return [np.sin(phase), np.cos(phase)]
-
-
-def _by_position(motion: Motion, k: int, speed: float) -> list[FloatArray]:
-    sign = np.tanh(motion.velocity[:, k] / (0.01 * speed))
-    return [sign * motion.position[:, k], sign * motion.position[:, k] ** 2]
-
-
-def _on(
-    arm: Arm, joint: int, values: Callable[[Motion], list[FloatArray]]
-) -> Callable[[Motion], FloatArray]:
-    return lambda m: on_joint(np.column_stack(values(m)), joint, len(arm.joints))
-
-
-def _of_drives(
-    arm: Arm,
-    motion: Motion,
-    values: Callable[[FloatArray, FloatArray], list[FloatArray]],
-) -> FloatArray:
-    """Return columns of the wrist's motors, as torques on the joints they drive.
-
-    q = M q_motor and equal power give tau = M^-T tau_motor.
-    """
-    first = arm.wrist or 0
-    inverse = np.linalg.inv(np.array(arm.wrist_coupling))
-    driven = slice(first, first + len(inverse))
-    position, velocity = (x[:, driven] @ inverse.T for x in (motion.position, motion.velocity))
-    held = len(arm.joints) - first  # the gripper's own torque is not looked at
-    blocks = []
-    for block in values(position, velocity):
-        columns = np.zeros((len(motion), len(arm.joints), len(inverse)))
-        columns[:, first:] = block[:, None, :] * inverse.T[:held]
-        blocks.append(columns)
-    return np.concatenate(blocks, axis=2)

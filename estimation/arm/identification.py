@@ -103,6 +103,32 @@ def fit(
     return Fit(values / length, np.sqrt(variance) / length, float(singular[0] / singular[-1]))
 
 
+def damped_around(
+    columns: FloatArray, torque: FloatArray, prior: FloatArray, damping: float
+) -> FloatArray:
+    """Return parameters by damped least squares around a first guess (del Sol et al. 2014).
+
+    theta = theta_0 + (A^T A + lambda^2 I)^-1 A^T (tau - A theta_0). The paper's equation 17 leaves
+    out the first theta_0, without which a perfect guess would give zero.
+
+    Args:
+        columns: A, shape (n, joints, parameters).
+        torque: tau, shape (n, joints).
+        prior: theta_0, shape (parameters,).
+        damping: lambda, in the unit of the columns; positive.
+
+    Raises:
+        ArmError: The damping is not positive.
+    """
+    if not damping > 0:
+        raise ArmError(f"A damping of {damping} is not positive.")
+    table = columns.reshape(-1, columns.shape[2])
+    left = torque.ravel() - table @ prior
+    gram = table.T @ table + damping**2 * np.eye(table.shape[1])
+    values: FloatArray = prior + linalg.solve(gram, table.T @ left, assume_a="pos")
+    return values
+
+
 def nrmsd_percent(estimate: FloatArray, torque: FloatArray) -> FloatArray:
     """Return the error of each joint, equation 3.2 of the thesis: RMS over the torque's range, %.
 

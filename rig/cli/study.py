@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.study_arm import arm_studies
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
@@ -20,6 +21,9 @@ study_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+
+
+study_app.add_typer(arm_studies)
 
 
 @study_app.callback()
@@ -137,45 +141,6 @@ def _fit_states(
             on_run=lambda name: bar.advance(task),
             on_row=lambda done, total: bar.update(fitted, completed=done, total=total),
         )
-
-
-@study_app.command()
-def pique(
-    data: Annotated[
-        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-    ],
-    paths: Annotated[
-        tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
-    ] = ("one18", "two18"),
-    also: Annotated[
-        list[str] | None,
-        typer.Option(help="A further run to test on, with models fitted on the second path."),
-    ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
-    from estimation.files import write_text_atomic
-    from rig.reports import pique as shown
-    from rig.reports.table import to_rich
-    from rig.studies.pique import open_paths, run_study
-
-    with progress() as bar:
-        task = bar.add_task("paths", total=None)
-        first, second, *others = open_paths(data, [*paths, *(also or [])])
-        study = run_study(
-            first, second, also=others, on_step=lambda step: bar.update(task, description=step)
-        )
-    screen = console()
-    for line in [shown.lead(study), *shown.notes(study)]:
-        screen.print(line, markup=False)
-    for table in shown.tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(study))
-        screen.print(f"Markdown: {out}", markup=False)
-    if json:
-        emit_json(study)
 
 
 @study_app.command()

@@ -3,7 +3,8 @@
 import numpy as np
 
 from rig.reports.table import TextTable, to_markdown
-from rig.studies.pique import DAMPING, EFFECTS, LEAST_GAIN, Row, Study
+from rig.studies.arm_search import DAMPING, LEAST_GAIN
+from rig.studies.pique import EFFECTS, Row, Study
 
 TITLE = "Joint torques of a patient-side manipulator: table 3.2 of Piqué 2018, made again"
 
@@ -26,11 +27,12 @@ def notes(study: Study) -> list[str]:
         "The torque is motor current times nominal constants: the arm has no torque sensor. Both"
         " sides pass a zero-phase Butterworth filter of order 3 at 5 Hz; one second at either end"
         " is left out. The thesis' row is another robot's.",
-        f"Effects were chosen by their gain on {second} after a fit on {first}, least gain"
-        f" {100 * LEAST_GAIN:g} %; nothing was chosen by the other direction. The list of"
+        f"Effects were discovered by their gain on {second} after a fit on {first}, least gain"
+        f" {100 * LEAST_GAIN:g} %, and kept if the other direction gains by them too. The list of"
         " candidates and the least gain were drawn up with the public paths one18 and two18 in"
-        " view, so a run unseen by either is the better judge."
-        f" Fits with effects are damped by {DAMPING:g} of each column's squared length.",
+        " view, so a run unseen by either is the better judge. Frictions, slip and creep cannot be"
+        " negative. The gripper's torque takes part in the fit and is not scored."
+        f" Fits with effects are damped by {DAMPING:g} of a column's squared length.",
     ]
 
 
@@ -107,13 +109,16 @@ def _dropped(study: Study) -> TextTable:
         for t in study.trials
         if t.kept_in_round is None
     ]
-    note = "Gain had the effect been added to those kept; negative: it made the estimate worse."
+    note = (
+        "Gain had the effect been added to those kept; negative: it made the estimate worse. An"
+        " effect that gains in the first column only was found and not confirmed."
+    )
     return TextTable("Effects tried and dropped", ["effect", "what", *_ways(study)], rows, note)
 
 
 def _ways(study: Study) -> list[str]:
     first, second = study.paths
-    return [f"gain on {second}, %", f"gain on {first} (not chosen on), %"]
+    return [f"gain on {second}, %", f"gain on {first} (to confirm), %"]
 
 
 def _parameters(study: Study) -> TextTable:

@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from estimation.arm.effects import candidates, slip
+from estimation.arm.effects import row_count
+from estimation.arm.elements import creep, hats, slip
 from estimation.arm.motion import motion_of
+from estimation.arm.signed import Block, Normal, Products, solve
 from estimation.arm.tables import PSM
+from estimation.arm.wrist import candidates
 
 PERIOD_S = 0.005
 
@@ -35,9 +38,9 @@ def test_every_candidate_gives_finite_columns_that_differ():
     tables = [effect.columns(motion) for effect in candidates(PSM)]
     assert len({effect.name for effect in candidates(PSM)}) == len(tables)
     for table in tables:
-        assert table.shape[:2] == (len(motion), 6)
+        assert table.shape[:2] == (len(motion), row_count(PSM))
         assert np.isfinite(table).all()
-        assert np.all(np.abs(table).max(axis=(0, 1)) > 0)
+        assert np.abs(table).max() > 0  # of a track, most knots are not visited
 
 
 def test_the_wrists_drives_do_the_work_that_its_joints_do():
@@ -46,10 +49,49 @@ def test_the_wrists_drives_do_the_work_that_its_joints_do():
     coupling = np.array(PSM.wrist_coupling)
     torque = damping.columns(motion)  # N m per N m s of each drive
     drive_speed = np.linalg.solve(coupling, motion.velocity[:, 4:7].T).T
-    # the gripper held still: the joints' power is the drives'
-    still = motion.velocity.copy()
-    still[:, 6] = 0
-    still_speed = np.linalg.solve(coupling, still[:, 4:7].T).T
     for drive in range(3):
-        power = np.sum(torque[:, :, drive] * still[:, :6], axis=1)
-        np.testing.assert_allclose(power, drive_speed[:, drive] * still_speed[:, drive], atol=1e-12)
+        power = np.sum(torque[:, :, drive] * motion.velocity[:, :7], axis=1)
+        np.testing.assert_allclose(power, drive_speed[:, drive] ** 2, atol=1e-12)
+
+
+def test_creep_follows_a_step_with_its_time_constant():
+    lagged = creep(np.ones((1000, 1)), 0.5, 0.01)[:, 0]
+    assert np.isclose(lagged[49], 1 - np.exp(-1), atol=1e-3)
+    assert np.isclose(lagged[-1], 1.0, atol=1e-6)
+
+
+def test_hats_are_shares_of_one_and_go_on_flat_beyond_their_ends():
+    shares = hats(np.linspace(-2, 2, 81), -1.0, 1.0, 5)
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
+    np.testing.assert_array_equal(shares[0], [1, 0, 0, 0, 0])
+    np.testing.assert_allclose(
+        shares @ np.linspace(-1, 1, 5), np.clip(np.linspace(-2, 2, 81), -1, 1)
+    )
+
+
+def test_dissipative_parameters_are_never_negative_and_others_are_least_squares():
+    rng = np.random.default_rng(3)
+    columns, truth = rng.normal(size=(200, 2, 4)), np.array([2.0, -1.0, 0.5, -0.3])
+    torque = columns @ truth
+    products, weights = Products.of(columns, torque), np.array([1.0, 2.0])
+    normal = Normal.of(products, weights)
+
+    def found(signs):
+        return solve(normal, [Block("all", np.arange(4), np.array(signs), 0.0, own_length=True)])
+
+    np.testing.assert_allclose(found([False] * 4), truth, atol=1e-10)
+    bounded = found([True, False, True, True])
+    assert bounded[3] == 0.0
+    assert np.all(bounded[[0, 2]] > 0)
+    left = torque - columns @ bounded
+    expected = np.sqrt(np.mean(left**2, axis=0))
+    np.testing.assert_allclose(products.rms(np.arange(4), bounded), expected, rtol=1e-9)
+
+
+def test_what_is_hardly_visited_stays_small():
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(500, 1, 2)) * [1.0, 1e-3]
+    torque = columns @ np.array([1.0, 100.0])
+    normal = Normal.of(Products.of(columns, torque), np.ones(1))
+    (one,) = (Block("map", np.arange(2), np.zeros(2, bool), 0.1),)
+    assert abs(solve(normal, [one])[1]) < 1e-2

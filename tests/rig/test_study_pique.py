@@ -6,21 +6,23 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimation.arm.effects import candidates
+from estimation.arm.identification import nrmsd_percent
 from estimation.arm.motion import motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM
+from estimation.arm.wrist import candidates
 from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.cli.study import study_app
 from rig.errors import DataError
 from rig.importers.dvrk_psm import MOTOR_TO_JOINT
-from rig.studies import pique
+from rig.studies import arm_search, pique
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
 RATE_HZ = 100.0
 HIDDEN = "presliding J2"
+TRIED = [e for e in candidates(PSM) if e.name.endswith(("J2", "hysteresis"))]
 
 
 def made_path(name: str, seed: int, seconds: float = 20.0) -> Recording:
@@ -36,10 +38,10 @@ def made_path(name: str, seed: int, seconds: float = 20.0) -> Recording:
     waves /= np.abs(waves).max(axis=0)
     lower, upper = (np.array([*(getattr(j, n) for j in PSM.joints), e]) for n, e in LIMITS)
     position = (lower + upper) / 2 + 0.4 * (upper - lower) * waves
-    motion = motion_of(position, 1 / RATE_HZ, pique.FINE)
+    motion = motion_of(position, 1 / RATE_HZ, arm_search.FINE)
     torque = regressor(PSM, motion) @ np.random.default_rng(1).uniform(0.05, 1, 68)
     (hidden,) = (e for e in candidates(PSM) if e.name == HIDDEN)
-    torque += hidden.columns(motion) @ np.full(3, 0.15 * np.ptp(torque[:, 1]))
+    torque += hidden.columns(motion)[:, :6] @ np.full(3, 0.15 * np.ptp(torque[:, 1]))
     torque += 0.002 * np.ptp(torque, axis=0) * rng.normal(size=torque.shape)
     columns = {}
     for k in range(7):
@@ -64,7 +66,7 @@ def paths():
 
 @pytest.fixture(scope="module")
 def study(paths):
-    return pique.run_study(*paths)
+    return pique.run_study(*paths, tried=TRIED)
 
 
 def errors(study, model):
@@ -79,27 +81,27 @@ def test_the_hidden_effect_is_found_and_halves_its_joints_error(study):
 
 
 def test_every_candidate_is_reported_as_kept_or_dropped(study):
-    assert sorted(t.effect for t in study.trials) == sorted(e.name for e in candidates(PSM))
+    assert sorted(t.effect for t in study.trials) == sorted(e.name for e in TRIED)
     kept = [t.kept_in_round for t in study.trials if t.kept_in_round is not None]
     assert kept == list(range(1, len(kept) + 1))
     assert all(
-        t.gain_percent >= 100 * pique.LEAST_GAIN
+        t.gain_percent >= 100 * arm_search.LEAST_GAIN
         for t in study.trials
         if t.kept_in_round is not None
     )
 
 
 def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
-    there = tuple(pique.prepare(path) for path in paths)
+    one, other = (arm_search.prepare(path, TRIED) for path in paths)
     kept = [HIDDEN]
-    fast = pique._Direction(*there, [HIDDEN, "curved spring J1"]).score(kept)
-    row = pique._row("x", *there, there[0].columns(kept), there[1].columns(kept), pique.DAMPING)
-    np.testing.assert_allclose(fast, row.nrmsd_percent, rtol=1e-6)
+    estimate = other.estimate(kept, one.values(kept))
+    expected = nrmsd_percent(estimate, other.torque[:, :6])
+    np.testing.assert_allclose(arm_search.score((one, other), kept), expected, rtol=1e-6)
 
 
 def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_path):
-    monkeypatch.setattr(pique, "open_campaign", lambda path: Campaign.of(paths))
-    monkeypatch.setattr(pique, "candidates", lambda arm: candidates(arm)[:6])
+    monkeypatch.setattr(arm_search, "open_campaign", lambda path: Campaign.of(paths))
+    monkeypatch.setattr(pique, "candidates", lambda arm: TRIED)
     out = tmp_path / "pique.md"
     words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "a", "--out", str(out)]
     ran = CliRunner().invoke(study_app, [*words, "--json"])
@@ -114,14 +116,14 @@ def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_pat
 
 
 def test_a_missing_path_names_those_there(paths, monkeypatch, tmp_path):
-    monkeypatch.setattr(pique, "open_campaign", lambda path: Campaign.of(paths))
+    monkeypatch.setattr(arm_search, "open_campaign", lambda path: Campaign.of(paths))
     with pytest.raises(DataError, match="no run one18"):
-        pique.open_paths(tmp_path, ("one18", "b"))
+        arm_search.open_paths(tmp_path, ("one18", "b"))
 
 
 def test_a_path_of_three_seconds_is_too_short():
     with pytest.raises(DataError, match="too short"):
-        pique.prepare(made_path("short", 1, seconds=3.0))
+        arm_search.prepare(made_path("short", 1, seconds=3.0))
 
 
 def test_the_table_and_the_importer_agree_on_the_coupling():
@@ -132,11 +134,36 @@ def test_the_table_and_the_importer_agree_on_the_coupling():
 def test_the_measured_paths_give_the_reference_and_the_effects_gain(measured_data):
     if not (measured_data / "psm").is_dir():
         pytest.skip(f"no arm data at {measured_data / 'psm'}")
-    found = pique.run_study(*pique.open_paths(measured_data / "psm", ("one18", "two18")))
+    kept = MEASURED_KEPT
+    tried = [e for e in candidates(PSM) if e.name in kept]
+    runs = arm_search.open_paths(measured_data / "psm", ("one18", "two18"))
+    found = pique.run_study(*runs, tried=tried)
     there, back = (r.nrmsd_percent for r in found.rows if r.model == pique.THESIS)
     # an independent run of the thesis' model on these files
     np.testing.assert_allclose(there, [1.71, 3.84, 4.21, 8.67, 10.00, 9.25], rtol=0.05)
     np.testing.assert_allclose(back, [1.54, 3.40, 4.61, 7.20, 9.97, 10.94], rtol=0.05)
-    for row in found.rows:
-        if row.model == pique.EFFECTS:
-            assert np.all(np.array(row.nrmsd_percent) < [0.95, 2.5, 3.4, 6.0, 4.9, 5.6])
+    one, other = (arm_search.prepare(run, tried) for run in runs)
+    ways = [arm_search.score(way, kept) for way in ((one, other), (other, one))]
+    assert np.all(np.mean(ways, axis=0) < [0.75, 1.7, 2.5, 5.0, 3.6, 3.7])
+
+
+MEASURED_KEPT = [
+    "presliding J1",
+    "presliding J2",
+    "presliding J4",
+    "friction along the track J2",
+    "friction along the track J3",
+    "curved friction J3",
+    "friction by position J3",
+    "late torque J3",
+    "late torque J4",
+    "creep 0.2 s J3",
+    "creep 1 s J2",
+    "bent cable J2 on J1",
+    *(f"ripple {order} a turn J2" for order in (8, 12, 20, 24)),
+    "wrist drive hysteresis",
+    "wrist drive friction by roll",
+    "wrist drive curved friction",
+    "wrist drive creep",
+    "shaft twist on wrist",
+]

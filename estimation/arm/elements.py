@@ -1,0 +1,62 @@
+"""Elements that effects are built of: slip, creep and hats, each linear in its strength.
+
+Hysteresis is a sum of elastic-slip elements (Maxwell slip): each follows the motion until its
+spring slips, so with the thresholds fixed it is linear in its strengths. F. Al-Bender, V. Lampaert,
+J. Swevers, "The generalized Maxwell-slip model", IEEE T-AC 50(11), 2005.
+"""
+
+import numba
+import numpy as np
+from scipy import signal
+
+from estimation.recording import FloatArray
+
+
+def slip(position: FloatArray, threshold: float) -> FloatArray:
+    """Return the stretch of elastic-slip elements, as a share of the one at which they slip.
+
+    Args:
+        position: Shape (n, drives); the elements start relaxed, so what they give is history-free
+            only after each has slipped once.
+        threshold: Stretch at which they slip, in the unit of position.
+    """
+    stretch: FloatArray = _stretch(np.ascontiguousarray(position), threshold) / threshold
+    return stretch
+
+
+@numba.njit(cache=True)
+def _stretch(position, threshold):  # type: ignore[no-untyped-def]
+    stretch = np.zeros_like(position)
+    for k in range(1, len(position)):
+        for j in range(position.shape[1]):
+            moved = stretch[k - 1, j] + position[k, j] - position[k - 1, j]
+            stretch[k, j] = min(max(moved, -threshold), threshold)
+    return stretch
+
+
+def creep(velocity: FloatArray, time_constant_s: float, period_s: float) -> FloatArray:
+    """Return the velocity that a damper sees behind a spring (one Maxwell element), at rest first.
+
+    Args:
+        velocity: Shape (n, ...).
+        time_constant_s: Damping over stiffness, s.
+        period_s: Sample period, s.
+    """
+    kept = np.exp(-period_s / time_constant_s)
+    lagged: FloatArray = signal.lfilter([1 - kept], [1, -kept], velocity, axis=0)
+    return lagged
+
+
+def hats(position: FloatArray, lower: float, upper: float, count: int) -> FloatArray:
+    """Return a piecewise linear function's columns, shape (n, count); the ends go on flat.
+
+    Args:
+        position: Shape (n,).
+        lower: Position of the first knot.
+        upper: Position of the last knot.
+        count: Number of knots, evenly spaced.
+    """
+    knots = np.linspace(lower, upper, count)
+    inside = np.clip(position, lower, upper)[:, None]
+    columns: FloatArray = np.clip(1 - np.abs(inside - knots) / (knots[1] - knots[0]), 0, 1)
+    return columns

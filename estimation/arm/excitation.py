@@ -1,0 +1,145 @@
+"""Excitation: finite Fourier series that tell an arm's parameters, within limits at every instant.
+
+Equation 2.14 of G. A. Piqué's thesis, five harmonics of 0.1 Hz; the condition number of the
+regressor with columns of unit length (equation 2.15) is made small. Every candidate is scaled into
+the limits before it is judged, so the search needs no constraints.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from estimation.arm.base import base_of
+from estimation.arm.motion import Motion
+from estimation.arm.regressor import regressor
+from estimation.arm.tables import Arm
+from estimation.recording import FloatArray
+
+HARMONICS = 5
+FUNDAMENTAL_HZ = 0.1
+GRID = 2000
+"""Instants of a period at which limits are looked at; between them the series' slope bounds it."""
+
+JUDGED = 80
+"""Instants at which the regressor is taken: its condition hardly changes with more."""
+
+ACCELERATION_PER_SPEED = 4.0
+"""Limit of acceleration, as a multiple of the speed limit, 1/s; assumed, the thesis states none."""
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A periodic motion of every joint.
+
+    Attributes:
+        middle: Shape (joints,), rad or m.
+        sine: Amplitudes of position's sines, shape (harmonics, joints).
+        cosine: Of its cosines.
+    """
+
+    middle: FloatArray
+    sine: FloatArray
+    cosine: FloatArray
+
+    def motion(self, time_s: FloatArray) -> Motion:
+        """Return the motion at instants that are evenly spaced."""
+        position, velocity, acceleration = (
+            _series(self.sine, self.cosine, time_s, order) for order in range(3)
+        )
+        period = float(time_s[1] - time_s[0])
+        return Motion(self.middle + position, velocity, acceleration, period)
+
+
+def _series(sine: FloatArray, cosine: FloatArray, time_s: FloatArray, order: int) -> FloatArray:
+    pulse = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
+    phase = np.outer(time_s, pulse) + order * np.pi / 2
+    scale = (pulse**order)[:, None]
+    values: FloatArray = np.sin(phase) @ (scale * sine) + np.cos(phase) @ (scale * cosine)
+    return values
+
+
+def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
+    """Return bounds that hold at every instant: of position, velocity, acceleration; (3, joints).
+
+    Between two instants a series differs from the nearer one by at most half the step times the
+    bound of its slope, the sum of its amplitudes.
+    """
+    time = np.arange(GRID) / (GRID * FUNDAMENTAL_HZ)
+    pulse = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
+    amplitude = np.hypot(sine, cosine)
+    rows = []
+    for order in range(3):
+        slope = (pulse ** (order + 1)) @ amplitude
+        seen = np.abs(_series(sine, cosine, time, order)).max(axis=0)
+        rows.append(seen + slope * time[1] / 2)
+    return np.stack(rows)
+
+
+def fitted(arm: Arm, raw: FloatArray) -> Excitation:
+    """Scale numbers without limits into an excitation within the arm's limits.
+
+    Args:
+        arm: The arm.
+        raw: Shape (joints x (2 harmonics + 1),): sines, cosines, and how the range is shared
+            between middle and swing.
+    """
+    joints = len(arm.joints)
+    table = raw.reshape(2 * HARMONICS + 1, joints)
+    sine, cosine = table[:HARMONICS], table[HARMONICS:-1]
+    lower, upper, speed = (
+        np.array([getattr(joint, name) for joint in arm.joints])
+        for name in ("lower", "upper", "speed")
+    )
+    half = (upper - lower) / 2
+    off_centre = 0.5 * np.tanh(table[-1]) * half
+    limits = np.stack([half - np.abs(off_centre), speed, ACCELERATION_PER_SPEED * speed])
+    factor = (limits / np.maximum(bounds(sine, cosine), 1e-12)).min(axis=0)
+    return Excitation((lower + upper) / 2 + off_centre, factor * sine, factor * cosine)
+
+
+def condition(arm: Arm, excitation: Excitation) -> float:
+    """Return the condition number of the base regressor with columns of unit length."""
+    time = np.arange(JUDGED) / (JUDGED * FUNDAMENTAL_HZ)
+    table = regressor(arm, excitation.motion(time))[:, :, base_of(arm).columns]
+    stacked = table.reshape(-1, table.shape[2])
+    length = np.linalg.norm(stacked, axis=0)
+    singular = np.linalg.svd(stacked / np.where(length > 0, length, 1.0), compute_uv=False)
+    return float(singular[0] / max(singular[-1], 1e-300))
+
+
+def start(arm: Arm, seed: int) -> FloatArray:
+    """Return a random start of the search."""
+    rng = np.random.default_rng(seed)
+    weight = 1 / np.arange(1.0, HARMONICS + 1)[:, None]
+    shape = (HARMONICS, len(arm.joints))
+    parts = [weight * rng.normal(size=shape), weight * rng.normal(size=shape)]
+    return np.concatenate([*parts, 0.3 * rng.normal(size=(1, shape[1]))]).ravel()
+
+
+def by_active_set(arm: Arm, first: FloatArray, evaluations: int) -> tuple[FloatArray, float]:
+    """Improve a start by sequential quadratic programming, the thesis' kind of search.
+
+    Args:
+        arm: The arm.
+        first: The start.
+        evaluations: Condition numbers it may take, gradients by differences included.
+
+    Returns:
+        The numbers for `fitted`, and their condition number.
+    """
+    rounds = max(1, evaluations // (len(first) + 2))
+
+    def logarithm(raw: FloatArray) -> float:
+        return float(np.log(condition(arm, fitted(arm, raw))))
+
+    found = minimize(
+        logarithm, first.ravel(), method="SLSQP", tol=1e-6, options={"maxiter": rounds}
+    )
+    return found.x, float(np.exp(found.fun))
+
+
+def designed(arm: Arm, seeds: int, evaluations: int) -> Excitation:
+    """Return the excitation of the lowest condition number of several starts."""
+    found = [by_active_set(arm, start(arm, seed), evaluations) for seed in range(seeds)]
+    return fitted(arm, min(found, key=lambda each: each[1])[0])

@@ -1,0 +1,129 @@
+"""Damped least squares whose dissipative parameters cannot be negative, from cross-products.
+
+The cross-products of all columns are made once; any subset of effects is then one small solution.
+Negative friction gives energy away: a fit that needs it has found the wrong effect.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import nnls
+
+from estimation.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class Block:
+    """Columns that belong together: the base, or one effect.
+
+    Attributes:
+        name: What they are.
+        at: Their places among all columns.
+        dissipative: Of each, whether it cannot be negative.
+        damping: Damping, as a share of the squared length of the block's columns: of each own one
+            where `own_length`, else of its longest, so that what is hardly visited stays small.
+        own_length: See `damping`.
+    """
+
+    name: str
+    at: NDArray[np.intp]
+    dissipative: NDArray[np.bool_]
+    damping: float
+    own_length: bool = False
+
+
+@dataclass(frozen=True)
+class Products:
+    """Cross-products of weighted columns with one another and with the torque, by row.
+
+    Attributes:
+        gram: Shape (rows, columns, columns).
+        right: Shape (rows, columns).
+        square: Sum of squares of the torque, shape (rows,).
+        samples: Number of samples.
+    """
+
+    gram: FloatArray
+    right: FloatArray
+    square: FloatArray
+    samples: int
+
+    @classmethod
+    def of(cls, columns: FloatArray, torque: FloatArray) -> "Products":
+        """Return the cross-products of columns (n, rows, k) with themselves and a torque."""
+        by_row = columns.transpose(1, 0, 2)
+        gram = np.stack([own.T @ own for own in by_row])
+        right = np.stack([own.T @ torque[:, k] for k, own in enumerate(by_row)])
+        return cls(gram, right, np.sum(torque**2, axis=0), len(torque))
+
+    def rms(self, at: NDArray[np.intp], values: FloatArray) -> FloatArray:
+        """Return the RMS error of each row that some columns leave with these parameters."""
+        gram = self.gram[:, at[:, None], at]
+        squares = self.square - 2 * self.right[:, at] @ values + (gram @ values) @ values
+        left: FloatArray = np.sqrt(np.maximum(squares, 0.0) / self.samples)
+        return left
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Cross-products summed over the rows, each with its weight squared.
+
+    Attributes:
+        gram: Shape (columns, columns).
+        right: Shape (columns,).
+    """
+
+    gram: FloatArray
+    right: FloatArray
+
+    @classmethod
+    def of(cls, products: Products, weights: FloatArray) -> "Normal":
+        """Weigh cross-products by the weight of each row; shape (rows,)."""
+        weight = weights**2
+        return cls(np.tensordot(weight, products.gram, axes=1), weight @ products.right)
+
+
+def solve(normal: Normal, blocks: Sequence[Block]) -> FloatArray:
+    """Return the parameters of some blocks, in their order.
+
+    Args:
+        normal: Of the path to fit.
+        blocks: The columns in use.
+    """
+    at = np.concatenate([block.at for block in blocks])
+    gram, right = normal.gram[at[:, None], at], normal.right[at]
+    length = _lengths(np.sqrt(np.diag(gram)), blocks)
+    damping = np.concatenate([np.full(len(block.at), block.damping) for block in blocks])
+    scaled = gram / np.outer(length, length) + np.diag(damping)
+    root = cholesky(scaled)
+    target = solve_triangular(root, right / length, trans="T")
+    bounded = np.concatenate([block.dissipative for block in blocks])
+    values: FloatArray = _bounded(root, target, bounded) / length
+    return values
+
+
+def _lengths(own: FloatArray, blocks: Sequence[Block]) -> FloatArray:
+    lengths, start = own.copy(), 0
+    for block in blocks:
+        part = lengths[start : start + len(block.at)]
+        if not block.own_length and len(part):
+            part[:] = part.max()
+        start += len(block.at)
+    lengths[lengths < 1e-12] = 1.0
+    return lengths
+
+
+def _bounded(table: FloatArray, target: FloatArray, bounded: NDArray[np.bool_]) -> FloatArray:
+    """Solve least squares where some unknowns are not negative; the free ones are eliminated."""
+    free, triangle = np.linalg.qr(table[:, ~bounded])
+    values = np.zeros(table.shape[1])
+    if bounded.any():
+        rest = table[:, bounded] - free @ (free.T @ table[:, bounded])
+        left = target - free @ (free.T @ target)
+        values[bounded] = nnls(rest, left, maxiter=100 * rest.shape[1])[0]
+    known = free.T @ (target - table[:, bounded] @ values[bounded])
+    values[~bounded] = np.linalg.solve(triangle, known)
+    return values

@@ -1,0 +1,199 @@
+"""The wrench at an arm's tip from what its joints' torque leaves: offline, and live at 1 kHz.
+
+In contact, tau = model + J^T w (G. A. Piqué's thesis, 2018, equations 3.4 to 3.6), with w what the
+tip does to its surroundings: force first, N, then moment, N m.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+from scipy.linalg import lapack
+
+from estimation.arm.kinematics import TIP, ArmError, built, pinocchio
+from estimation.arm.regressor import LINK, SIGN_WIDTH, names
+from estimation.arm.tables import Arm
+from estimation.recording import FloatArray
+
+LIKELY_FORCE_N = 20.0
+LIKELY_MOMENT_N_M = 4.0
+"""Standard deviations of wrenches in surgery before anything is measured: what a singular direction
+falls back to. Wide, so that they hardly bend what the joints do tell."""
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """Wrenches with their covariance.
+
+    Attributes:
+        value: Force and moment, shape (n, 6).
+        covariance: Shape (n, 6, 6). In directions that the joints do not tell it is that of the
+            wrenches thought likely beforehand, not zero.
+    """
+
+    value: FloatArray
+    covariance: FloatArray
+
+
+def spatial_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return spatial Jacobians along a motion, shape (n, 6, joints), base frame and origin."""
+    return _jacobians(arm, position, "WORLD")
+
+
+def body_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return body Jacobians along a motion, shape (n, 6, joints), tip's frame and origin."""
+    return _jacobians(arm, position, "LOCAL")
+
+
+def _jacobians(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
+    if position.shape[1] != len(arm.joints) or not np.isfinite(position).all():
+        raise ArmError(
+            f"Positions of shape {position.shape} do not fit {arm.name}.",
+            f"It has {len(arm.joints)} joints; every position must be finite.",
+        )
+    pin, model = pinocchio(), built(arm)
+    data, tip = model.createData(), model.getFrameId(TIP)
+    reference = getattr(pin.ReferenceFrame, frame)
+    return np.stack([pin.computeFrameJacobian(model, data, q, tip, reference) for q in position])
+
+
+def by_pseudo_inverse(jacobians: FloatArray, external_torque: FloatArray) -> FloatArray:
+    """Return wrenches by the pseudo-inverse of the transposed Jacobian, equation 3.6.
+
+    Near a singularity the result grows without bound; see `most_likely`.
+
+    Args:
+        jacobians: Shape (n, 6, joints).
+        external_torque: Shape (n, joints).
+    """
+    inverse = np.linalg.pinv(jacobians.transpose(0, 2, 1))
+    wrenches: FloatArray = np.einsum("nij,nj->ni", inverse, external_torque)
+    return wrenches
+
+
+def most_likely(
+    jacobians: FloatArray, external_torque: FloatArray, torque_error: FloatArray
+) -> Wrench:
+    """Return the most likely wrenches, joints weighed by their errors.
+
+    Gaussian: w = (J S^-1 J^T + P^-1)^-1 J S^-1 tau, with S the joints' variances and P that of
+    likely wrenches; the bracket's inverse is the covariance.
+
+    Args:
+        jacobians: Shape (n, 6, joints).
+        external_torque: Shape (n, joints).
+        torque_error: Standard error of each joint's torque, shape (joints,), all positive.
+
+    Raises:
+        ArmError: An error is not positive.
+    """
+    if not np.all(torque_error > 0):
+        raise ArmError("A joint's torque has no positive error.", f"They are {torque_error}.")
+    weighted = jacobians / torque_error**2
+    bracket: FloatArray = weighted @ jacobians.transpose(0, 2, 1) + _likely()
+    covariance = np.linalg.inv(bracket).astype(np.float64)
+    value = np.einsum("nij,njk,nk->ni", covariance, weighted, external_torque)
+    return Wrench(value, covariance)
+
+
+def _likely() -> FloatArray:
+    return np.diag(np.repeat([LIKELY_FORCE_N**-2, LIKELY_MOMENT_N_M**-2], 3))
+
+
+class LiveWrench:
+    """Wrench sample by sample: position and torque in, most likely spatial wrench out.
+
+    Position and torque pass the same Savitzky-Golay window, so a lag of one is a lag of the other;
+    velocity and acceleration are the window's derivatives at its middle, half a window late.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        values: FloatArray,
+        torque_error: FloatArray,
+        period_s: float,
+        window: int = 61,
+        order: int = 3,
+    ) -> None:
+        """Set up.
+
+        Args:
+            arm: The arm.
+            values: All parameters in the order of `estimation.arm.regressor.names`.
+            torque_error: Standard error of each joint's torque, shape (joints,).
+            period_s: Sample period, s.
+            window: Samples of the window, odd.
+            order: Degree of its polynomial.
+
+        Raises:
+            ArmError: The number of parameters is not the arm's.
+        """
+        if values.shape != (len(names(arm)),):
+            raise ArmError(f"{len(names(arm))} parameters are needed, not {values.shape}.")
+        self._pin, self._model = pinocchio(), built(arm)
+        self._data, self._tip = self._model.createData(), self._model.getFrameId(TIP)
+        self._world = self._pin.ReferenceFrame.WORLD
+        self._taps = np.stack(
+            [
+                signal.savgol_coeffs(window, order, deriv=k, delta=period_s, use="dot")
+                for k in range(3)
+            ]
+        )
+        self._joints = len(arm.joints)
+        self._window = np.zeros((2 * window, 2 * self._joints))
+        self._seen = 0
+        self._width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
+        self._links, self._linear, self._coulomb, self._offset = _split(arm, values)
+        self._inverse_variance = torque_error**-2.0
+        self._prior = _likely()
+
+    def step(self, position: FloatArray, torque: FloatArray) -> FloatArray | None:
+        """Take one sample; return the wrench half a window ago, or None while the window fills.
+
+        Args:
+            position: Shape (joints,).
+            torque: Shape (joints,).
+
+        Raises:
+            ArmError: The sample is not finite.
+        """
+        window, n = self._taps.shape[1], self._joints
+        at = self._seen % window
+        # written twice, so that the last window is always one stretch of memory
+        for row in (at, at + window):
+            self._window[row, :n] = position
+            self._window[row, n:] = torque
+        self._seen += 1
+        if self._seen < window:
+            return None
+        smooth = self._taps @ self._window[at + 1 : at + 1 + window]
+        q, v, a = smooth[:, :n]
+        links = self._pin.computeJointTorqueRegressor(self._model, self._data, q, v, a)
+        model = links @ self._links + self._linear @ smooth[:, :n].ravel() + self._offset
+        model += self._coulomb * np.tanh(v / self._width)
+        jacobian = self._pin.computeFrameJacobian(
+            self._model, self._data, q, self._tip, self._world
+        )
+        weighted = jacobian * self._inverse_variance
+        _, wrench, failed = lapack.dposv(
+            weighted @ jacobian.T + self._prior, weighted @ (smooth[0, n:] - model)
+        )
+        if failed:
+            raise ArmError("The wrench cannot be told from this sample.", f"Torque: {torque}.")
+        found: FloatArray = wrench
+        return found
+
+
+def _split(arm: Arm, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return Pinocchio's link parameters, the matrix on (q, v, a), frictions and offsets."""
+    named = dict(zip(names(arm), values, strict=True))
+    every = range(1, len(arm.joints) + 1)
+    links = [named.get(f"{name}{k}", 0.0) for k in every for name in LINK]
+    damping = np.diag([named[f"Fv{k}"] for k in every])
+    for row, column in arm.viscous_pairs:
+        damping[row, column] = named[f"Fv{row + 1}{column + 1}"]
+    spring = np.diag([named.get(f"Ke{k}", 0.0) for k in every])
+    drive = np.diag([named[f"Ia{k}"] for k in every])
+    coulomb, offset = (np.array([named[f"{name}{k}"] for k in every]) for name in ("Fs", "tau0_"))
+    return np.array(links), np.hstack([spring, damping, drive]), coulomb, offset

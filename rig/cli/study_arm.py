@@ -1,0 +1,145 @@
+"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, external force."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json, progress
+
+arm_studies = typer.Typer(rich_markup_mode=None)
+
+
+@arm_studies.command()
+def pique(
+    data: Annotated[
+        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
+    ],
+    paths: Annotated[
+        tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
+    ] = ("one18", "two18"),
+    also: Annotated[
+        list[str] | None,
+        typer.Option(help="A further run to test on, with models fitted on the second path."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
+    from estimation.files import write_text_atomic
+    from rig.reports import pique as shown
+    from rig.reports.table import to_rich
+    from rig.studies.arm_search import open_paths
+    from rig.studies.pique import run_study
+
+    with progress() as bar:
+        task = bar.add_task("paths", total=None)
+        first, second, *others = open_paths(data, [*paths, *(also or [])])
+        study = run_study(
+            first, second, also=others, on_step=lambda step: bar.update(task, description=step)
+        )
+    screen = console()
+    for line in [shown.lead(study), *shown.notes(study)]:
+        screen.print(line, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def wrench(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
+    from estimation.files import write_text_atomic
+    from rig.reports import pique_wrench as shown
+    from rig.reports.table import to_rich
+    from rig.studies.pique_wrench import run_wrench_study
+
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_wrench_study(seeds, workers, lambda: bar.advance(task))
+    screen = console()
+    for note in shown.NOTES:
+        screen.print(note, markup=False)
+    for table in shown.tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, shown.markdown(study))
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def delsol(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
+    from estimation.files import write_text_atomic
+    from rig.reports.table import to_markdown, to_rich
+    from rig.simulation.hydraulic_arm import HYDRAULIC
+    from rig.studies.delsol import run_delsol, tables
+
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_delsol(seeds, lambda: bar.advance(task))
+    screen = console()
+    note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
+    screen.print(note, markup=False)
+    for table in tables(study):
+        screen.print(to_rich(table))
+    if out is not None:
+        title = "# External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
+        parts = [title, note, *(to_markdown(table).rstrip() for table in tables(study))]
+        write_text_atomic(out, "\n\n".join([*parts, study.provenance.line()]) + "\n")
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def payload(
+    data: Annotated[
+        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
+    ],
+    on: Annotated[list[str], typer.Option(help="A run to look for an added mass on.")],
+    model: Annotated[str, typer.Option(help="Run without the mass, to fit a model on.")] = "two18",
+    height_m: Annotated[
+        float, typer.Option(min=0.01, help="Height of the mass above the remote centre, m.")
+    ] = 0.535,
+    height_error_m: Annotated[
+        float, typer.Option(min=0.0, help="Standard error of that height, m.")
+    ] = 0.01,
+    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Find a mass added to an arm's insertion axis from its joints' torque."""
+    from estimation.files import write_text_atomic
+    from rig.reports.table import to_markdown, to_rich
+    from rig.studies.arm_search import open_paths
+    from rig.studies.payload import find_payload, table
+
+    with progress() as bar:
+        task = bar.add_task("paths", total=None)
+        fitted, *runs = open_paths(data, [model, *on])
+        found = find_payload(
+            fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
+        )
+    screen = console()
+    screen.print(to_rich(table(found)))
+    if out is not None:
+        text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
+        write_text_atomic(out, f"{text}\n{found.provenance.line()}\n")
+        screen.print(f"Markdown: {out}", markup=False)
+    if json:
+        emit_json(found)

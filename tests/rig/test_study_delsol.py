@@ -1,0 +1,38 @@
+"""`rig study delsol` on one simulated hydraulic arm."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rig.cli.study import study_app
+from rig.studies import delsol
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+
+
+def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):
+    out = tmp_path / "delsol.md"
+    ran = CliRunner().invoke(study_app, ["delsol", "--seeds", "1", "--json", "--out", str(out)])
+    assert ran.exit_code == 0, ran.output
+    found = json.loads(ran.stdout)
+    joint, share = found["hoses_found"][0]
+    assert joint == 1
+    assert share > 0.5
+    (paper,), (ours,) = (found["outcomes"][name] for name in (delsol.PAPER, delsol.OURS))
+    assert np.all(np.array(ours["residual_n_m"]) < paper["residual_n_m"])
+    assert ours["impact_n"] < paper["impact_n"]
+    assert "| paper | 26.10 | 12.98 | 6.81 |" in out.read_text()
+
+
+def test_the_excitation_keeps_to_table_1():
+    motions = delsol.swings(np.random.default_rng(0))
+    assert len(motions) == 5 * delsol.SWINGS * delsol.POSES
+    for k, motion in enumerate(motions):
+        joint = k // (delsol.SWINGS * delsol.POSES)
+        moving = np.ptp(motion.position, axis=0) > 1e-9
+        assert list(np.flatnonzero(moving)) == [joint]
+        lowest, highest = delsol.TABLE_1_HZ[joint]
+        frequency = 2 / (len(motion) * motion.period_s)
+        assert 0.98 * lowest <= frequency <= 1.03 * highest
