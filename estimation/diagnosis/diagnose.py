@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from estimation.campaign import Campaign, with_campaign_time
+from estimation.derived import GEAR_RATIO
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
@@ -38,6 +39,21 @@ Added = Mapping[str, FloatArray]
 
 SAME_CAUSE = 0.9
 """Two balances show one cause when what it adds to them correlates at least this well."""
+
+SAME_RATE = 0.03
+"""Two waves are one when their periods a turn differ by less than this share."""
+
+_TORQUE = "proximal torque sensor"
+SENSORS = {
+    "motor": {"current sensor", _TORQUE, "motor encoder"},
+    "gearbox": {_TORQUE, "motor encoder", "spindle encoder"},
+    "cable": {_TORQUE, "distal torque sensor", "spindle encoder"},
+    "stretch": {"distal torque sensor", "spindle encoder", "jaw encoder"},
+}
+"""What each balance reads: a sensor at fault shows in all that read it."""
+
+LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
+"""Faults that two balances may name differently."""
 
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
@@ -377,14 +393,20 @@ def _all(candidate: Candidate) -> tuple[Parameter, ...]:
 def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     """Report a cause seen in several balances once, where it explains the largest share."""
     found = [pair for story in stories.values() for pair in _findings(story)]
-    found.sort(key=lambda pair: pair[0].rmse_after / max(pair[0].rmse_before, 1e-300))
+    # a named fault of a sensor speaks for what other balances only show
+    found.sort(
+        key=lambda pair: (
+            not pair[0].family.startswith("sensor."),
+            pair[0].rmse_after / max(pair[0].rmse_before, 1e-300),
+        )
+    )
     kept: list[tuple[Finding, Added]] = []
     for finding, added in found:
         for k, (first, other) in enumerate(kept):
             if finding.balance in (first.balance, *first.also_in):
                 continue
             units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
-            if _same_cause(other, added, units[0] == units[1]):
+            if _same_cause(other, added, units[0] == units[1]) or _same_fault(first, finding):
                 kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
                 break
         else:
@@ -392,6 +414,28 @@ def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     order = list(stories)
     ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
     return [finding for finding, _ in ranked]
+
+
+def _same_fault(first: Finding, second: Finding) -> bool:
+    """Say whether a second balance shows a fault that the first one names.
+
+    A sensor that both balances read, or a wave of as many periods a turn.
+    """
+    if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
+        return False
+    if first.family.startswith("sensor."):
+        akin = second.family.startswith("sensor.") or second.family == UNKNOWN
+        return akin and (second.family in (first.family, UNKNOWN, *LIKE.get(first.family, ())))
+    rates = [_periods_per_turn(finding) for finding in (first, second)]
+    return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
+
+
+def _periods_per_turn(finding: Finding) -> float | None:
+    """Return a wave's periods a turn of the spindle, or None for what is no wave."""
+    order = finding.parameters.get("order")
+    if order is None:
+        return None
+    return order.value * (GEAR_RATIO if "motor_angle" in finding.depends_on else 1.0)
 
 
 def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:
