@@ -255,6 +255,10 @@ def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool
             claims.append(_map_claim(left, may_name))
         elif worth >= gates.map_floor and not claims:
             claims.append(Claim(Part(map=left), "something_missing", None, ()))
+    vetoes = [named.veto for named in discovery.named if named.veto is not None]
+    if not claims and vetoes:
+        # the effect is proved; that its name fell to this map makes it no smaller
+        claims.append(_map_claim(vetoes[0], may_name))
     last = discovery.steps[-1] if discovery.steps else None
     if not claims and last is not None and last.stands_out(gates):
         claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))

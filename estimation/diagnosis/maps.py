@@ -129,15 +129,15 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         count: Number of surrogates.
         seed: Their seed.
     """
-    bases = _bases(balance)
+    offered = bases(balance)
     base = [b[::THIN] for b in balance.base(terms)]
     left = [r[::THIN] for r in balance.left(terms)]
     drawn = surrogates(left, count, seed)
     aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
-    singles = {basis: _thinned(balance, basis) for basis in bases}
+    singles = {basis: _thinned(balance, basis) for basis in offered}
     found: list[Map] = []
     null = np.full(count, -np.inf)
-    for subset in [*((b,) for b in bases), *itertools.combinations(bases, 2)]:
+    for subset in [*((b,) for b in offered), *itertools.combinations(offered, 2)]:
         columns = [
             _centred(p[0] if len(p) == 1 else _products(*p), balance.demean)
             for p in zip(*(singles[basis] for basis in subset), strict=True)
@@ -213,18 +213,21 @@ def needed_channels(measured: Sequence[str]) -> list[str]:
     return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
 
 
-def _bases(balance: Balance) -> list[Basis]:
-    bases = []
+def bases(balance: Balance) -> list[Basis]:
+    """Return the variables that the balance's residual may be mapped over, simplest first."""
+    found = []
     for variable, channel in CHANNELS.items():
         if variable in BEHIND.get(balance.model.balance, ()):
             continue
+        if balance.model.target in (channel, *measured_channels([channel])):
+            continue  # the target tells its own residual, noise and all
         if any(channel not in run.channels for run in balance.runs):
             continue
         values = np.concatenate([run.channels[channel] for run in balance.runs])
         low, high = (float(v) for v in np.percentile(values, [1, 99]))
         if high - low > 1e-12 * max(abs(high), abs(low), 1e-12):
-            bases.append(Basis(variable, channel, low, high))
-    return bases
+            found.append(Basis(variable, channel, low, high))
+    return found
 
 
 def _thinned(balance: Balance, basis: Basis) -> list[FloatArray]:
