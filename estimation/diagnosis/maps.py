@@ -9,7 +9,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from estimation.derived import measured_channels
@@ -17,6 +16,7 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.effects.unknown_product import followed
 from estimation.recording import FloatArray
 
 CHANNELS = {
@@ -171,19 +171,9 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
 
 def play(x: FloatArray, width: float) -> FloatArray:
     """Return the play operator of a signal: it follows when pulled by more than half its width."""
-    half = 0.5 * width
-    offset: FloatArray = (x - _followed(x, half)) / max(half, np.finfo(float).tiny)
+    offset: FloatArray = np.empty(len(x))
+    followed(x, max(0.5 * width, np.finfo(float).tiny), np.nan, offset)
     return offset
-
-
-@numba.njit(cache=True)
-def _followed(x: FloatArray, half: float) -> FloatArray:
-    out = np.empty(len(x))
-    value = x[0]
-    for k in range(len(x)):
-        value = min(max(value, x[k] - half), x[k] + half)
-        out[k] = value
-    return out
 
 
 def projection(balance: Balance) -> Callable[[Run], Run]:
