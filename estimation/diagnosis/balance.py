@@ -89,12 +89,21 @@ class Balance:
         """Return the squared error over all runs."""
         return float(sum(r @ r for r in self.left(terms)))
 
-    def refined(self, terms: Sequence[Candidate], passes: int = 2) -> list[Candidate]:
-        """Return the effects with all shapes moved to where the joint fit is best."""
+    def refined(
+        self, terms: Sequence[Candidate], passes: int = 2, last: int | None = None
+    ) -> list[Candidate]:
+        """Return the effects with all shapes moved to where the joint fit is best.
+
+        Args:
+            terms: The effects.
+            passes: How often, each time in smaller steps.
+            last: Move only those of so many effects at the end, None for all.
+        """
         best = list(terms)
+        begin = 0 if last is None else len(best) - last
         for width in (1.0, 0.3, 0.1)[:passes]:
-            for i, term in enumerate(best):
-                for k in range(len(term.shape)):
+            for i in range(begin, len(best)):
+                for k in range(len(best[i].shape)):
                     best[i] = self._along(best, i, k, width)
         return best
 

@@ -16,10 +16,16 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True)
 class Part:
-    """What one finding adds: an effect, or a map."""
+    """What one finding adds: an effect, a map, or the terms of a formula in place of a map."""
 
     candidate: Candidate | None = None
     map: Map | None = None
+    formula: tuple[Candidate, ...] = ()
+
+    @property
+    def terms(self) -> tuple[Candidate, ...]:
+        """The effects among it."""
+        return self.formula if self.candidate is None else (self.candidate, *self.formula)
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,7 @@ class Frozen:
 
 def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
     """Fit declared effects and parts together on the discovery runs."""
-    terms = [*balance.terms, *(p.candidate for p in parts if p.candidate is not None)]
+    terms = [*balance.terms, *(term for part in parts for term in part.terms)]
     maps = [p.map for p in parts if p.map is not None]
     weights = balance.solve(terms) if not maps else _with_maps(balance, terms, maps)
     level = 0.0

@@ -69,7 +69,7 @@ def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
 
 
 def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
-    diagnosis, _ = diagnosed(runs(tight_spot))
+    diagnosis, stories = diagnosed(runs(tight_spot))
     assert diagnosis.verdict == "depends_on"
     (finding,) = diagnosis.findings
     assert finding.family == "unknown"
@@ -77,6 +77,21 @@ def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found(
     assert "spindle_angle" in finding.depends_on
     assert finding.confidence is None
     assert finding.rmse_after < 0.5 * finding.rmse_before
+    # the form it was made by, written as effects that run as any other
+    assert 1 <= len(finding.formulas) <= 5
+    (best, *others) = finding.formulas
+    assert "tanh(velocity" in best.text
+    assert best.rmse_after < 1.1 * finding.rmse_after
+    assert best.gain > 0.9
+    assert all(other.rmse_after is None for other in others)
+    fitted = stories["motor"].model
+    (spot,) = [term for term in fitted.terms if term.effect.family == "unknown"]
+    assert spot.effect.id in ("unknown.sign.bump", "unknown.bump.sign")
+    shape = {name.split("_")[1]: known.value for name, known in spot.values.items() if "_" in name}
+    role = "second" if spot.effect.id.endswith("bump") else "first"
+    assert spot.values[f"{role}_width"].value == pytest.approx(0.1, rel=0.25)
+    assert spot.values[f"{role}_width"].value * shape["place"] == pytest.approx(0.2, abs=0.02)
+    assert model_file.parse(model_file.to_toml(fitted)) == fitted
 
 
 def test_a_name_withdrawn_by_a_map_below_its_own_floor_leaves_a_finding():
