@@ -14,7 +14,15 @@ from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.formula import Formula, formulas
-from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, samples_of, squares
+from estimation.diagnosis.frozen import (
+    Frozen,
+    Part,
+    errors,
+    freeze,
+    samples_of,
+    settled,
+    squares,
+)
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
@@ -107,7 +115,7 @@ class Story:
     @property
     def model(self) -> Model:
         """The fitted model with what was found: named effects, and formulas in place of maps."""
-        return as_model(self.balance, self.written.terms, self.written_values)
+        return as_model(self.written.balance, self.written.terms, self.written_values)
 
 
 def diagnose(
@@ -348,20 +356,22 @@ def _written(story: Story, gates: Gates) -> Story:
     if all(claim.part.map is None for claim in story.claims):
         return replace(story, written=story.after, written_values=story.values)
     kept: list[Claim] = []
-    parts: list[Part] = []
     refused = list(story.refused)
     last = story.before
     for claim in story.claims:
-        trial = freeze(story.balance, [*parts, claim.written])
+        parts = [c.written for c in (*kept, claim)]
+        trial = (settled if claim.formulas else freeze)(story.balance, parts)
         reason = _refusal(last, trial, story.confirm, gates) if claim.formulas else None
-        if reason is None:
-            parts.append(claim.written)
-            kept.append(claim)
-            last = trial
-        else:
-            kept.append(replace(claim, formulas=()))
+        if reason is not None:
             refused.append(f"the formula {claim.formulas[0].text}: {reason}")
-    values = tuple(intervals(story.balance, last.terms, seed=0))
+            kept.append(replace(claim, formulas=()))
+            continue
+        if claim.formulas:
+            best, *others = claim.formulas
+            claim = replace(claim, formulas=(best.settled(trial.terms, trial.weights), *others))
+        kept.append(claim)
+        last = trial
+    values = tuple(intervals(last.balance, last.terms, seed=0))
     return replace(
         story, claims=tuple(kept), refused=tuple(refused), written=last, written_values=values
     )
@@ -413,7 +423,7 @@ def _findings(story: Story) -> list[tuple[Finding, Added]]:
                     depends_on=claim.depends_on,
                     confidence=named.confidence if named else None,
                     parameters=_parameters(story, named.candidate) if named else {},
-                    formulas=_stated(story, k, samples),
+                    formulas=_stated(story, claim, samples),
                 ),
                 _added(last, now, story.balance.runs),
             )
@@ -422,15 +432,17 @@ def _findings(story: Story) -> list[tuple[Finding, Added]]:
     return found
 
 
-def _stated(story: Story, k: int, samples: float) -> tuple[Stated, ...]:
-    """Return the formulas of the k-th claim; the first is written, and its error is confirmed."""
-    found = story.claims[k].formulas
+def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
+    """Return the formulas of a claim; the first is written, and its error is confirmed.
+
+    A map is the last of a balance's claims, so the written model is the one with its formula.
+    """
+    found = claim.formulas
     if not found:
         return ()
-    written = freeze(story.balance, [c.written for c in story.claims[: k + 1]])
-    left = squares(written, story.confirm, at_rest=True).sum()
-    errors_ = [float(np.sqrt(left / samples)), *(None for _ in found[1:])]
-    return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, errors_, strict=True))
+    left = squares(story.written, story.confirm, at_rest=True).sum()
+    confirmed = [float(np.sqrt(left / samples)), *(None for _ in found[1:])]
+    return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, confirmed, strict=True))
 
 
 def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:

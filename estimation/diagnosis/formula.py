@@ -16,9 +16,17 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import columns_at
 from estimation.diagnosis.evidence import leave_one_run_out
-from estimation.diagnosis.maps import LOAD, ORDERS, PLAYS, PROJECTED_LOAD, SIMPLER, Basis, Map
-from estimation.effects.roles import CHANNELS as PLAYED_BY
-from estimation.effects.unknown_product import Product, product, product_id
+from estimation.diagnosis.formula_library import (
+    Unary,
+    candidate,
+    library,
+    live_channel,
+    named,
+    values,
+    word,
+)
+from estimation.diagnosis.maps import SIMPLER, Map
+from estimation.effects.unknown_product import Product
 from estimation.recording import FloatArray
 
 MOST_TERMS = 4
@@ -62,14 +70,16 @@ class Formula:
             parts.append(f"{weight:.3g} {kind.in_words(names, term.shape)}")
         return " + ".join(parts).replace("+ -", "- ")
 
+    def settled(self, terms: Sequence[Candidate], weights: FloatArray) -> "Formula":
+        """Return the same formula as it stands at the end of a joint fit's effects.
 
-@dataclass(frozen=True)
-class _Unary:
-    """A function of one variable at one shape; None for the constant."""
-
-    form: str | None
-    channel: str
-    shape: tuple[float, ...] = ()
+        Args:
+            terms: All effects of the fit, those of the formula last.
+            weights: Their amplitudes; a formula's term has one each.
+        """
+        count = len(self.terms)
+        own = tuple(float(w) for w in weights[-count:])
+        return replace(self, terms=tuple(terms[-count:]), weights=own)
 
 
 @dataclass
@@ -99,7 +109,7 @@ class _Pursuit:
 
     balance: Balance
     known: Sequence[Candidate]
-    libraries: Sequence[Sequence[_Unary]]
+    libraries: Sequence[Sequence[Unary]]
     values: list[FloatArray] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -109,8 +119,8 @@ class _Pursuit:
         self.left = [r[::step] for r in self.balance.left(self.known)]
         self.cuts = np.cumsum([len(r) for r in self.left])[:-1]
         self.values = [
-            np.vstack([_values(library, run.channels)[run.kept][::step] for run in runs])
-            for library in self.libraries
+            np.vstack([values(functions, run.channels)[run.kept][::step] for run in runs])
+            for functions in self.libraries
         ]
         fixed = np.vstack(self.base)
         if self.balance.demean:
@@ -141,14 +151,14 @@ class _Pursuit:
         best: dict[str, tuple[int, int]] = {}
         for at in np.argsort(-score, axis=None):
             i, j = np.unravel_index(at, score.shape)
-            forms = _named(self.libraries[0][i], self.libraries[1][j])
+            forms = named(self.libraries[0][i], self.libraries[1][j])
             if not forms or score[i, j] <= 0 or len(best) == TRIED:
                 continue
             best.setdefault(f"{forms}{self._channels(int(i), int(j))}", (int(i), int(j)))
         found = []
         for i, j in best.values():
             pair = (self.libraries[0][i], self.libraries[1][j])
-            found.append(self._with(partial, _candidate(*pair), first[:, i] * second[:, j]))
+            found.append(self._with(partial, candidate(*pair), first[:, i] * second[:, j]))
         return self._scored(found)
 
     def refined(self, found: Sequence[_Partial]) -> list[_Partial]:
@@ -215,12 +225,12 @@ def formulas(balance: Balance, terms: Sequence[Candidate], found: Map) -> tuple[
         At most `NEAR_EQUAL`; none where a variable has no channel that a model can read live, or
         where no formula predicts a run left out.
     """
-    channels = {basis.variable: _channel(balance, basis) for basis in found.bases}
+    channels = {basis.variable: live_channel(balance, basis) for basis in found.bases}
     if None in channels.values():
         return ()
-    libraries = [_library(basis, str(channels[basis.variable])) for basis in found.bases]
-    constant = [_Unary(None, "")]
-    pair = [[*constant, *library] for library in libraries] + [constant] * (2 - len(libraries))
+    libraries = [library(basis, str(channels[basis.variable])) for basis in found.bases]
+    constant = [Unary(None, "")]
+    pair = [[*constant, *functions] for functions in libraries] + [constant] * (2 - len(libraries))
     pursuit = _Pursuit(balance, terms, pair)
     kept = [pursuit.start()]
     every: list[_Partial] = []
@@ -234,7 +244,7 @@ def formulas(balance: Balance, terms: Sequence[Candidate], found: Map) -> tuple[
         every += kept
     near = [one for one in every if one.gain >= (1 - SIMPLER) * reached]
     near.sort(key=lambda one: (len(one.terms), -one.gain))
-    words = {str(channels[basis.variable]): _word(basis) for basis in found.bases}
+    words = {str(channels[basis.variable]): word(basis) for basis in found.bases}
     return tuple(_fitted(balance, terms, one.terms, words) for one in near[:NEAR_EQUAL])
 
 
@@ -257,76 +267,6 @@ def _distinct(found: Sequence[_Partial]) -> list[_Partial]:
     for one in sorted(found, key=lambda one: -one.gain):
         best.setdefault(tuple(sorted((t.id, t.channels) for t in one.terms)), one)
     return list(best.values())
-
-
-def _channel(balance: Balance, basis: Basis) -> str | None:
-    """Return the channel that a model reads for a variable, or None where it has none."""
-    channel = basis.channel
-    if channel == PROJECTED_LOAD:
-        channel = LOAD
-        if balance.model.target == LOAD:
-            # the balance's own sensor is what is estimated: another tells the load
-            (channel, *_) = PLAYED_BY.get(balance.model.balance, {}).get("load", ("",))
-    return channel if all(channel in run.channels for run in balance.runs) else None
-
-
-def _word(basis: Basis) -> str:
-    return {"velocity_sign": "velocity", "history": "spindle_angle"}.get(
-        basis.variable, basis.variable
-    )
-
-
-def _library(basis: Basis, channel: str) -> list[_Unary]:
-    """Return the functions of one variable that are tried."""
-    span, low, high = basis.high - basis.low, basis.low, basis.high
-
-    def made(form: str, *shapes: tuple[float, ...]) -> list[_Unary]:
-        return [_Unary(form, channel, shape) for shape in shapes or ((),)]
-
-    if basis.variable == "history":
-        return made("play", *((0.5 * share * span,) for share in PLAYS))
-    if basis.variable == "motor_angle":
-        waves = [(float(k),) for k in range(1, ORDERS + 1)]
-        return made("sine", *waves) + made("cosine", *waves)
-    signs = made("sign", *((share * span,) for share in (0.005, 0.02, 0.08)))
-    if basis.variable == "velocity_sign":
-        return signs
-    waves = [(2 * math.pi * turns / span,) for turns in (0.5, 1.0, 2.0, 3.0)]
-    places = [float(x) for x in np.linspace(low, high, 9)]
-    bumps = [(w * span, c / (w * span)) for w in (0.08, 0.15, 0.3) for c in places]
-    steps = [(0.05 * span, c / (0.05 * span)) for c in places[1:-1]]
-    library = [*made("value"), *made("square"), *made("cube")]
-    library += made("sine", *waves) + made("cosine", *waves)
-    library += made("bump", *bumps) + made("step", *steps)
-    return library + made("absolute") + signs if low < 0 < high else library
-
-
-def _values(library: Sequence[_Unary], channels: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the functions of one library on a whole run, shape (n, functions)."""
-    length = len(next(iter(channels.values())))
-    columns = []
-    for unary in library:
-        kind = product(product_id(unary.form)) if unary.form else None
-        if kind is None:
-            columns.append(np.ones(length))
-        else:
-            columns.append(kind.columns({"first": channels[unary.channel]}, unary.shape)[:, 0])
-    return np.column_stack(columns)
-
-
-def _named(*unary: _Unary) -> list[str]:
-    return [one.form for one in unary if one.form]
-
-
-def _candidate(*unary: _Unary) -> Candidate:
-    """Return the product of functions as a term of a model, on the side of the estimate."""
-    factors = [one for one in unary if one.form]
-    return Candidate(
-        product_id(*_named(*unary)),
-        1,
-        tuple(zip(("first", "second"), (one.channel for one in factors), strict=False)),
-        tuple(value for one in factors for value in one.shape),
-    )
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:

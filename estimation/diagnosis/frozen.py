@@ -13,6 +13,10 @@ from estimation.diagnosis.maps import RIDGE, Map
 from estimation.diagnosis.result import Error
 from estimation.recording import FloatArray
 
+ROUNDS = 30
+SETTLED = 1e-3
+"""Shapes are settled when a round lowers the squared error by less than this share of it."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -65,6 +69,25 @@ def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
     if balance.demean:
         level = float(np.mean([frozen.error(run).mean() for run in balance.runs]))
     return replace(frozen, level=level)
+
+
+def settled(balance: Balance, parts: Sequence[Part]) -> Frozen:
+    """Fit declared effects and the parts' effects together, amplitudes and shapes, and freeze.
+
+    Args:
+        balance: The balance on the runs that discover.
+        parts: Effects and formulas; a map has no shape to settle.
+    """
+    terms = [*balance.terms, *(term for part in parts for term in part.terms)]
+    loss = balance.loss(terms)
+    for _ in range(ROUNDS):
+        terms = balance.refined(terms, passes=3)
+        before, loss = loss, balance.loss(terms)
+        if before - loss < SETTLED * loss:
+            break
+    declared = len(balance.terms)
+    moved = replace(balance, terms=terms[:declared])
+    return freeze(moved, [Part(formula=tuple(terms[declared:]))])
 
 
 def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]) -> FloatArray:

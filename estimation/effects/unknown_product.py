@@ -14,7 +14,7 @@ UNKNOWN = "unknown"
 ROLES = {"first": "spindle_angle_rad", "second": "motor_velocity_rad_s"}
 MOST_FACTORS = len(ROLES)
 
-_SCALES = (1e-5, 1e4)
+_SCALES = (1e-6, 1e6)
 
 
 class Form(NamedTuple):
@@ -186,7 +186,7 @@ def _parameter(role: str, name: str, unit: str, meaning: str) -> Parameter:
     full, own = f"{role}_{name}", unit.format(role=role)
     if name == "place":
         return Parameter(full, own, meaning, -200.0, 200.0, linear=True, points=801)
-    return Parameter(full, own, meaning, *_SCALES, points=93)
+    return Parameter(full, own, meaning, *_SCALES, points=124)
 
 
 @numba.njit(cache=True)

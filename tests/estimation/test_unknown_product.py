@@ -31,7 +31,7 @@ def test_columns_and_live_steps_agree_also_after_a_sample_that_is_not_finite(for
     random = np.random.default_rng(3)
     inputs = {role: np.cumsum(random.normal(size=200)) * 0.1 for role in kind.roles}
     inputs["first"][50] = np.nan
-    shape = [p.upper / 1e4 if p.name.endswith("order") else 0.3 for p in kind.shape]
+    shape = [1.7 if p.name.endswith("order") else 0.3 for p in kind.shape]
     columns = kind.columns(inputs, shape)[:, 0]
     state = kind.start()
     live = [
