@@ -107,6 +107,31 @@ class Balance:
                     best[i] = self._along(best, i, k, width)
         return best
 
+    def stepped(self, terms: Sequence[Candidate]) -> list[Candidate]:
+        """Return the effects after one Gauss-Newton step of all shapes together.
+
+        It is halved until the error falls; where it never does, they stay as they are. Shapes that
+        lean on one another, as the place and width of a bump, settle so and not one by one.
+        """
+        places = [(i, k) for i, term in enumerate(terms) for k in range(len(term.shape))]
+        if not places:
+            return list(terms)
+        base, left = np.vstack(self.base(terms)), np.concatenate(self.left(terms))
+        scale = np.maximum(np.linalg.norm(base, axis=0), np.finfo(float).tiny)
+        found = np.linalg.lstsq(base / scale, left, rcond=1e-8)[0] / scale
+        steps = np.clip(found[-len(places) :], -1.0, 1.0)
+        least = self.loss(terms)
+        for share in 0.5 ** np.arange(6):
+            moved = list(terms)
+            for (i, k), one in zip(places, steps, strict=True):
+                moved[i] = moved[i].moved(k, share * float(one))
+            loss = self.loss(moved)
+            if loss < least:
+                return moved
+            for term in moved:
+                self.tables_of.pop(term, None)  # a point of a search, not to be kept
+        return list(terms)
+
     def _along(self, terms: list[Candidate], i: int, k: int, width: float) -> Candidate:
         """Return effect i with its k-th shape at the best value near where it stands."""
         term = terms[i]

@@ -14,7 +14,7 @@ from estimation.diagnosis.result import Error
 from estimation.recording import FloatArray
 
 ROUNDS = 30
-SETTLED = 1e-3
+SETTLED = 1e-5
 """Shapes are settled when a round lowers the squared error by less than this share of it."""
 
 
@@ -79,11 +79,11 @@ def settled(balance: Balance, parts: Sequence[Part]) -> Frozen:
         parts: Effects and formulas; a map has no shape to settle.
     """
     terms = [*balance.terms, *(term for part in parts for term in part.terms)]
-    loss = balance.loss(terms)
+    terms = balance.refined(terms, passes=3)
     for _ in range(ROUNDS):
-        terms = balance.refined(terms, passes=3)
-        before, loss = loss, balance.loss(terms)
-        if before - loss < SETTLED * loss:
+        before = balance.loss(terms)
+        terms = balance.stepped(terms)
+        if before - balance.loss(terms) < SETTLED * before:
             break
     declared = len(balance.terms)
     moved = replace(balance, terms=terms[:declared])
