@@ -54,7 +54,7 @@ def demo(
 def _told(result: "Demo") -> list[str]:
     """Return what was found, where it lies, and what to type next."""
     from rig.demo import MODEL
-    from rig.reports.diagnosis import sentences
+    from rig.reports.diagnosis_words import sentences
 
     lines = [f"{len(result.runs)} runs, {sum(r.samples for r in result.runs)} samples."]
     if not result.firmware:

@@ -57,7 +57,8 @@ def diagnose(
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import declared_models, run_diagnosis
     from rig.errors import UsageError
-    from rig.reports.diagnosis import page, sentences
+    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis_words import sentences
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
 

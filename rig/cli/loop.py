@@ -42,7 +42,8 @@ def loop(
     from rig.diagnosis.run import declared_models
     from rig.errors import UsageError
     from rig.protocol import load_protocol
-    from rig.reports.diagnosis import next_sentence, page, sentences
+    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis_words import next_sentence, sentences
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
     from rig.simulation.hidden import chosen

@@ -52,6 +52,23 @@ def test_the_demo_finds_what_it_hid_on_runs_not_touched(demo, told):
     assert "ripple.motor" in {t.effect.id for t in model_file.read(Path(told["model"])).terms}
 
 
+def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
+    page = (demo / "diagnosis.html").read_text()
+    found = told["diagnosis"]
+    assert page.count("<svg") == 2
+    assert (
+        "ripple.motor is missing, torque that repeats with the motor&#39;s turn (amplitude" in page
+    )
+    assert "runs not touched" in page
+    assert all(run in page for run in found["runs"]["confirm"])
+    for part in ("Parameters of what was found", "Declared parameters: motor", "What was tried"):
+        assert part in page
+    for part in ("What else it could be", "What this cannot tell", "Next experiment"):
+        assert f"<h2>{part}</h2>" in page
+    for note in ("simulated twins", "has not been calibrated"):
+        assert note in page
+
+
 def test_the_first_look_keeps_off_the_runs_that_prove(demo, told):
     confirm = told["diagnosis"]["runs"]["confirm"]
     assert told["held_out"]["runs"] == 14 - len(confirm)
