@@ -54,7 +54,9 @@ def loop(
     now = datetime.now()
     number = seed if seed is not None else int(now.timestamp()) % 1000
     hidden = chosen(hide, number)
-    settings = load_config().changed(simulation={"seed": number, "hidden": hidden})
+    settings = load_config().changed(
+        simulation={"seed": number, "hidden": hidden, "plant": "declared"}
+    )
     folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
     screen.print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
     first = load_protocol(protocol) if protocol else None
