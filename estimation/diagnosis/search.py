@@ -21,8 +21,9 @@ from estimation.diagnosis.evidence import (
 from estimation.diagnosis.maps import Map, best_map
 from estimation.recording import FloatArray
 
-TwinNull = Callable[[float], float]
-"""Fall of squared error (target unit squared, pooled mean) to its p-value under the twin."""
+TwinNull = Callable[[float, float], float]
+"""Fall of squared error (target unit squared, pooled mean) and its share of the error it falls
+from, to its p-value under the twin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +288,9 @@ class Search:
         if self.twin is None or not trial.stands_out(self.gates):
             return trial
         samples = sum(len(y) for y in self.balance.target)
-        return replace(trial, p_twin=self.twin(trial.worth * self.declared_loss / samples))
+        return replace(
+            trial, p_twin=self.twin(trial.worth * self.declared_loss / samples, trial.gain)
+        )
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
