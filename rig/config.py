@@ -158,6 +158,7 @@ class SimulationSection(_Section):
         hidden: Hidden effect to strength; effects that no declared model is told of.
         draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
         firmware: Put the compiled firmware core in the loop where it is built.
+        plant: `measured`, with losses that no declared model holds, or `declared`, without them.
     """
 
     seed: int = 0
@@ -165,6 +166,7 @@ class SimulationSection(_Section):
     hidden: dict[str, Number] = Field(default_factory=dict)
     draw_hidden: int | None = None
     firmware: bool = True
+    plant: Literal["measured", "declared"] = "measured"
 
 
 class Config(_Section):

@@ -220,7 +220,7 @@ def diagnose(
 ) -> None:
     """Ask the diagnosis what a calibration of a force-sensing resistor lacks, on its raw logs."""
     from rig.calibrate.diagnose import diagnose_record
-    from rig.reports.diagnosis import sentences
+    from rig.reports.diagnosis_words import sentences
 
     screen = console()
     found = diagnose_record(

@@ -58,7 +58,8 @@ def diagnose(
     from rig.diagnosis.run import declared_models, run_diagnosis
     from rig.diagnosis.written import with_cost_of_causal_filters
     from rig.errors import UsageError
-    from rig.reports.diagnosis import page, sentences
+    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis_words import sentences
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
 

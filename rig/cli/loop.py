@@ -42,7 +42,8 @@ def loop(
     from rig.diagnosis.run import declared_models
     from rig.errors import UsageError
     from rig.protocol import load_protocol
-    from rig.reports.diagnosis import next_sentence, page, sentences
+    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis_words import next_sentence, sentences
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
     from rig.simulation.hidden import chosen
@@ -53,7 +54,9 @@ def loop(
     now = datetime.now()
     number = seed if seed is not None else int(now.timestamp()) % 1000
     hidden = chosen(hide, number)
-    settings = load_config().changed(simulation={"seed": number, "hidden": hidden})
+    settings = load_config().changed(
+        simulation={"seed": number, "hidden": hidden, "plant": "declared"}
+    )
     folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
     screen.print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
     first = load_protocol(protocol) if protocol else None

@@ -1,5 +1,6 @@
 """A diagnosis on one page: the sentence, the plots, the numbers, and what it cannot tell."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,91 +11,19 @@ from estimation.diagnosis.design import Run
 from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.frozen import Frozen
 from estimation.diagnosis.maps import CHANNELS
-from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
 from rig.reports import figures
+from rig.reports.diagnosis_words import display, next_sentence, other_sentences, sentences
 from rig.reports.provenance import Provenance
 from rig.reports.render import render
 from rig.reports.table import TextTable
 
-NO_NEXT = "None is proposed: there are no rivals to tell apart."
 CONFIDENCE = (
     "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
     " gain is real and general; it has not been calibrated on known cases."
 )
-
-
-def sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what may be said, one sentence a finding."""
-    if not diagnosis.findings:
-        runs = len(diagnosis.sealed.confirm)
-        lines = [
-            f"Nothing is missing above the floor in {', '.join(diagnosis.errors)}: no effect or map"
-            f" passes every gate and holds on the {runs} confirm runs."
-        ]
-    else:
-        lines = [_sentence(f, diagnosis.unit[f.balance]) for f in diagnosis.findings]
-    return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
-
-
-def _sentence(finding: Finding, unit: str) -> str:
-    scale, shown = _display(unit)
-    fall = (
-        f"error on {finding.runs_total} runs not touched falls from"
-        f" {scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {shown}"
-        f" ({finding.runs_improved} of {finding.runs_total} runs better)"
-    )
-    also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
-    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{_formula(finding, unit)}"
-
-
-def _formula(finding: Finding, unit: str) -> str:
-    """Return the formula that a model file holds, in words; empty without one."""
-    if not finding.formulas:
-        return ""
-    best = finding.formulas[0]
-    scale, shown = _display(unit)
-    left = (
-        "" if best.rmse_after is None else f", which leaves {scale * best.rmse_after:.3g} {shown}"
-    )
-    more = len(finding.formulas) - 1
-    others = f"; {more} more do about as well" if more else ""
-    return f" As a formula: {best.text} (SI units){left}{others}."
-
-
-def _claim(finding: Finding) -> str:
-    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
-    sure = "" if finding.confidence is None else f" (confidence {finding.confidence:.0%})"
-    if finding.verdict == "identified":
-        return f"{finding.family} is missing{sure}"
-    if finding.verdict == "one_of":
-        others = ", ".join(finding.alternatives) or "another effect"
-        return f"{finding.family} is missing{sure}, or {others}: these runs do not tell"
-    if finding.verdict == "depends_on":
-        return f"an effect of unknown form is missing; it depends on {words}"
-    return "something is missing, and these runs do not tell what"
-
-
-def next_sentence(diagnosis: Diagnosis) -> str:
-    """Return what to record next and why."""
-    proposed = diagnosis.next_experiment
-    if proposed is None:
-        return NO_NEXT
-    rivals = (
-        " from ".join(proposed["between"][:2])
-        if len(proposed["between"]) == 2
-        else (", ".join(proposed["between"]) + " from each other")
-    )
-    if proposed["protocol"] is None:
-        return f"To tell {rivals}: {proposed['description']}."
-    others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())
-    return (
-        f"To tell {rivals}, record {proposed['name']!r}: {proposed['description']}"
-        f" ({proposed['seconds']:.0f} s). What the worse rival cannot imitate there is"
-        f" {proposed['discrimination']:.3g} times the variance of the noise; of the other"
-        f" experiments on the menu: {others}."
-    )
 
 
 def page(done: Diagnosed, provenance: Provenance) -> str:
@@ -119,6 +48,7 @@ def page(done: Diagnosed, provenance: Provenance) -> str:
             "story": story,
             "figures": drawn,
             "tables": tables(done),
+            "others": other_sentences(diagnosis),
             "limits": [*diagnosis.notes, CONFIDENCE],
             "next_experiment": next_sentence(diagnosis),
             "provenance": provenance,
@@ -134,18 +64,14 @@ def tables(done: Diagnosed) -> list[TextTable]:
     if any(f.formulas for f in done.diagnosis.findings):
         shown.append(_formulas(done.diagnosis))
     for name, story in done.stories.items():
-        shown += [_tried(name, story), _moved(done.diagnosis, name)]
+        shown += [_tried(done.diagnosis, name, story), _moved(done.diagnosis, name, story)]
     return shown
-
-
-def _display(unit: str) -> tuple[float, str]:
-    return (1e3, "mN m") if unit == "N m" else (1.0, unit)
 
 
 def _errors(diagnosis: Diagnosis) -> TextTable:
     rows = []
     for name, error in diagnosis.errors.items():
-        scale, unit = _display(diagnosis.unit[name])
+        scale, unit = display(diagnosis.unit[name])
         low, high = error.ratio_ci95
         values = (error.before, error.after, error.with_means_before, error.with_means_after)
         rows.append([name, *(f"{scale * v:.3g}" for v in values), f"{low:.2f} to {high:.2f}", unit])
@@ -161,12 +87,11 @@ def _errors(diagnosis: Diagnosis) -> TextTable:
 
 
 def _parameters(findings: Sequence[Finding]) -> TextTable:
-    rows = []
-    for finding in findings:
-        for name, known in finding.parameters.items():
-            interval = "" if known.ci95 is None else f"{known.ci95[0]:.3g} to {known.ci95[1]:.3g}"
-            cells = [f"{known.value:.4g}", interval, known.unit]
-            rows.append([f"{finding.balance}, {finding.family}, {name}", *cells])
+    rows = [
+        [f"{finding.balance}, {finding.family}, {name}", *_with_interval(known)]
+        for finding in findings
+        for name, known in finding.parameters.items()
+    ]
     columns = ["parameter", "value", "95 %", "unit"]
     return TextTable("Parameters of what was found", columns, rows, "Bootstrap over runs.")
 
@@ -174,7 +99,7 @@ def _parameters(findings: Sequence[Finding]) -> TextTable:
 def _formulas(diagnosis: Diagnosis) -> TextTable:
     rows = []
     for finding in diagnosis.findings:
-        scale, unit = _display(diagnosis.unit[finding.balance])
+        scale, unit = display(diagnosis.unit[finding.balance])
         for one in finding.formulas:
             left = "" if one.rmse_after is None else f"{scale * one.rmse_after:.3g} {unit}"
             rows.append([f"{finding.balance}: {one.text}", f"{100 * one.gain:.1f} %", left])
@@ -188,12 +113,24 @@ def _formulas(diagnosis: Diagnosis) -> TextTable:
     )
 
 
-def _tried(name: str, story: Story) -> TextTable:
+def _with_interval(known: Value) -> list[str]:
+    """Return value, interval and unit, with the digits that the interval leaves."""
+    scale, unit = display(known.unit)
+    if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
+        return [f"{scale * known.value:.4g}", "", unit]
+    low, high = (scale * end for end in known.ci95)
+    places = max(0, 1 - math.floor(math.log10(high - low)))
+    return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
+
+
+def _tried(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
     rows = []
+    claimed = {f.family for f in diagnosis.findings if name in (f.balance, *f.also_in)}
     for k, step in enumerate(story.discovery.steps, start=1):
         twin = "" if step.p_twin is None else f"{step.p_twin:.3f}"
         cells = [f"{100 * step.gain:.1f} %", f"{step.p:.3f}", twin, f"{step.agree:.3f}"]
-        rows.append([f"step {k}: {step.family}", *cells])
+        said = "claimed" if step.family in claimed else "not claimed"
+        rows.append([f"step {k}: {step.family}, {said}", *cells])
     for trial in story.discovery.ranking[1:6]:
         cells = [f"{100 * trial.gain:.1f} %", f"{trial.p:.3f}", "", f"{trial.agree:.3f}"]
         rows.append([f"at first also: {trial.family}", *cells])
@@ -210,12 +147,19 @@ def _tried(name: str, story: Story) -> TextTable:
     )
 
 
-def _moved(diagnosis: Diagnosis, name: str) -> TextTable:
-    rows = [
-        [key, f"{value['before']:.4g}", f"{value['after']:.4g}"]
-        for key, value in diagnosis.moved[name].items()
-    ]
-    return TextTable(f"Declared parameters: {name}", ["parameter", "before", "after"], rows)
+def _moved(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
+    model = story.balance.model
+    units = {
+        f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
+        for term in model.terms
+        for parameter in term.parameters
+    }
+    rows = []
+    for key, value in diagnosis.moved[name].items():
+        scale, unit = display(units.get(key, ""))
+        rows.append([key, f"{scale * value['before']:.4g}", f"{scale * value['after']:.4g}", unit])
+    columns = ["parameter", "before", "after", "unit"]
+    return TextTable(f"Declared parameters: {name}", columns, rows)
 
 
 def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
@@ -229,7 +173,7 @@ def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
     x = np.concatenate([run.channels[channel][run.used] for run in story.confirm])
     if channel == "motor_angle_rad":
         x = np.mod(x, 2 * np.pi)
-    scale, unit = _display(story.balance.model.unit)
+    scale, unit = display(story.balance.model.unit)
     label = f"{variable.replace('_', ' ')}, {unit_of(channel)}"
     panels = [
         figures.Panel(f"{label}: {when}", x, scale * _left(model, story.confirm))
@@ -249,10 +193,10 @@ def _left(model: Frozen, runs: Sequence[Run]) -> FloatArray:
 
 def _by_run(diagnosis: Diagnosis, name: str) -> tuple[str, Markup]:
     error = diagnosis.errors[name]
-    scale, unit = _display(diagnosis.unit[name])
-    bars = {}
-    for run, before in error.by_run_before.items():
-        bars[f"{run} before"] = scale * before
-        bars[f"{run} after"] = scale * error.by_run_after[run]
+    scale, unit = display(diagnosis.unit[name])
+    pairs = {
+        run: (scale * before, scale * error.by_run_after[run])
+        for run, before in error.by_run_before.items()
+    }
     caption = f"{name}: error of each confirm run before and after."
-    return caption, figures.bars(bars, f"rmse, {unit}", caption)
+    return caption, figures.paired_bars(pairs, ("before", "after"), f"rmse, {unit}", caption)

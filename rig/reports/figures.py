@@ -33,6 +33,9 @@ _STYLE: dict[Any, Any] = {
 POINTS = 1500
 """Most points a line is drawn with."""
 
+LETTERS = 100
+"""Names of a bar chart stand side by side up to so many letters together, then upright."""
+
 
 def _drawn(figure: Figure, caption: str) -> Markup:
     """Return a figure as an SVG element that refers to nothing outside itself."""
@@ -192,6 +195,31 @@ def bars(
         ax.grid(visible=False, axis="x")
         ax.set_ylabel(unit)
         ax.margins(x=0.01)
+    return _drawn(figure, caption)
+
+
+def paired_bars(
+    values: Mapping[str, tuple[float, float]], sides: tuple[str, str], unit: str, caption: str
+) -> Markup:
+    """Draw two bars a name, side by side.
+
+    Args:
+        values: Name to the two values.
+        sides: What the first and the second of them are.
+        unit: Name and unit of the values.
+        caption: What is seen.
+    """
+    figure, (ax,) = _axes(7.2, 2.2)
+    with mpl.rc_context(_STYLE):
+        place = np.arange(len(values))
+        for k, (side, colour) in enumerate(zip(sides, COLOURS, strict=False)):
+            heights = [pair[k] for pair in values.values()]
+            ax.bar(place + 0.36 * (k - 0.5), heights, color=colour, width=0.34, label=side)
+        crowded = sum(map(len, values)) > LETTERS
+        ax.set_xticks(place, list(values), rotation=90 if crowded else 0, fontsize=7)
+        ax.grid(visible=False, axis="x")
+        ax.set_ylabel(unit)
+        _legend_above(ax)
     return _drawn(figure, caption)
 
 

@@ -6,6 +6,7 @@ from drivers.transport.simulated import Board, SimulatedTransport
 from rig.config import SimulationSection
 from rig.simulation import hidden, parameters
 from rig.simulation.bench import SimulatedBench
+from rig.simulation.fitted import DECLARED_PLANT
 
 PACED_STEP_S = 0.05
 UNPACED_STEP_S = 0.2
@@ -53,7 +54,9 @@ def plant_and_sensors(
     effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
     if simulation.draw_hidden is not None:
         effects.append(hidden.draw(simulation.draw_hidden))
-    plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
+    declared = simulation.plant == "declared"
+    plant = DECLARED_PLANT if declared else parameters.PlantParameters()
+    sensors = parameters.SensorParameters()
     if simulation.spread:
         plant = parameters.vary(plant, simulation.seed, simulation.spread)
         sensors = parameters.vary(sensors, simulation.seed, simulation.spread)

@@ -1,11 +1,16 @@
 """The demonstration and the fit, as a user runs them."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from estimation import model_file
+from estimation.diagnosis.split import evidence
 from rig.cli.main import main
+from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.schema import DiagnosisSchema
+from rig.importers.registry import open_campaign
 from rig.log.reader import read_log
 
 
@@ -26,13 +31,54 @@ def told(demo):
     return json.loads(out.getvalue())
 
 
-def test_the_demo_leaves_logs_a_model_and_a_report(demo, told):
-    assert len(list((demo / "logs").glob("*.mcap"))) == 12
-    page = (demo / "report.html").read_text()
-    assert "<svg" in page
-    assert "http" not in page.replace("http://www.w3.org", "")
-    assert told["report"] == str(demo / "report.html")
+def test_the_demo_leaves_logs_a_model_and_two_pages(demo, told):
+    assert len(list((demo / "logs").glob("*.mcap"))) == 14
+    for name, path in (("diagnosis.html", told["report"]), ("first_look.html", told["first_look"])):
+        page = (demo / name).read_text()
+        assert "<svg" in page
+        assert "http" not in page.replace("http://www.w3.org", "")
+        assert path == str(demo / name)
     assert told["structures"]
+
+
+def test_the_demo_finds_what_it_hid_on_runs_not_touched(demo, told):
+    found = told["diagnosis"]
+    DiagnosisSchema.model_validate(found)
+    (finding,) = found["findings"]
+    assert (finding["verdict"], finding["family"]) == ("identified", "ripple.motor")
+    assert finding["runs_improved"] == finding["runs_total"] == len(found["runs"]["confirm"])
+    assert found["rmse_after"]["motor"] < 0.75 * found["rmse_before"]["motor"]
+    assert found["exploratory"] is False
+    assert "ripple.motor" in {t.effect.id for t in model_file.read(Path(told["model"])).terms}
+
+
+def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
+    page = (demo / "diagnosis.html").read_text()
+    found = told["diagnosis"]
+    assert page.count("<svg") == 2
+    assert (
+        "ripple.motor is missing, torque that repeats with the motor&#39;s turn (amplitude" in page
+    )
+    assert "runs not touched" in page
+    assert all(run in page for run in found["runs"]["confirm"])
+    for part in ("Parameters of what was found", "Declared parameters: motor", "What was tried"):
+        assert part in page
+    for part in ("What else it could be", "What this cannot tell", "Next experiment"):
+        assert f"<h2>{part}</h2>" in page
+    for note in ("simulated twins", "has not been calibrated"):
+        assert note in page
+
+
+def test_the_first_look_keeps_off_the_runs_that_prove(demo, told):
+    confirm = told["diagnosis"]["runs"]["confirm"]
+    assert told["held_out"]["runs"] == 14 - len(confirm)
+    page = (demo / "first_look.html").read_text()
+    assert not [name for name in confirm if name in page]
+
+
+def test_the_demo_remembers_what_it_looked_at(demo, told):
+    recordings = evidence(open_campaign(demo / "logs"))
+    assert Ledger(Path(told["ledger"])).known(recordings) == {r.name for r in recordings}
 
 
 def test_the_hidden_effect_is_not_told_to_whoever_reads_the_logs(demo, told):
@@ -51,7 +97,7 @@ def test_a_fit_reports_the_error_on_runs_it_was_not_fitted_on(demo, told, tmp_pa
     assert main(words) == 0
     result = json.loads(capsys.readouterr().out)
     assert 0 < result["held_out"]["rmse"] < 0.05
-    assert result["held_out"]["runs"] == 12
+    assert result["held_out"]["runs"] == 14
     fitted = model_file.read(out)
     assert fitted.is_fitted
     assert main(["replay", str(demo / "logs"), "--model", str(out), "--speed", "0", "--json"]) == 0

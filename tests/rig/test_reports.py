@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
+from estimation.diagnosis.result import Value
+from estimation.effects import catalogue
 from estimation.fitting import fit
 from estimation.model_file import read, shipped
 from estimation.residual import largest_structure
 from rig.reports import figures
+from rig.reports.diagnosis_words import meaning, sizes_of
 from rig.reports.first_look import first_look
 from rig.reports.oneill import page
 from rig.reports.provenance import Provenance, commit
@@ -159,6 +162,34 @@ def test_bins_with_few_samples_are_left_out():
     assert centres == pytest.approx([0.05, 0.95])
     assert mean == pytest.approx([0.0, 1.0])
     assert np.all(low <= high)
+
+
+def test_names_under_pairs_of_bars_stand_upright_when_they_would_touch():
+    few = figures.paired_bars({"a": (2.0, 1.0)}, ("before", "after"), "N m", "few")
+    runs = {f"{k:03d}-fourier-0.95A": (2.0, 1.0) for k in range(9)}
+    many = figures.paired_bars(runs, ("before", "after"), "N m", "many")
+    assert "rotate(-90)" in many.replace(" ", "")
+    assert "008-fourier-0.95A" in many
+    for drawn in (few, many):
+        assert "before" in drawn
+        assert "after" in drawn
+
+
+@pytest.mark.parametrize("family", sorted({e.family for e in catalogue().values()}))
+def test_every_family_has_a_meaning_in_plain_words(family):
+    words = meaning(family)
+    assert words
+    assert not words.endswith(".")
+
+
+def test_sizes_are_those_of_the_wave_and_in_readable_units():
+    wave = {
+        "sine": Value(3e-3, "N m", None),
+        "cosine": Value(4e-3, "N m", None),
+        "order": Value(7.0, "1", None),
+        "time": Value(0.25, "s", None),
+    }
+    assert sizes_of(wave) == {"amplitude": "5 mN m", "order": "7", "time": "0.25 s"}
 
 
 def test_a_table_is_the_same_in_every_medium():

@@ -30,9 +30,12 @@ def test_every_command_in_the_pages_exists():
     from typer.main import get_command
 
     root = get_command(app)
-    for page in ("index.md", "how-to.md", "troubleshooting.md", "calibration.md", "foxglove.md"):
-        text = (ROOT / "docs" / page).read_text()
-        for words in re.findall(r"`(?:\.venv/bin/)?rig ([a-z][^`]*)`", text):
+    pages = ("index", "how-to", "troubleshooting", "calibration", "foxglove", "diagnose")
+    for page in ("README.md", *(f"docs/{name}.md" for name in pages)):
+        text = (ROOT / page).read_text()
+        spoken = re.findall(r"`(?:\.venv/bin/)?rig ([a-z][^`]*)`", text)
+        blocks = re.findall(r"^ {4,}(?:\.venv/bin/)?rig ([a-z].*)$", text, re.MULTILINE)
+        for words in [*spoken, *blocks]:
             command = root
             for word in words.split():
                 below = getattr(command, "commands", None)

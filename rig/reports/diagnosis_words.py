@@ -1,0 +1,143 @@
+"""What a diagnosis says in words: claims, sizes, rivals, and what to record next."""
+
+import math
+import sys
+from collections.abc import Mapping
+
+from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.effects import catalogue
+
+NO_NEXT = "None is proposed: there are no rivals to tell apart."
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what may be said, one sentence a finding."""
+    if not diagnosis.findings:
+        runs = len(diagnosis.sealed.confirm)
+        lines = [
+            f"Nothing is missing above the floor in {', '.join(diagnosis.errors)}: no effect or map"
+            f" passes every gate and holds on the {runs} confirm runs."
+        ]
+    else:
+        which = "runs seen before" if diagnosis.exploratory else "runs not touched"
+        lines = [_sentence(f, diagnosis.unit[f.balance], which) for f in diagnosis.findings]
+    return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
+
+
+def _sentence(finding: Finding, unit: str, which: str) -> str:
+    scale, shown = display(unit)
+    fall = (
+        f"error on {finding.runs_total} {which} falls from"
+        f" {scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {shown}"
+        f" ({finding.runs_improved} of {finding.runs_total} runs better)"
+    )
+    also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{_formula(finding, unit)}"
+
+
+def _formula(finding: Finding, unit: str) -> str:
+    """Return the formula that a model file holds, in words; empty without one."""
+    if not finding.formulas:
+        return ""
+    best = finding.formulas[0]
+    scale, shown = display(unit)
+    left = (
+        "" if best.rmse_after is None else f", which leaves {scale * best.rmse_after:.3g} {shown}"
+    )
+    more = len(finding.formulas) - 1
+    others = f"; {more} more do about as well" if more else ""
+    return f" As a formula: {best.text} (SI units){left}{others}."
+
+
+def _claim(finding: Finding) -> str:
+    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    if finding.verdict == "identified":
+        return _named(finding)
+    if finding.verdict == "one_of":
+        others = ", ".join(finding.alternatives) or "another effect"
+        return f"{_named(finding)}, or {others}: these runs do not tell"
+    if finding.verdict == "depends_on":
+        return f"an effect of unknown form is missing; it depends on {words}"
+    return "something is missing, and these runs do not tell what"
+
+
+def _named(finding: Finding) -> str:
+    sizes = [f"{name} {text}" for name, text in sizes_of(finding.parameters).items()]
+    if finding.confidence is not None:
+        sizes.append(f"confidence {finding.confidence:.0%}")
+    plain = meaning(finding.family)
+    size = f" ({', '.join(sizes)})" if sizes else ""
+    return f"{finding.family} is missing{plain and f', {plain}'}{size}"
+
+
+def meaning(family: str) -> str:
+    """Return what a family of the catalogue is, in plain words; empty for no such family."""
+    known = catalogue().get(family)
+    lines = known and sys.modules[type(known).__module__].__doc__
+    first = (lines or "").partition("\n")[0]
+    return first.partition(": ")[2].removesuffix(".")
+
+
+def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
+    """Return parameters with their units, sine and cosine of one wave as its amplitude."""
+    left = dict(parameters)
+    sizes = {}
+    if "sine" in left and "cosine" in left:
+        sine, cosine = left.pop("sine"), left.pop("cosine")
+        scale, unit = display(sine.unit)
+        sizes["amplitude"] = _measured(scale * math.hypot(sine.value, cosine.value), unit)
+    for name, known in left.items():
+        scale, unit = display(known.unit)
+        sizes[name] = _measured(scale * known.value, unit)
+    return sizes
+
+
+def _measured(value: float, unit: str) -> str:
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+
+
+def display(unit: str) -> tuple[float, str]:
+    """Return the factor and the symbol that a unit is shown with."""
+    return (1e3, "mN m") if unit == "N m" else (1.0, unit)
+
+
+def other_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what else each finding could be, and what would tell."""
+    return [
+        f"{finding.balance}, {finding.family}: {_others(finding)}" for finding in diagnosis.findings
+    ]
+
+
+def _others(finding: Finding) -> str:
+    known = catalogue().get(finding.family)
+    if known is None:
+        return "no effect of the catalogue says it as well as a map of its variables does."
+    if finding.alternatives:
+        said = f"on these runs {', '.join(finding.alternatives)} does about as well."
+    else:
+        said = "on these runs no other effect of the catalogue does as well."
+    if known.confused_with:
+        said += f" It is easily taken for {', '.join(known.confused_with)}"
+        said += f"; what tells them apart: {known.told_apart_by}." if known.told_apart_by else "."
+    return said
+
+
+def next_sentence(diagnosis: Diagnosis) -> str:
+    """Return what to record next and why."""
+    proposed = diagnosis.next_experiment
+    if proposed is None:
+        return NO_NEXT
+    rivals = (
+        " from ".join(proposed["between"][:2])
+        if len(proposed["between"]) == 2
+        else (", ".join(proposed["between"]) + " from each other")
+    )
+    if proposed["protocol"] is None:
+        return f"To tell {rivals}: {proposed['description']}."
+    others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())
+    return (
+        f"To tell {rivals}, record {proposed['name']!r}: {proposed['description']}"
+        f" ({proposed['seconds']:.0f} s). What the worse rival cannot imitate there is"
+        f" {proposed['discrimination']:.3g} times the variance of the noise; of the other"
+        f" experiments on the menu: {others}."
+    )
