@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint site bench blind soak fuzz figures firmware clean
+.PHONY: setup demo test lint site bench blind soak fuzz figures firmware firmware-arm clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -62,6 +62,15 @@ figures: $(VENV)/.installed
 firmware:
 	@if command -v $(CXX) >/dev/null 2>&1; then $(MAKE) --no-print-directory -C firmware CXX=$(CXX); \
 	else echo "no C++ compiler ($(CXX)): left out the firmware in the loop" >&2; fi
+
+# the core on an emulated Cortex-M4, held to the contract every driver keeps; optional, and in real time
+ARM_CXX ?= arm-none-eabi-g++
+firmware-arm: $(VENV)/.developing
+	@for tool in $(ARM_CXX) qemu-system-arm; do command -v $$tool >/dev/null 2>&1 || { \
+	echo "no $$tool: left out the firmware on an emulated processor; apt-get install gcc-arm-none-eabi" \
+	"libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm" >&2; exit 0; }; done; \
+	$(MAKE) --no-print-directory -C firmware arm ARM_CXX=$(ARM_CXX) && \
+	$(BIN)/python -m pytest -q -rs tests/drivers/test_contract.py -k Cortex
 
 clean:
 	rm -rf $(VENV) firmware/build

@@ -7,6 +7,7 @@ demonstrations load it.
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -85,10 +86,15 @@ def drivers() -> dict[str, Driver]:
 def fakes() -> dict[str, OpenFake]:
     """Return the function that opens each driver's fake, by the driver's name.
 
-    Raises:
-        UnknownDriverError: An entry point does not load.
+    A fake is loaded when it is opened, as it may need a library that another does not; opening one
+    that does not load raises `UnknownDriverError`.
     """
-    return {entry.name: _load(entry) for entry in sorted(entry_points(group=FAKES))}
+    return {entry.name: partial(_open_fake, entry) for entry in sorted(entry_points(group=FAKES))}
+
+
+def _open_fake(entry: EntryPoint, faults: Faults) -> Device:
+    device: Device = _load(entry)(faults)
+    return device
 
 
 def open_device(name: str, url: str, **options: Any) -> Device:

@@ -14,7 +14,7 @@ from rig.errors import RigError, UsageError
 from rig.logger import open_logger
 
 SOURCES = Path(__file__).parents[1] / "firmware"
-BOARDS = ("teensy41",)
+BOARDS = ("teensy35", "teensy41")
 
 
 class FirmwareToolError(RigError):

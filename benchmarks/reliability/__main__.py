@@ -2,12 +2,13 @@
 
 `python -m benchmarks.reliability [soak pty faults kills fuzz] [--virtual S] [--real S]
 [--faults N] [--kills N]`: the parts named, all if none. Each part's figures are kept in
-`build/reliability.json`, and the table is written from all that are there; parts that were never
-measured say so.
+`build/reliability.json`, and the table is written from all that are there. A part that was not
+measured in this checkout keeps the rows it has in the table; one that never was says so.
 """
 
 import argparse
 import json
+import re
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -22,6 +23,14 @@ from rig.reports.provenance import Provenance
 STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
 PARTS = ("soak", "pty", "faults", "kills", "fuzz")
+OF_PART = {
+    "soak": r"firmware core, ",
+    "pty": r"firmware process ",
+    "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
+    "kills": r"\d+ recorders killed",
+    "fuzz": r"fuzzed decoders",
+}
+"""How the figures of a part's rows begin."""
 SAFE_S, WATCHDOG_S = 0.020, 0.052
 
 
@@ -41,7 +50,8 @@ def main() -> int:
         if part != "fuzz":  # its own command measures it; here it is only told
             sys.stderr.write(f"{part} ...\n")
             _keep(part, _MEASURES[part](options))
-    write_text_atomic(TABLE, _table(_kept()))
+    earlier = TABLE.read_text() if TABLE.is_file() else ""
+    write_text_atomic(TABLE, written(_kept(), earlier))
     sys.stderr.write(f"Written: {TABLE}\n")
     return 0
 
@@ -97,23 +107,33 @@ _MEASURES = {
 }
 
 
-def _table(figures: dict[str, Any]) -> str:
-    rows = []
-    for part in ("soak", "pty"):
-        rows += _soak_rows(figures.get(part), part)
-    rows += _fault_rows(figures.get("faults")) + _kill_rows(figures.get("kills"))
+def written(figures: dict[str, Any], earlier: str) -> str:
+    """Return the page; parts without figures keep their rows of the earlier one."""
     tallies = fuzz.load(fuzz.STATE)
-    rows += _fuzz_rows(tallies)
-    wanted = fuzz.plan(fuzz.TOTAL)
+    fuzzed = any(tally.inputs for tally in tallies.values())
+    parts = {
+        "soak": _soak_rows(figures.get("soak"), "soak"),
+        "pty": _soak_rows(figures.get("pty"), "pty"),
+        "faults": _fault_rows(figures.get("faults")),
+        "kills": _kill_rows(figures.get("kills")),
+        "fuzz": _fuzz_rows(tallies),
+    }
+    measured = {*figures, *(["fuzz"] if fuzzed else [])}
+    summary, _, decoders = earlier.partition("## Fuzzed decoders")
+    rows = []
+    for part, new in parts.items():
+        kept = [] if part in measured else _rows(summary, OF_PART[part])
+        rows += kept or [f"| {a} | {b} | {c} | {d} |" for a, b, c, d in new]
     lines = [
         "# Reliability",
         "",
-        "Written by `make soak` and `make fuzz`. The machine was shared with other work; a missed"
-        " goal is said as missed.",
+        "Written by `make soak` and `make fuzz`; each command writes the rows it measured, and the"
+        " last line is the last command's. The machine was shared with other work; a missed goal is"
+        " said as missed.",
         "",
         "| figure | measured | goal | met |",
         "|---|---|---|---|",
-        *(f"| {a} | {b} | {c} | {d} |" for a, b, c, d in rows),
+        *rows,
         "",
         "## Fuzzed decoders",
         "",
@@ -122,11 +142,23 @@ def _table(figures: dict[str, Any]) -> str:
         "",
         "| decoder | inputs | planned | accepted | refused | slowest ms | failures |",
         "|---|---:|---:|---:|---:|---:|---:|",
+        *(_decoder_rows(tallies) if fuzzed else _rows(decoders, r"[^|]*\| \d")),
     ]
+    return "\n".join([*lines, "", Provenance.now(seed=0).line(), ""])
+
+
+def _rows(text: str, begins: str) -> list[str]:
+    """Return the rows of a table whose first cell begins so."""
+    return [line for line in text.splitlines() if re.match(rf"\| (?:{begins})", line)]
+
+
+def _decoder_rows(tallies: dict[str, fuzz.Tally]) -> list[str]:
+    wanted = fuzz.plan(fuzz.TOTAL)
+    rows = []
     for name, t in tallies.items():
         counts = f"{t.inputs} | {wanted[name]} | {t.accepted} | {t.refused}"
-        lines.append(f"| {name} | {counts} | {1e3 * t.slowest_s:.0f} | {len(t.failures)} |")
-    return "\n".join([*lines, "", Provenance.now(seed=0).line(), ""])
+        rows.append(f"| {name} | {counts} | {1e3 * t.slowest_s:.0f} | {len(t.failures)} |")
+    return rows
 
 
 def _row(what: str, measured: str, goal: str, met: bool) -> tuple[str, str, str, str]:

@@ -1,11 +1,11 @@
 """A digital F/T that takes and gives the bytes a real one would, a slow sine on its gauges.
 
-It answers Modbus itself: a Modbus server's library runs in real time and knows neither the sensor's
-own functions nor a line that turns into a stream. Each write of the host is taken for one message,
-as the silence between messages marks them on a line. Not modelled: the time bytes take.
+What it says in Modbus is a Modbus library's word (`modbus_server`), not this project's; the stream
+and its end are here. Each write of the host is taken for one message, as the silence between
+messages marks them on a line. Not modelled: the time bytes take.
 """
 
-import struct
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,14 @@ from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import AtiSerial
 from drivers.ati_serial.protocol import Calibration
 from drivers.device import Device
-from drivers.errors import FrameError
+from drivers.errors import LinkError
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
+if TYPE_CHECKING:
+    from drivers.ati_serial.modbus_server import ModbusServer
+
 FRAMES_A_TICK = 7
-LAST_REGISTER = 0x0FFF
-ILLEGAL_FUNCTION, ILLEGAL_ADDRESS = b"\x01", b"\x02"
 
 
 def example_calibration() -> Calibration:
@@ -39,30 +40,22 @@ class AtiSerialFake:
 
     def __init__(self, calibration: Calibration | None = None) -> None:
         block = protocol.encode_calibration(calibration or example_calibration())
-        self.registers = bytearray(2 * LAST_REGISTER + 2)
-        first = 2 * protocol.FIRST_CALIBRATION
-        self.registers[first : first + len(block)] = block
-        self.streaming = False
+        self.server = _server(block)
         self.status_bad = False
-        self._locked = True
         self._sent = 0
         self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
         """Take one message; one that does not pass its check is not answered."""
-        if self.streaming:
-            self.streaming = len(data) < 14
+        if self.server.streaming:
+            self.server.streaming = len(data) < 14
             return
-        try:
-            function, body = protocol.decode(data)
-        except FrameError:
-            return
-        self._out += self._answer(function, body)
+        self._out += self.server.answer(data)
 
     def advance(self, ticks: int) -> None:
         """Let `ticks` milliseconds pass; while it streams, frames are made."""
         count = ticks * FRAMES_A_TICK
-        if self.streaming:
+        if self.server.streaming:
             gauges = self.gauges(np.arange(self._sent, self._sent + count))
             self._out += protocol.encode_frames(gauges, self.status_bad)
         self._sent += count
@@ -79,24 +72,22 @@ class AtiSerialFake:
         gauges: NDArray[np.int64] = np.round(turn * np.arange(1000, 7000, 1000)).astype(np.int64)
         return gauges
 
-    def _answer(self, function: int, body: bytes) -> bytes:
-        if function == protocol.STREAM:
-            self.streaming = body == protocol.START_STREAM
-            return protocol.encode(function, bytes([self.streaming]))
-        if function == protocol.STORAGE:
-            self._locked = body != protocol.UNLOCK
-            return protocol.encode(function, b"\x01")
-        if function not in (protocol.READ, protocol.WRITE):
-            return protocol.encode(function | protocol.FAILED, ILLEGAL_FUNCTION)
-        first, count = struct.unpack(">HH", body[:4])
-        place = slice(2 * first, 2 * (first + count))
-        refused = count > 125 or first + count > LAST_REGISTER + 1
-        if refused or (function == protocol.WRITE and self._locked):
-            return protocol.encode(function | protocol.FAILED, ILLEGAL_ADDRESS)
-        if function == protocol.WRITE:
-            self.registers[place] = body[5:]
-            return protocol.encode(function, body[:4])
-        return protocol.encode(function, bytes([2 * count]) + self.registers[place])
+
+def _server(block: bytes) -> "ModbusServer":
+    """Return the Modbus server; its library is an extra, loaded only here.
+
+    Raises:
+        LinkError: It is not installed.
+    """
+    try:
+        from drivers.ati_serial.modbus_server import ModbusServer
+    except ModuleNotFoundError as error:
+        raise LinkError(
+            "The simulated digital F/T needs the pymodbus library.",
+            f"{error}.",
+            "Run: pip install 'rig[modbus]'.",
+        ) from error
+    return ModbusServer(protocol.FIRST_CALIBRATION, block)
 
 
 def open_fake(faults: Faults) -> Device:

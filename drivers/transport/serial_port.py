@@ -6,7 +6,9 @@ two steal each other's bytes.
 
 import errno
 import os
+import select
 import stat
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
@@ -66,8 +68,7 @@ class SerialTransport:
         self._require_link()
         try:
             if isinstance(self._port, serial.Serial):
-                self._set_timeout(timeout_s)
-                return bytes(self._port.read(max(1, self._port.in_waiting)))
+                return self._read_port(timeout_s)
             self._set_timeout(timeout_s)  # a socket does not know how much is waiting
             first = bytes(self._port.read(1))
             if not first:
@@ -100,6 +101,19 @@ class SerialTransport:
         """Close the port."""
         self._lost = self._lost or LinkLostError(f"{self._url} is closed.")
         self._port.close()
+
+    def _read_port(self, timeout_s: float) -> bytes:
+        """Return what a port has; pyserial would set the port up anew for every new timeout."""
+        if sys.platform == "win32":  # its ports are no file descriptors
+            self._set_timeout(timeout_s)
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+        descriptor = self._port.fileno()
+        if not select.select([descriptor], [], [], max(0.0, timeout_s))[0]:
+            return b""
+        data = os.read(descriptor, _READ_SIZE)
+        if not data:
+            raise serial.SerialException("it is ready to be read and gives nothing")
+        return data
 
     def _set_timeout(self, timeout_s: float) -> None:
         if self._port.timeout != timeout_s:

@@ -41,6 +41,8 @@ class Gates:
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        leftover: Least share that an effect has in what all found in a balance remove together:
+            what a name's form leaves of its own cause is no second cause.
         parameters: Named parameters of the whole model at most, or None for no limit.
         akin: Whether an effect may be added beside one that looks alike: where a model must
             predict well rather than be named surely.
@@ -57,6 +59,7 @@ class Gates:
     veto: float = 0.9
     sure: float = 0.9
     map_floor: float = 0.2
+    leftover: float = 0.15
     parameters: int | None = None
     akin: bool = False
     balances: int = 1
@@ -340,10 +343,16 @@ class Search:
                 enough = runs_agree(loss, joint) <= self.gates.agree
                 gains[k] = float(loss.sum() - joint.sum()) if enough else -1.0
             weakest = min(kept, key=lambda k: gains[k])
-            if gains[weakest] >= self.floor:
+            least = max(self.floor, self.gates.leftover * self._explained(found, kept))
+            if gains[weakest] >= least:
                 break
             kept.remove(weakest)
         return kept
+
+    def _explained(self, found: Sequence[Candidate], kept: Sequence[int]) -> float:
+        """Return the squared error that effects remove together."""
+        terms = [*self.balance.terms, *(found[k] for k in kept)]
+        return self.declared_loss - self.balance.loss(terms)
 
     def _beside(self, found: Sequence[Candidate], kept: Sequence[int], k: int) -> Losses:
         """Return the losses of one found effect beside all others."""

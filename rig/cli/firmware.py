@@ -14,7 +14,7 @@ firmware_app = typer.Typer(
     rich_markup_mode=None,
 )
 
-BoardOption = Annotated[str, typer.Option("--board", "-b", help="teensy41.")]
+BoardOption = Annotated[str, typer.Option("--board", "-b", help="teensy35 or teensy41.")]
 
 
 @firmware_app.command()

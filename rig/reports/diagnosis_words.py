@@ -32,7 +32,21 @@ def _sentence(finding: Finding, unit: str, which: str) -> str:
         f" ({finding.runs_improved} of {finding.runs_total} runs better)"
     )
     also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
-    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{_formula(finding, unit)}"
+
+
+def _formula(finding: Finding, unit: str) -> str:
+    """Return the formula that a model file holds, in words; empty without one."""
+    if not finding.formulas:
+        return ""
+    best = finding.formulas[0]
+    scale, shown = display(unit)
+    left = (
+        "" if best.rmse_after is None else f", which leaves {scale * best.rmse_after:.3g} {shown}"
+    )
+    more = len(finding.formulas) - 1
+    others = f"; {more} more do about as well" if more else ""
+    return f" As a formula: {best.text} (SI units){left}{others}."
 
 
 def _claim(finding: Finding) -> str:

@@ -63,8 +63,7 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     assert device.status() == 0
     device.start()
     calibration = example_calibration()
-    active = np.frombuffer(bytes(fake.registers[:24]), ">u2")
-    assert tuple(active.tolist()) == calibration.gains + calibration.offsets
+    assert fake.server.registers(0, 12) == calibration.gains + calibration.offsets
     batch = device.read(0.1)
     assert len(batch) == 7 * 50 - 1  # the newest waits for its successor
     began = np.arange(fake._sent - 350, fake._sent)
@@ -72,7 +71,7 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     got = np.stack(list(batch.columns.values()), axis=1)
     assert np.allclose(got, expected)
     device.close()
-    assert not fake.streaming
+    assert not fake.server.streaming
 
 
 def test_a_stream_left_on_by_another_program_is_ended_first() -> None:
@@ -143,3 +142,24 @@ def test_a_sensor_that_does_not_answer_the_lock_still_starts() -> None:
     device = AtiSerial(SimulatedTransport(Mute()), assumed=Assumptions(lock_answers=False))
     device.start()
     assert len(device.read(0.1)) > 100
+
+
+def test_the_server_keeps_silent_where_a_slave_does_and_refuses_what_it_must() -> None:
+    fake = AtiSerialFake()
+    damaged = bytearray(protocol.read_registers(0, 1))
+    damaged[-1] ^= 1
+    body = bytes([protocol.SLAVE + 1]) + protocol.read_registers(0, 1)[1:-2]
+    elsewhere = body + protocol.crc16(body).to_bytes(2, "little")
+    for message in (bytes(damaged), elsewhere, protocol.JAM, b""):
+        fake.receive(message)
+        assert fake.transmit() == b""
+    fake.receive(protocol.read_registers(0x0FFF, 2))
+    assert protocol.decode(fake.transmit()) == (protocol.READ | protocol.FAILED, b"\x02")
+    fake.receive(protocol.encode(protocol.STORAGE, protocol.UNLOCK))
+    fake.receive(protocol.write_registers(3, (7, 8)))
+    fake.receive(protocol.encode(protocol.STORAGE, protocol.LOCK))
+    fake.receive(protocol.write_registers(3, (1, 1)))
+    fake.transmit()
+    assert fake.server.registers(2, 4) == (0, 7, 8, 0)
+    fake.receive(protocol.read_registers(3, 2))
+    assert protocol.decode(fake.transmit()) == (protocol.READ, bytes.fromhex("04 0007 0008"))

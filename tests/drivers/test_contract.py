@@ -11,14 +11,23 @@ from drivers.device import Batch, Device, SampleFlag
 from drivers.errors import DriverError, LinkLostError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.transport.faulty import Fault, Faults
+from tests.drivers.emulated_board import MISSING
+from tests.drivers.emulated_board import open_fake as open_emulated
 
 NAMES = sorted(drivers())
+EMULATED = "teensy on a Cortex-M4"
+PLACES = [
+    *NAMES,
+    pytest.param(EMULATED, marks=pytest.mark.skipif(bool(MISSING), reason=MISSING)),
+]
+"""Every driver on its fake, and the logger's on the firmware an emulated processor runs."""
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 STRIKES = 8
 
 
 def opened(name: str, faults: Faults | None = None) -> Device:
-    return fakes()[name](faults or Faults())
+    open_fake = open_emulated if name == EMULATED else fakes()[name]
+    return open_fake(faults or Faults())
 
 
 def troubles(device: Device) -> int:
@@ -80,12 +89,12 @@ def test_it_is_documented(name: str) -> None:
     device.close()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLACES)
 def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
     for _ in range(2):
         device = opened(name)
         assert isinstance(device, Device)
-        assert device.name == name
+        assert device.name == name.split()[0]
         assert device.identify().model
         device.start()
         assert device.channels
@@ -114,7 +123,7 @@ def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
 
 
 @pytest.mark.parametrize("fault", [fault for fault in Fault if fault is not Fault.DISCONNECT])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLACES)
 def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
     faults = Faults(seed=2)
     device = opened(name, faults)
@@ -138,7 +147,7 @@ def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
     device.close()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLACES)
 def test_a_cut_link_is_said_and_it_can_be_opened_again(name: str) -> None:
     faults = Faults()
     device = opened(name, faults)

@@ -1,9 +1,11 @@
 """A small share of `make soak` and `make fuzz`, and that the two go on where they stopped."""
 
 import random
+from pathlib import Path
 
 import pytest
 
+from benchmarks.reliability import __main__ as page
 from benchmarks.reliability import fuzz
 from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
@@ -68,3 +70,21 @@ def test_faults_of_every_kind_are_detected_named_and_end_safe_in_time() -> None:
         if outcome.safe_after_s is not None:
             assert outcome.safe_after_s <= (0.052 if silence else 0.020), outcome
     assert sum(outcome.safe_after_s is not None for outcome in outcomes) == len(SENSOR_FAULTS) + 2
+
+
+def test_a_part_that_was_not_measured_here_keeps_its_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    earlier = page.TABLE.read_text()
+    monkeypatch.setattr(fuzz, "STATE", tmp_path / "fuzz.json")
+    rows = [line for line in earlier.splitlines() if line.startswith("| ")]
+    assert len(rows) == 2 + 12 + len(TARGETS)
+    kept = page.written({}, earlier)
+    assert [line for line in kept.splitlines() if line.startswith("| ")] == rows
+    kills = {"count": 3, "most_lost_s": 0.5, "median_lost_s": 0.1}
+    changed = page.written({"kills": kills}, earlier).splitlines()
+    assert [line for line in changed if line.startswith("| ") and line not in rows] == [
+        "| 3 recorders killed: lost, all files repaired, nothing earlier changed | most 0.500 s,"
+        " median 0.100 s | 0.25 s in 200 | **no** |"
+    ]
+    assert "not measured" in page.written({}, "")

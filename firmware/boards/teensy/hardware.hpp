@@ -1,12 +1,16 @@
-// The Teensy 4.1 as `rig::App` wants its hardware. Nothing has run on a board yet: it is compiled, and
-// tried on a host against tests/arduino, which stands for the parts of the Arduino core used here.
+// A Teensy as `rig::App` wants its hardware; the 4.1 unless the 3.5 is compiled for. Nothing has run on
+// a board yet: it is compiled, and tried on a host against tests/arduino, which stands for the parts of
+// the Arduino core used here.
 #pragma once
 
 #include <Arduino.h>
-#include <QuadEncoder.h>
 
 #include "../../core/app.hpp"
-#include "wiring.hpp"
+#if defined(ARDUINO_TEENSY35)
+#include "counters35.hpp"
+#else
+#include "counters41.hpp"
+#endif
 
 namespace rig {
 
@@ -27,18 +31,17 @@ class TeensyHardware {
             pinMode(pin, OUTPUT);
             digitalWrite(pin, LOW);
         }
-        analogWriteResolution(wiring::kPwmBits);
-        for (int pin : {wiring::kDriveSetPin, wiring::kLoadSetPin}) {
-            analogWriteFrequency(pin, wiring::kPwmHz);
+        analogWriteResolution(wiring::kSetBits);
+        if constexpr (wiring::kPwmHz > 0) {
+            for (int pin : {wiring::kDriveSetPin, wiring::kLoadSetPin}) {
+                analogWriteFrequency(pin, wiring::kPwmHz);
+            }
         }
         drive(Outputs());
         for (int pin : {wiring::kDriveReadyPin, wiring::kLoadReadyPin}) pinMode(pin, INPUT_PULLUP);
         analogReadResolution(wiring::kAdcBits);
         analogReadAveraging(4);
-        for (QuadEncoder* encoder : {&motor_, &spindle_, &jaw_}) {
-            encoder->setInitConfig();
-            encoder->init();
-        }
+        encoders_.begin();
         Serial.begin(115200);  // the rate has no effect on USB
     }
 
@@ -46,9 +49,9 @@ class TeensyHardware {
 
     Inputs sample() {
         Inputs counts;
-        counts.motor = motor_.read();
-        counts.spindle = spindle_.read();
-        counts.jaw = jaw_.read();
+        counts.motor = encoders_.motor();
+        counts.spindle = encoders_.spindle();
+        counts.jaw = encoders_.jaw();
         counts.proximal = torque(wiring::kProximalPin);
         counts.distal = torque(wiring::kDistalPin);
         counts.current = drive_ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
@@ -95,9 +98,7 @@ class TeensyHardware {
         return enabled_ticks_ < wiring::kReadyAfterTicks || digitalRead(wiring::kDriveReadyPin) == HIGH;
     }
 
-    QuadEncoder motor_{1, wiring::kMotorA, wiring::kMotorB};
-    QuadEncoder spindle_{2, wiring::kSpindleA, wiring::kSpindleB};
-    QuadEncoder jaw_{3, wiring::kJawA, wiring::kJawB};
+    Counters encoders_;
     std::uint32_t enabled_ticks_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// The logger on a Teensy 4.1: a timer samples and drives once a millisecond, the loop carries bytes.
+// The logger on a Teensy 3.5 or 4.1: a timer samples and drives once a millisecond, the loop carries bytes.
 #include "hardware.hpp"
 
 namespace {
@@ -15,7 +15,7 @@ void sample() { app.tick(); }
 
 void setup() {
     hardware.begin();
-    timer.priority(32);  // above USB: its interrupts may wait, the sample may not
+    timer.priority(rig::wiring::kSamplePriority);
     timer.begin(sample, 1000);
 }
 

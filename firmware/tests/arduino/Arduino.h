@@ -7,10 +7,11 @@
 #include <deque>
 #include <map>
 
-constexpr int LOW = 0, HIGH = 1, INPUT = 0, OUTPUT = 1, INPUT_PULLUP = 2;
+constexpr int LOW = 0, HIGH = 1, INPUT = 0, OUTPUT = 1, INPUT_PULLUP = 2, CHANGE = 4;
 
 struct FakeBoard {
-    std::map<int, int> modes, levels, duties, analog;
+    std::map<int, int> modes, levels, duties, analog, priorities;
+    std::map<int, void (*)()> edges;
     int locked = 0;
     std::uint32_t now_us = 0;
 };
@@ -25,6 +26,9 @@ inline void analogWriteFrequency(int, float) {}
 inline void analogWriteResolution(int) {}
 inline void analogReadResolution(int) {}
 inline void analogReadAveraging(int) {}
+inline int digitalReadFast(int pin) { return digitalRead(pin); }
+inline int digitalPinToInterrupt(int pin) { return pin; }
+inline void attachInterrupt(int pin, void (*called)(), int) { board.edges[pin] = called; }
 inline std::uint32_t micros() { return board.now_us; }
 inline void noInterrupts() { ++board.locked; }
 inline void interrupts() { --board.locked; }
@@ -50,9 +54,19 @@ inline FakeSerial Serial;
 
 struct IntervalTimer {
     void (*function)() = nullptr;
-    void priority(int) {}
+    int level = 128;
+    void priority(int asked) { level = asked; }
     bool begin(void (*called)(), int) {
         function = called;
         return true;
     }
 };
+
+// what the Teensy 3.5's core calls the registers and pins that its layer uses
+constexpr int A21 = 66, A22 = 67, IRQ_PORTC = 61;
+constexpr std::uint32_t FTM_MODE_WPDIS = 4, FTM_MODE_FTMEN = 1, FTM_QDCTRL_QUADEN = 1;
+constexpr std::uint32_t PORT_PCR_MUX(std::uint32_t function) { return function << 8; }
+inline volatile std::uint32_t PORTA_PCR12, PORTA_PCR13, PORTB_PCR18, PORTB_PCR19;
+inline volatile std::uint32_t FTM1_MODE, FTM1_SC, FTM1_CNTIN, FTM1_MOD, FTM1_CNT, FTM1_QDCTRL;
+inline volatile std::uint32_t FTM2_MODE, FTM2_SC, FTM2_CNTIN, FTM2_MOD, FTM2_CNT, FTM2_QDCTRL;
+inline void NVIC_SET_PRIORITY(int line, int level) { board.priorities[line] = level; }

@@ -13,6 +13,8 @@ constexpr int kMotorA = 0, kMotorB = 1;
 constexpr int kSpindleA = 2, kSpindleB = 3;
 constexpr int kJawA = 5, kJawB = 7;
 
+constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
+
 constexpr int kProximalPin = 14, kDistalPin = 15, kFsrPin = 16;  // A0, A1, A2
 constexpr int kDriveCurrentPin = 17;                             // A3
 constexpr int kAdcBits = 12;
@@ -23,7 +25,7 @@ constexpr int kDriveSetPin = 22, kLoadSetPin = 23;
 constexpr int kDriveEnablePin = 24, kLoadEnablePin = 25;
 constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
 constexpr float kPwmHz = 5000.0F;
-constexpr int kPwmBits = 12;
+constexpr int kSetBits = 12;
 constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens
 constexpr std::uint32_t kReadyAfterTicks = 20;  // enable acts within 8 ms
 

@@ -1,0 +1,57 @@
+// The logger on an emulated Cortex-M4: start-up, and the loop that ticks when the timer says so.
+#include "hardware.hpp"
+
+extern "C" {
+
+extern std::uint32_t stack_top, data_begin, data_end, data_stored, bss_begin, bss_end;
+
+[[noreturn]] void reset();
+void wake() {}
+void on_received() { rig::Mps2Hardware::on_received(); }
+[[noreturn]] void stuck() {
+    for (;;) {
+    }
+}
+
+using Handler = void (*)();
+__attribute__((section(".vectors"), used)) const Handler vectors[17] = {
+    reinterpret_cast<Handler>(&stack_top),
+    reset, stuck, stuck, stuck, stuck, stuck, nullptr, nullptr, nullptr, nullptr,
+    stuck, stuck, nullptr, stuck, wake, on_received};
+}
+
+namespace {
+
+constexpr std::size_t kTransmitCapacity = 65536;
+constexpr std::uint32_t kTickUs = static_cast<std::uint32_t>(rig::kTickUs);
+
+rig::Mps2Hardware* hardware() {
+    static rig::Mps2Hardware only;
+    return &only;
+}
+
+[[noreturn]] void run() {
+    static rig::App<rig::Mps2Hardware, kTransmitCapacity> app(*hardware(), "MPS2-0001");
+    hardware()->begin();
+    // the timer says when a tick is due, so one that came late is caught up
+    for (std::uint32_t due_us = hardware()->now_us() + kTickUs;;) {
+        app.exchange();
+        if (static_cast<std::int32_t>(hardware()->now_us() - due_us) >= 0) {
+            app.tick(due_us);
+            due_us += kTickUs;
+        } else {
+            __asm volatile("wfi");
+        }
+    }
+}
+
+}  // namespace
+
+extern "C" void reset() {
+    rig::at(0xE000ED88) |= 0xFU << 20;  // the floating-point unit, before anything uses it
+    __asm volatile("dsb\n isb");
+    const std::uint32_t* from = &data_stored;
+    for (std::uint32_t* to = &data_begin; to < &data_end;) *to++ = *from++;
+    for (std::uint32_t* to = &bss_begin; to < &bss_end;) *to++ = 0;
+    run();
+}

@@ -1,0 +1,36 @@
+// What is wired to which pin of the Teensy 3.5, and the scalings set in ESCON Studio. Nothing here is
+// known from outside: change it to your rig and flash.
+#pragma once
+
+#include <Arduino.h>
+
+#include "../escon.hpp"
+
+namespace rig::wiring {
+
+constexpr char kSerial[] = "TEENSY35-0001";
+
+// The motor is at pins 3 and 4 (FTM1), the jaw at 29 and 30 (FTM2): the hardware has no others. The
+// spindle's pins are both of port C, whose interrupt priority is raised. All take 5 V.
+constexpr int kSpindleA = 9, kSpindleB = 10;
+constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
+constexpr int kEdgePriority = 16;
+
+constexpr int kProximalPin = 14, kDistalPin = 15, kFsrPin = 16;  // A0, A1, A2
+constexpr int kDriveCurrentPin = 17;                             // A3
+constexpr int kAdcBits = 12;
+constexpr int kTorqueZero = 2048;  // counts of a cell's amplifier at mid-scale
+
+// Set values are its two converters', 0 to 3.3 V; an amplifier makes the controller's +-10 V of them.
+constexpr int kDriveSetPin = A21, kLoadSetPin = A22;
+constexpr int kDriveEnablePin = 24, kLoadEnablePin = 25;
+constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
+constexpr float kPwmHz = 0.0F;  // none
+constexpr int kSetBits = 12;
+constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens
+constexpr std::uint32_t kReadyAfterTicks = 20;  // enable acts within 8 ms
+
+constexpr EsconWiring kDrive{{0.0, -2.0, 3.3, 2.0}, 3.3, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
+constexpr EsconWiring kLoad{{0.0, -2.0, 3.3, 2.0}, 3.3, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
+
+}  // namespace rig::wiring
