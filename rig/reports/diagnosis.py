@@ -96,6 +96,16 @@ def _parameters(findings: Sequence[Finding]) -> TextTable:
     return TextTable("Parameters of what was found", columns, rows, "Bootstrap over runs.")
 
 
+def _with_interval(known: Value) -> list[str]:
+    """Return value, interval and unit, with the digits that the interval leaves."""
+    scale, unit = display(known.unit)
+    if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
+        return [f"{scale * known.value:.4g}", "", unit]
+    low, high = (scale * end for end in known.ci95)
+    places = max(0, 1 - math.floor(math.log10(high - low)))
+    return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
+
+
 def _formulas(diagnosis: Diagnosis) -> TextTable:
     rows = []
     for finding in diagnosis.findings:
@@ -111,16 +121,6 @@ def _formulas(diagnosis: Diagnosis) -> TextTable:
         " bump(x; c, s) = exp(-((x - c) / s)^2), step(x; c, s) = (1 + tanh((x - c) / s)) / 2,"
         " play(x; s): how far a slack of s on either side is crossed, -1 to 1.",
     )
-
-
-def _with_interval(known: Value) -> list[str]:
-    """Return value, interval and unit, with the digits that the interval leaves."""
-    scale, unit = display(known.unit)
-    if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
-        return [f"{scale * known.value:.4g}", "", unit]
-    low, high = (scale * end for end in known.ci95)
-    places = max(0, 1 - math.floor(math.log10(high - low)))
-    return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
 
 
 def _tried(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
