@@ -89,14 +89,48 @@ class Balance:
         """Return the squared error over all runs."""
         return float(sum(r @ r for r in self.left(terms)))
 
-    def refined(self, terms: Sequence[Candidate], passes: int = 2) -> list[Candidate]:
-        """Return the effects with all shapes moved to where the joint fit is best."""
+    def refined(
+        self, terms: Sequence[Candidate], passes: int = 2, last: int | None = None
+    ) -> list[Candidate]:
+        """Return the effects with all shapes moved to where the joint fit is best.
+
+        Args:
+            terms: The effects.
+            passes: How often, each time in smaller steps.
+            last: Move only those of so many effects at the end, None for all.
+        """
         best = list(terms)
+        begin = 0 if last is None else len(best) - last
         for width in (1.0, 0.3, 0.1)[:passes]:
-            for i, term in enumerate(best):
-                for k in range(len(term.shape)):
+            for i in range(begin, len(best)):
+                for k in range(len(best[i].shape)):
                     best[i] = self._along(best, i, k, width)
         return best
+
+    def stepped(self, terms: Sequence[Candidate]) -> list[Candidate]:
+        """Return the effects after one Gauss-Newton step of all shapes together.
+
+        It is halved until the error falls; where it never does, they stay as they are. Shapes that
+        lean on one another, as the place and width of a bump, settle so and not one by one.
+        """
+        places = [(i, k) for i, term in enumerate(terms) for k in range(len(term.shape))]
+        if not places:
+            return list(terms)
+        base, left = np.vstack(self.base(terms)), np.concatenate(self.left(terms))
+        scale = np.maximum(np.linalg.norm(base, axis=0), np.finfo(float).tiny)
+        found = np.linalg.lstsq(base / scale, left, rcond=1e-8)[0] / scale
+        steps = np.clip(found[-len(places) :], -1.0, 1.0)
+        least = self.loss(terms)
+        for share in 0.5 ** np.arange(6):
+            moved = list(terms)
+            for (i, k), one in zip(places, steps, strict=True):
+                moved[i] = moved[i].moved(k, share * float(one))
+            loss = self.loss(moved)
+            if loss < least:
+                return moved
+            for term in moved:
+                self.tables_of.pop(term, None)  # a point of a search, not to be kept
+        return list(terms)
 
     def _along(self, terms: list[Candidate], i: int, k: int, width: float) -> Candidate:
         """Return effect i with its k-th shape at the best value near where it stands."""

@@ -9,15 +9,25 @@ from functools import partial
 import numpy as np
 
 from estimation.campaign import Campaign, with_campaign_time
+from estimation.derived import GEAR_RATIO
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
 from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
-from estimation.diagnosis.frozen import Frozen, Part, errors, freeze, samples_of, squares
+from estimation.diagnosis.formula import Formula, formulas
+from estimation.diagnosis.frozen import (
+    Frozen,
+    Part,
+    errors,
+    freeze,
+    samples_of,
+    settled,
+    squares,
+)
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
-from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
+from estimation.diagnosis.result import Diagnosis, Error, Finding, Stated, Value
 from estimation.diagnosis.search import Discovery, Gates, Named, Search
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.twin import Bootstrap, Twin
@@ -39,18 +49,49 @@ Added = Mapping[str, FloatArray]
 SAME_CAUSE = 0.9
 """Two balances show one cause when what it adds to them correlates at least this well."""
 
+SAME_RATE = 0.03
+"""Two waves are one when their periods a turn differ by less than this share."""
+
+_TORQUE = "proximal torque sensor"
+SENSORS = {
+    "motor": {"current sensor", _TORQUE, "motor encoder"},
+    "gearbox": {_TORQUE, "motor encoder", "spindle encoder"},
+    "cable": {_TORQUE, "distal torque sensor", "spindle encoder"},
+    "stretch": {"distal torque sensor", "spindle encoder", "jaw encoder"},
+}
+"""What each balance reads: a sensor at fault shows in all that read it."""
+
+LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
+"""Faults that two balances may name differently."""
+
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One finding before it is confirmed."""
+    """One finding before it is confirmed.
+
+    Attributes:
+        part: What it adds.
+        verdict: What is claimed.
+        named: The effect, or None.
+        depends_on: Variables.
+        formulas: What stands for its map in a model, the one that is written first.
+    """
 
     part: Part
     verdict: str
     named: Named | None
     depends_on: tuple[str, ...]
+    formulas: tuple[Formula, ...] = ()
+
+    @property
+    def written(self) -> Part:
+        """What a model file holds of it: a formula in place of a map; nothing without one."""
+        if self.part.map is None:
+            return self.part
+        return Part(formula=self.formulas[0].terms) if self.formulas else Part()
 
 
 @dataclass(frozen=True)
@@ -65,6 +106,8 @@ class Story:
         before: Declared model, frozen.
         after: Model with the claims, frozen.
         values: Parameters of `after`'s effects, in their order.
+        written: What a model file holds: `after` with formulas in place of maps, frozen.
+        written_values: Parameters of its effects, in their order.
         confirm: The confirm runs.
         candidates: Grid points tried.
         families: Families tried.
@@ -78,6 +121,8 @@ class Story:
     before: Frozen
     after: Frozen
     values: tuple[Mapping[str, Estimate], ...]
+    written: Frozen
+    written_values: tuple[Mapping[str, Estimate], ...]
     confirm: tuple[Run, ...]
     candidates: int
     families: tuple[str, ...]
@@ -85,8 +130,8 @@ class Story:
 
     @property
     def model(self) -> Model:
-        """The fitted model with the named effects; maps are not part of a model file."""
-        return as_model(self.balance, self.after.terms, self.values)
+        """The fitted model with what was found: named effects, and formulas in place of maps."""
+        return as_model(self.written.balance, self.written.terms, self.written_values)
 
 
 def diagnose(
@@ -199,6 +244,13 @@ def _balance(
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
     discovery = Search(balance, tried, gates, sealed.seed, twin).run()
     claims = _claims(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
+    beside = [c.part.candidate for c in claims if c.part.candidate is not None]
+    claims = [
+        c
+        if c.part.map is None
+        else replace(c, formulas=formulas(balance, [*balance.terms, *beside], c.part.map))
+        for c in claims
+    ]
     before = freeze(balance, [])
     return Story(
         balance=balance,
@@ -208,6 +260,8 @@ def _balance(
         before=before,
         after=before,
         values=(),
+        written=before,
+        written_values=(),
         confirm=tuple(loaded(told(run)) for run in held),
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
@@ -255,6 +309,10 @@ def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool
             claims.append(_map_claim(left, may_name))
         elif worth >= gates.map_floor and not claims:
             claims.append(Claim(Part(map=left), "something_missing", None, ()))
+    vetoes = [named.veto for named in discovery.named if named.veto is not None]
+    if not claims and vetoes:
+        # the effect is proved; that its name fell to this map makes it no smaller
+        claims.append(_map_claim(vetoes[0], may_name))
     last = discovery.steps[-1] if discovery.steps else None
     if not claims and last is not None and last.stands_out(gates):
         claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
@@ -304,9 +362,34 @@ def _confirmed(story: Story, gates: Gates) -> Story:
         else:
             what = claim.named.candidate.family if claim.named else UNKNOWN
             refused.append(f"{what}: {reason}")
-    values = intervals(story.balance, last.terms, seed=0)
+    values = tuple(intervals(story.balance, last.terms, seed=0))
+    story = replace(story, claims=tuple(kept), refused=tuple(refused), after=last, values=values)
+    return _written(story, gates)
+
+
+def _written(story: Story, gates: Gates) -> Story:
+    """Say what a model file holds; a formula that the confirm runs do not bear out is left out."""
+    if all(claim.part.map is None for claim in story.claims):
+        return replace(story, written=story.after, written_values=story.values)
+    kept: list[Claim] = []
+    refused = list(story.refused)
+    last = story.before
+    for claim in story.claims:
+        parts = [c.written for c in (*kept, claim)]
+        trial = (settled if claim.formulas else freeze)(story.balance, parts)
+        reason = _refusal(last, trial, story.confirm, gates) if claim.formulas else None
+        if reason is not None:
+            refused.append(f"the formula {claim.formulas[0].text}: {reason}")
+            kept.append(replace(claim, formulas=()))
+            continue
+        if claim.formulas:
+            best, *others = claim.formulas
+            claim = replace(claim, formulas=(best.settled(trial.terms, trial.weights), *others))
+        kept.append(claim)
+        last = trial
+    values = tuple(intervals(last.balance, last.terms, seed=0))
     return replace(
-        story, claims=tuple(kept), refused=tuple(refused), after=last, values=tuple(values)
+        story, claims=tuple(kept), refused=tuple(refused), written=last, written_values=values
     )
 
 
@@ -356,12 +439,26 @@ def _findings(story: Story) -> list[tuple[Finding, Added]]:
                     depends_on=claim.depends_on,
                     confidence=named.confidence if named else None,
                     parameters=_parameters(story, named.candidate) if named else {},
+                    formulas=_stated(story, claim, samples),
                 ),
                 _added(last, now, story.balance.runs),
             )
         )
         last = now
     return found
+
+
+def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
+    """Return the formulas of a claim; the first is written, and its error is confirmed.
+
+    A map is the last of a balance's claims, so the written model is the one with its formula.
+    """
+    found = claim.formulas
+    if not found:
+        return ()
+    left = squares(story.written, story.confirm, at_rest=True).sum()
+    confirmed = [float(np.sqrt(left / samples)), *(None for _ in found[1:])]
+    return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, confirmed, strict=True))
 
 
 def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
@@ -377,14 +474,20 @@ def _all(candidate: Candidate) -> tuple[Parameter, ...]:
 def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     """Report a cause seen in several balances once, where it explains the largest share."""
     found = [pair for story in stories.values() for pair in _findings(story)]
-    found.sort(key=lambda pair: pair[0].rmse_after / max(pair[0].rmse_before, 1e-300))
+    # a named fault of a sensor speaks for what other balances only show
+    found.sort(
+        key=lambda pair: (
+            not pair[0].family.startswith("sensor."),
+            pair[0].rmse_after / max(pair[0].rmse_before, 1e-300),
+        )
+    )
     kept: list[tuple[Finding, Added]] = []
     for finding, added in found:
         for k, (first, other) in enumerate(kept):
             if finding.balance in (first.balance, *first.also_in):
                 continue
             units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
-            if _same_cause(other, added, units[0] == units[1]):
+            if _same_cause(other, added, units[0] == units[1]) or _same_fault(first, finding):
                 kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
                 break
         else:
@@ -392,6 +495,28 @@ def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     order = list(stories)
     ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
     return [finding for finding, _ in ranked]
+
+
+def _same_fault(first: Finding, second: Finding) -> bool:
+    """Say whether a second balance shows a fault that the first one names.
+
+    A sensor that both balances read, or a wave of as many periods a turn.
+    """
+    if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
+        return False
+    if first.family.startswith("sensor."):
+        akin = second.family.startswith("sensor.") or second.family == UNKNOWN
+        return akin and (second.family in (first.family, UNKNOWN, *LIKE.get(first.family, ())))
+    rates = [_periods_per_turn(finding) for finding in (first, second)]
+    return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
+
+
+def _periods_per_turn(finding: Finding) -> float | None:
+    """Return a wave's periods a turn of the spindle, or None for what is no wave."""
+    order = finding.parameters.get("order")
+    if order is None:
+        return None
+    return order.value * (GEAR_RATIO if "motor_angle" in finding.depends_on else 1.0)
 
 
 def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:

@@ -13,13 +13,23 @@ from estimation.diagnosis.maps import RIDGE, Map
 from estimation.diagnosis.result import Error
 from estimation.recording import FloatArray
 
+ROUNDS = 30
+SETTLED = 1e-5
+"""Shapes are settled when a round lowers the squared error by less than this share of it."""
+
 
 @dataclass(frozen=True)
 class Part:
-    """What one finding adds: an effect, or a map."""
+    """What one finding adds: an effect, a map, or the terms of a formula in place of a map."""
 
     candidate: Candidate | None = None
     map: Map | None = None
+    formula: tuple[Candidate, ...] = ()
+
+    @property
+    def terms(self) -> tuple[Candidate, ...]:
+        """The effects among it."""
+        return self.formula if self.candidate is None else (self.candidate, *self.formula)
 
 
 @dataclass(frozen=True)
@@ -51,7 +61,7 @@ class Frozen:
 
 def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
     """Fit declared effects and parts together on the discovery runs."""
-    terms = [*balance.terms, *(p.candidate for p in parts if p.candidate is not None)]
+    terms = [*balance.terms, *(term for part in parts for term in part.terms)]
     maps = [p.map for p in parts if p.map is not None]
     weights = balance.solve(terms) if not maps else _with_maps(balance, terms, maps)
     level = 0.0
@@ -59,6 +69,25 @@ def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
     if balance.demean:
         level = float(np.mean([frozen.error(run).mean() for run in balance.runs]))
     return replace(frozen, level=level)
+
+
+def settled(balance: Balance, parts: Sequence[Part]) -> Frozen:
+    """Fit declared effects and the parts' effects together, amplitudes and shapes, and freeze.
+
+    Args:
+        balance: The balance on the runs that discover.
+        parts: Effects and formulas; a map has no shape to settle.
+    """
+    terms = [*balance.terms, *(term for part in parts for term in part.terms)]
+    terms = balance.refined(terms, passes=3)
+    for _ in range(ROUNDS):
+        before = balance.loss(terms)
+        terms = balance.stepped(terms)
+        if before - balance.loss(terms) < SETTLED * before:
+            break
+    declared = len(balance.terms)
+    moved = replace(balance, terms=terms[:declared])
+    return freeze(moved, [Part(formula=tuple(terms[declared:]))])
 
 
 def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]) -> FloatArray:

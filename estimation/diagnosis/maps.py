@@ -9,7 +9,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from estimation.derived import measured_channels
@@ -17,6 +16,7 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.effects.unknown_product import followed
 from estimation.recording import FloatArray
 
 CHANNELS = {
@@ -129,15 +129,15 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         count: Number of surrogates.
         seed: Their seed.
     """
-    bases = _bases(balance)
+    offered = bases(balance)
     base = [b[::THIN] for b in balance.base(terms)]
     left = [r[::THIN] for r in balance.left(terms)]
     drawn = surrogates(left, count, seed)
     aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
-    singles = {basis: _thinned(balance, basis) for basis in bases}
+    singles = {basis: _thinned(balance, basis) for basis in offered}
     found: list[Map] = []
     null = np.full(count, -np.inf)
-    for subset in [*((b,) for b in bases), *itertools.combinations(bases, 2)]:
+    for subset in [*((b,) for b in offered), *itertools.combinations(offered, 2)]:
         columns = [
             _centred(p[0] if len(p) == 1 else _products(*p), balance.demean)
             for p in zip(*(singles[basis] for basis in subset), strict=True)
@@ -171,19 +171,9 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
 
 def play(x: FloatArray, width: float) -> FloatArray:
     """Return the play operator of a signal: it follows when pulled by more than half its width."""
-    half = 0.5 * width
-    offset: FloatArray = (x - _followed(x, half)) / max(half, np.finfo(float).tiny)
+    offset: FloatArray = np.empty(len(x))
+    followed(x, max(0.5 * width, np.finfo(float).tiny), np.nan, offset)
     return offset
-
-
-@numba.njit(cache=True)
-def _followed(x: FloatArray, half: float) -> FloatArray:
-    out = np.empty(len(x))
-    value = x[0]
-    for k in range(len(x)):
-        value = min(max(value, x[k] - half), x[k] + half)
-        out[k] = value
-    return out
 
 
 def projection(balance: Balance) -> Callable[[Run], Run]:
@@ -213,18 +203,21 @@ def needed_channels(measured: Sequence[str]) -> list[str]:
     return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
 
 
-def _bases(balance: Balance) -> list[Basis]:
-    bases = []
+def bases(balance: Balance) -> list[Basis]:
+    """Return the variables that the balance's residual may be mapped over, simplest first."""
+    found = []
     for variable, channel in CHANNELS.items():
         if variable in BEHIND.get(balance.model.balance, ()):
             continue
+        if balance.model.target in (channel, *measured_channels([channel])):
+            continue  # the target tells its own residual, noise and all
         if any(channel not in run.channels for run in balance.runs):
             continue
         values = np.concatenate([run.channels[channel] for run in balance.runs])
         low, high = (float(v) for v in np.percentile(values, [1, 99]))
         if high - low > 1e-12 * max(abs(high), abs(low), 1e-12):
-            bases.append(Basis(variable, channel, low, high))
-    return bases
+            found.append(Basis(variable, channel, low, high))
+    return found
 
 
 def _thinned(balance: Balance, basis: Basis) -> list[FloatArray]:

@@ -41,6 +41,22 @@ class Value:
     ci95: tuple[float, float] | None
 
 
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """A formula that stands for an effect without a name.
+
+    Attributes:
+        text: The formula in SI units, amplitudes fitted.
+        gain: Share of squared error it removes on discovery runs left out.
+        rmse_after: Error on the confirm runs with it, the one that a model file holds; None for the
+            others, which are as good on the discovery runs.
+    """
+
+    text: str
+    gain: float
+    rmse_after: float | None
+
+
 @dataclass(frozen=True)
 class Finding:
     """One cause.
@@ -48,6 +64,7 @@ class Finding:
     Attributes:
         balance: Balance of its origin.
         also_in: Other balances that the same cause shows in.
+        formulas: Formulas of `depends_on` that do about equally well; the first one is written.
         family: Id of the effect, or `unknown`.
         verdict: What is claimed of it.
         alternatives: Families it cannot be told from on these runs.
@@ -74,6 +91,7 @@ class Finding:
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)
     also_in: tuple[str, ...] = ()
+    formulas: tuple[Stated, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +202,8 @@ ORDER = [
 
 def _finding(finding: Finding) -> dict[str, Any]:
     fields = asdict(finding)
-    return {name: fields[name] for name in ORDER}
+    optional = ["formulas"] if finding.formulas else []
+    return {name: fields[name] for name in [*ORDER, *optional]}
 
 
 def _plain(value: Any) -> Any:

@@ -21,8 +21,9 @@ from estimation.diagnosis.evidence import (
 from estimation.diagnosis.maps import Map, best_map
 from estimation.recording import FloatArray
 
-TwinNull = Callable[[float], float]
-"""Fall of squared error (target unit squared, pooled mean) to its p-value under the twin."""
+TwinNull = Callable[[float, float], float]
+"""Fall of squared error (target unit squared, pooled mean) and its share of the error it falls
+from, to its p-value under the twin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,8 @@ class Gates:
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        leftover: Least share that an effect has in what all found in a balance remove together:
+            what a name's form leaves of its own cause is no second cause.
         parameters: Named parameters of the whole model at most, or None for no limit.
         akin: Whether an effect may be added beside one that looks alike: where a model must
             predict well rather than be named surely.
@@ -56,6 +59,7 @@ class Gates:
     veto: float = 0.9
     sure: float = 0.9
     map_floor: float = 0.2
+    leftover: float = 0.15
     parameters: int | None = None
     akin: bool = False
     balances: int = 1
@@ -287,7 +291,9 @@ class Search:
         if self.twin is None or not trial.stands_out(self.gates):
             return trial
         samples = sum(len(y) for y in self.balance.target)
-        return replace(trial, p_twin=self.twin(trial.worth * self.declared_loss / samples))
+        return replace(
+            trial, p_twin=self.twin(trial.worth * self.declared_loss / samples, trial.gain)
+        )
 
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes."""
@@ -337,10 +343,16 @@ class Search:
                 enough = runs_agree(loss, joint) <= self.gates.agree
                 gains[k] = float(loss.sum() - joint.sum()) if enough else -1.0
             weakest = min(kept, key=lambda k: gains[k])
-            if gains[weakest] >= self.floor:
+            least = max(self.floor, self.gates.leftover * self._explained(found, kept))
+            if gains[weakest] >= least:
                 break
             kept.remove(weakest)
         return kept
+
+    def _explained(self, found: Sequence[Candidate], kept: Sequence[int]) -> float:
+        """Return the squared error that effects remove together."""
+        terms = [*self.balance.terms, *(found[k] for k in kept)]
+        return self.declared_loss - self.balance.loss(terms)
 
     def _beside(self, found: Sequence[Candidate], kept: Sequence[int], k: int) -> Losses:
         """Return the losses of one found effect beside all others."""

@@ -44,7 +44,8 @@ class Bootstrap:
         channels: Channels to prepare.
         level: P-value that decides.
         mapper: Maps over seeds; an executor's makes it parallel, then `twin` must be picklable.
-        falls: Largest fall of mean squared error of each twin so far.
+        falls: Of each twin so far the catalogue's largest fall of mean squared error, and the
+            largest share of it that any candidate removes.
     """
 
     twin: Twin
@@ -53,45 +54,56 @@ class Bootstrap:
     channels: Sequence[str]
     level: float
     mapper: Mapper = map
-    falls: list[float] = field(default_factory=list)
+    falls: list[tuple[float, float]] = field(default_factory=list)
 
-    def p_value(self, fall: float) -> float:
-        """Return the p-value of a fall; at most `MOST` twins, and `LEAST` where it may pass."""
-        while not self._decided(fall):
+    def p_value(self, fall: float, share: float) -> float:
+        """Return the larger p-value of a fall and of its share of the error it falls from.
+
+        What noise makes is so large, whatever else is missing; what filters make is such a share
+        of the error. At most `MOST` twins are made, and `LEAST` where it may pass.
+        """
+        while not self._decided(fall, share):
             seeds = range(len(self.falls), len(self.falls) + BATCH)
             work = partial(largest_fall, self.twin, self.model, self.pool, self.channels)
             self.falls += list(self.mapper(work, seeds))
-        return self._p(fall)
+        return max(self._p(0, fall), self._p(1, share))
 
-    def _p(self, fall: float) -> float:
-        above = sum(f >= fall for f in self.falls)
-        if above == 0 and (tail := self._tail(fall)) < CLEAR:
+    def _above(self, k: int, value: float) -> int:
+        return sum(found[k] >= value for found in self.falls)
+
+    def _p(self, k: int, value: float) -> float:
+        above = self._above(k, value)
+        if above == 0 and (tail := self._tail(k, value)) < CLEAR:
             return tail
         return (1 + above) / (1 + len(self.falls))
 
-    def _decided(self, fall: float) -> bool:
+    def _decided(self, fall: float, share: float) -> bool:
         done = len(self.falls)
-        above = sum(f >= fall for f in self.falls)
-        if (1 + above) / (1 + MOST) > self.level:
+        worst = max(self._above(0, fall), self._above(1, share))
+        if (1 + worst) / (1 + MOST) > self.level:
             return True
         if done < LEAST:
             return False
-        won = (1 + above) / (1 + done) <= self.level
-        return won or (above == 0 and self._tail(fall) < CLEAR) or done >= MOST
+        won = (1 + worst) / (1 + done) <= self.level
+        clear = worst == 0 and max(self._tail(0, fall), self._tail(1, share)) < CLEAR
+        return won or clear or done >= MOST
 
-    def _tail(self, fall: float) -> float:
-        """Return the tail probability of a Gumbel law through the falls: they are maxima."""
-        spread = float(np.std(self.falls, ddof=1)) * math.sqrt(6) / math.pi
-        middle = float(np.mean(self.falls)) - 0.5772 * spread
+    def _tail(self, k: int, value: float) -> float:
+        """Return the tail probability of a Gumbel law through what was found: maxima."""
+        found = np.array([pair[k] for pair in self.falls])
+        spread = float(np.std(found, ddof=1)) * math.sqrt(6) / math.pi
+        middle = float(np.mean(found)) - 0.5772 * spread
         if spread <= 0:
             return 1.0
-        return float(-np.expm1(-np.exp(-min((fall - middle) / spread, 700.0))))
+        return float(-np.expm1(-np.exp(-min((value - middle) / spread, 700.0))))
 
 
 def largest_fall(
     twin: Twin, model: Model, pool: Sequence[Candidate], channels: Sequence[str], seed: int
-) -> float:
+) -> tuple[float, float]:
     """Return the largest fall of mean squared error the catalogue reaches on one twin.
+
+    And the share of that error that falls.
 
     Args:
         twin: Makes a campaign.
@@ -108,7 +120,7 @@ def largest_fall(
     sizes = [len(c.effect.amplitudes) for c in pool]
     losses = leave_one_run_out(balance.base(balance.terms), table, sizes, aims)
     fall = losses.base.sum() - losses.joint[:, :, 0].sum(axis=0).min()
-    return float(fall) / sum(len(y) for y in balance.target)
+    return float(fall) / sum(len(y) for y in balance.target), float(fall / losses.base.sum())
 
 
 def coarse(run: Run) -> Run:

@@ -9,6 +9,7 @@ from functools import cache
 from types import MappingProxyType
 
 from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
+from estimation.effects.unknown_product import FORMS, product
 from estimation.errors import EstimationError
 
 __all__ = [
@@ -44,17 +45,20 @@ def catalogue() -> Mapping[str, Effect]:
 
 
 def effect(name: str) -> Effect:
-    """Return one effect by its id.
+    """Return one effect by its id, of the catalogue or a term of a formula, `unknown.sign.bump`.
 
     Raises:
         UnknownEffectError: There is none of that id; the nearest one is named.
     """
     known = catalogue()
+    if name not in known and (term := product(name)) is not None:
+        return term
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
         raise UnknownEffectError(
             f"There is no effect {name!r}.",
-            f"The catalogue has: {', '.join(known)}.",
+            f"The catalogue has: {', '.join(known)}; formulas: unknown.FORM or unknown.FORM.FORM of"
+            f" {', '.join(FORMS)}.",
             f"Did you mean {near[0]!r}?" if near else "",
         )
     return known[name]

@@ -56,6 +56,7 @@ def diagnose(
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import declared_models, run_diagnosis
+    from rig.diagnosis.written import with_cost_of_causal_filters
     from rig.errors import UsageError
     from rig.reports.diagnosis import page, sentences
     from rig.reports.provenance import Provenance
@@ -79,6 +80,8 @@ def diagnose(
             quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),
         )
+    if model_out is not None:
+        done = with_cost_of_causal_filters(done)
     for line in sentences(done.diagnosis):
         screen.print(line, markup=False)
     for note in done.diagnosis.notes:

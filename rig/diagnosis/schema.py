@@ -32,6 +32,14 @@ class Parameter(_Strict):
     ci95: tuple[Number, Number] | None
 
 
+class Formula(_Strict):
+    """A formula of the variables that an effect without a name depends on."""
+
+    text: str
+    gain: Number
+    rmse_after: Number | None
+
+
 class Finding(_Strict):
     """One cause."""
 
@@ -48,6 +56,9 @@ class Finding(_Strict):
     runs_improved: int
     runs_total: int
     runs_affected: list[str]
+    formulas: list[Formula] = []
+    """Formulas that do about equally well, the one that a model file holds first; may be left out.
+    """
 
 
 class Runs(_Strict):

@@ -46,7 +46,21 @@ def _sentence(finding: Finding, unit: str) -> str:
         f" ({finding.runs_improved} of {finding.runs_total} runs better)"
     )
     also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
-    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{_formula(finding, unit)}"
+
+
+def _formula(finding: Finding, unit: str) -> str:
+    """Return the formula that a model file holds, in words; empty without one."""
+    if not finding.formulas:
+        return ""
+    best = finding.formulas[0]
+    scale, shown = _display(unit)
+    left = (
+        "" if best.rmse_after is None else f", which leaves {scale * best.rmse_after:.3g} {shown}"
+    )
+    more = len(finding.formulas) - 1
+    others = f"; {more} more do about as well" if more else ""
+    return f" As a formula: {best.text} (SI units){left}{others}."
 
 
 def _claim(finding: Finding) -> str:
@@ -117,6 +131,8 @@ def tables(done: Diagnosed) -> list[TextTable]:
     shown = [_errors(done.diagnosis)]
     if any(f.parameters for f in done.diagnosis.findings):
         shown.append(_parameters(done.diagnosis.findings))
+    if any(f.formulas for f in done.diagnosis.findings):
+        shown.append(_formulas(done.diagnosis))
     for name, story in done.stories.items():
         shown += [_tried(name, story), _moved(done.diagnosis, name)]
     return shown
@@ -153,6 +169,23 @@ def _parameters(findings: Sequence[Finding]) -> TextTable:
             rows.append([f"{finding.balance}, {finding.family}, {name}", *cells])
     columns = ["parameter", "value", "95 %", "unit"]
     return TextTable("Parameters of what was found", columns, rows, "Bootstrap over runs.")
+
+
+def _formulas(diagnosis: Diagnosis) -> TextTable:
+    rows = []
+    for finding in diagnosis.findings:
+        scale, unit = _display(diagnosis.unit[finding.balance])
+        for one in finding.formulas:
+            left = "" if one.rmse_after is None else f"{scale * one.rmse_after:.3g} {unit}"
+            rows.append([f"{finding.balance}: {one.text}", f"{100 * one.gain:.1f} %", left])
+    return TextTable(
+        "Formulas of what has no name",
+        ["formula, SI units", "gain, runs left out", "error on the confirm runs"],
+        rows,
+        "These do about equally well on the runs that discovered; a model file holds the first."
+        " bump(x; c, s) = exp(-((x - c) / s)^2), step(x; c, s) = (1 + tanh((x - c) / s)) / 2,"
+        " play(x; s): how far a slack of s on either side is crossed, -1 to 1.",
+    )
 
 
 def _tried(name: str, story: Story) -> TextTable:

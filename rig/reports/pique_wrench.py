@@ -10,8 +10,9 @@ TITLE = "Free space and contact on simulated arms: tables 3.1 to 3.3 of Piqué 2
 NOTES = (
     "Every seed draws an arm: parameters near the thesis' table 2.2, and hidden friction with"
     " memory (Dahl), friction by another joint's position, and drift, which no model declares."
-    " Their sizes were set once so that the thesis' own method meets its table 3.2; motion of the"
-    " hand and of the contact is assumed. A column counts for a comparison only where the thesis'"
+    " Their sizes were set over several rounds on these seeds so that the thesis' own method meets"
+    " its table 3.2; motion of the hand and of the contact is assumed. A column"
+    " counts for a comparison only where the thesis'"
     " method lands within 25 % of the thesis' number.",
     "The force sensor has noise, bias, drift, cross-talk of 1 % and a frame turned and moved;"
     " wrenches are in the base frame. Both sides pass a zero-phase Butterworth filter at 5 Hz.",

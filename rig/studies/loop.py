@@ -207,7 +207,12 @@ def _row(
     runs = _prepared(discover, wanted, declared)
     tried = covered(tried, runs)
     gates = Gates(
-        most=task.parameters, parameters=task.parameters, akin=True, surrogates=99, floor=FLOOR
+        most=task.parameters,
+        parameters=task.parameters,
+        akin=True,
+        surrogates=99,
+        floor=FLOOR,
+        leftover=0.0,
     )
     search = Search(lay_out(fitted, runs), tried, gates, sealed.seed)
 

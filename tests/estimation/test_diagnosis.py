@@ -10,6 +10,7 @@ import pytest
 from estimation import model_file
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.diagnosis.maps import bases
 from estimation.diagnosis.search import Gates
 from estimation.diagnosis.split import SplitError, data_hash, split
 from estimation.errors import EstimationError
@@ -68,7 +69,7 @@ def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
 
 
 def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
-    diagnosis, _ = diagnosed(runs(tight_spot))
+    diagnosis, stories = diagnosed(runs(tight_spot))
     assert diagnosis.verdict == "depends_on"
     (finding,) = diagnosis.findings
     assert finding.family == "unknown"
@@ -76,6 +77,43 @@ def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found(
     assert "spindle_angle" in finding.depends_on
     assert finding.confidence is None
     assert finding.rmse_after < 0.5 * finding.rmse_before
+    # the form it was made by, written as effects that run as any other
+    assert 1 <= len(finding.formulas) <= 5
+    (best, *others) = finding.formulas
+    assert "tanh(velocity" in best.text
+    assert best.rmse_after < 1.1 * finding.rmse_after
+    assert best.gain > 0.9
+    assert all(other.rmse_after is None for other in others)
+    fitted = stories["motor"].model
+    (spot,) = [term for term in fitted.terms if term.effect.family == "unknown"]
+    assert spot.effect.id in ("unknown.sign.bump", "unknown.bump.sign")
+    shape = {name.split("_")[1]: known.value for name, known in spot.values.items() if "_" in name}
+    role = "second" if spot.effect.id.endswith("bump") else "first"
+    assert spot.values[f"{role}_width"].value == pytest.approx(0.1, rel=0.05)
+    assert spot.values[f"{role}_width"].value * shape["place"] == pytest.approx(0.2, abs=0.005)
+    assert model_file.parse(model_file.to_toml(fitted)) == fitted
+
+
+def test_a_name_withdrawn_by_a_map_below_its_own_floor_leaves_a_finding():
+    recordings = runs(tight_spot, count=9, seconds=4.0)
+    gates = replace(QUICK, map_floor=0.999)
+    diagnosis, stories = diagnose(recordings, [MOTOR], split(recordings, 1), gates=gates)
+    assert any(named.veto is not None for named in stories["motor"].discovery.named)
+    (finding,) = diagnosis.findings
+    assert (finding.family, finding.verdict) == ("unknown", "depends_on")
+    assert "spindle_angle" in finding.depends_on
+
+
+def test_a_balance_is_never_mapped_over_its_own_target():
+    recordings = [
+        r.with_columns(jaw_angle_rad=r["spindle_angle_rad"] * 1.1 - r["distal_torque_n_m"])
+        for r in runs(count=6, seconds=2.0)
+    ]
+    stretch = model_file.read(Path("stretch"))
+    _, stories = diagnose(recordings, [stretch], split(recordings, 1), gates=QUICK)
+    mapped = {basis.variable for basis in bases(stories["stretch"].balance)}
+    assert "spindle_angle" in mapped
+    assert "jaw_angle" not in mapped
 
 
 @pytest.mark.parametrize("seed", [100, 200, 300, 400])

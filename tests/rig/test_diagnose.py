@@ -1,6 +1,7 @@
 """`rig diagnose` from a path to JSON, report, model file and ledger."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,12 +16,13 @@ from estimation.diagnosis.frozen import freeze, samples_of, squares
 from estimation.diagnosis.result import VERDICTS, Diagnosis, Finding
 from estimation.diagnosis.search import Gates
 from estimation.diagnosis.split import Sealed, split
+from estimation.estimator import load
 from estimation.fitting import fit
 from rig.cli.main import main
 from rig.diagnosis import run as diagnosis_run
 from rig.diagnosis.ledger import Ledger, LedgerError
 from rig.diagnosis.schema import FILE, DiagnosisSchema, json_schema
-from tests.estimation.test_diagnosis import runs, spring
+from tests.estimation.test_diagnosis import runs, spring, tight_spot
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,6 +61,40 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "spring.position is missing" in captured.err
+
+
+def test_what_has_no_name_is_written_as_a_formula_that_runs_live(monkeypatch, tmp_path, capsys):
+    recordings = runs(tight_spot, count=9, seconds=4.0)
+    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(recordings))
+    path, report = tmp_path / "model.toml", tmp_path / "report"
+    words = ["--model-out", str(path), "--report", str(report), "--balance", "motor"]
+    found = run(tmp_path, *words, "--quick")
+    DiagnosisSchema.model_validate(found)
+    (finding,) = found["findings"]
+    assert finding["verdict"] == "depends_on"
+    best = finding["formulas"][0]
+    assert "bump(spindle_angle" in best["text"]
+    assert best["text"] in (report / "diagnosis.html").read_text()
+    assert best["text"] in capsys.readouterr().err
+    estimator = load(path)
+    assert any(t.effect.family == "unknown" for t in estimator.model.terms)
+
+    confirm = [r for r in recordings if r.name in found["runs"]["confirm"]]
+    left = np.array([r["proximal_torque_n_m"] - estimator.predict(r) for r in confirm])[:, 300:-300]
+    left -= left.mean(axis=1, keepdims=True)
+    # the raw sensor's noise of 1 mN m on top of what the filtered runs leave
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(np.hypot(best["rmse_after"], 1e-3), rel=0.1)
+    (one, *_) = confirm
+    stepper = estimator.stepper(one.sample_rate_hz)
+    parts = [slice(k, k + 64) for k in range(0, len(one), 64)]
+    live = np.concatenate(
+        [stepper.step(one.time_s[p], {c: v[p] for c, v in one.columns.items()}) for p in parts]
+    )
+    assert live == pytest.approx(estimator.predict(one, causal=True), rel=1e-12, abs=1e-14)
+    (note,) = [n for n in found["notes"] if "causal" in n]
+    zero_phase, causal = (float(n) for n in re.findall(r"([\d.]+) mN m", note))
+    assert zero_phase == pytest.approx(1e3 * best["rmse_after"], rel=0.01)
+    assert causal > zero_phase
 
 
 def test_reported_errors_count_samples_at_rest_too():

@@ -1,0 +1,210 @@
+"""Terms of a formula that no effect of the catalogue stands for: products of plain functions."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, ClassVar, NamedTuple, cast
+
+import numba
+import numpy as np
+
+from estimation.effects.effect import Effect, Parameter
+from estimation.recording import FloatArray
+
+UNKNOWN = "unknown"
+ROLES = {"first": "spindle_angle_rad", "second": "motor_velocity_rad_s"}
+MOST_FACTORS = len(ROLES)
+
+_SCALES = (1e-6, 1e6)
+
+
+class Form(NamedTuple):
+    """One function of one variable.
+
+    Attributes:
+        of: Values and shape to the function's values.
+        shape: Name, unit over the role `{role}`, and meaning of each shape parameter.
+        text: The function in words; `{x}` is the variable, `{0}`, `{1}` are the shape.
+    """
+
+    of: Callable[..., Any]
+    shape: tuple[tuple[str, str, str], ...]
+    text: str
+
+
+_WIDTH = ("width", "{role}", "over so much it changes")
+_PLACE = ("place", "1", "where its middle is, in widths")
+
+FORMS: Mapping[str, Form] = {
+    "value": Form(lambda x: x, (), "{x}"),
+    "absolute": Form(np.abs, (), "|{x}|"),
+    "square": Form(np.square, (), "{x}^2"),
+    "cube": Form(lambda x: x * np.square(x), (), "{x}^3"),
+    "sign": Form(lambda x, width: np.tanh(x / width), (_WIDTH,), "tanh({x} / {0:.3g})"),
+    "sine": Form(
+        lambda x, order: np.sin(order * x),
+        (("order", "1 / {role}", "radians a unit"),),
+        "sin({0:.4g} {x})",
+    ),
+    "cosine": Form(
+        lambda x, order: np.cos(order * x),
+        (("order", "1 / {role}", "radians a unit"),),
+        "cos({0:.4g} {x})",
+    ),
+    "bump": Form(
+        lambda x, width, place: np.exp(-np.square(x / width - place)),
+        (_WIDTH, _PLACE),
+        "bump({x}; {middle:.3g}, {0:.3g})",
+    ),
+    "step": Form(
+        lambda x, width, place: 0.5 * (1.0 + np.tanh(x / width - place)),
+        (_WIDTH, _PLACE),
+        "step({x}; {middle:.3g}, {0:.3g})",
+    ),
+    "play": Form(
+        lambda x, _: x,  # `followed` walks it
+        (("width", "{role}", "half the travel that crosses it"),),
+        "play({x}; {0:.3g})",
+    ),
+}
+"""Functions of one variable. `bump(x; c, s)` is exp(-((x - c) / s)^2), `step(x; c, s)` rises
+from 0 to 1 within about s of c, `play(x; s)` is how far a slack of s on either side is crossed."""
+
+
+class Product(Effect):
+    """A term of a formula: an amplitude times a function of one variable, or of each of two.
+
+    Equation: torque = a f(first) g(second), f and g from `FORMS`, named in the id as in
+    `unknown.sign.bump`.
+
+    Source: a search over products of plain functions, as in orthogonal matching pursuit (Pati,
+    Rezaiifar and Krishnaprasad 1993); it stands for no known cause.
+    """
+
+    forms: ClassVar[tuple[str, ...]]
+    family = UNKNOWN
+
+    def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
+        """Return the one column, shape (n, 1)."""
+        made: FloatArray = np.ones(len(next(iter(inputs.values()))))
+        for form, values, own in self._factors(inputs, shape):
+            if form == "play":
+                crossed = np.empty(len(values))
+                followed(np.ascontiguousarray(values), own[0], np.nan, crossed)
+                made = made * crossed
+            else:
+                made = made * FORMS[form].of(values, *own)
+        return made[:, None]
+
+    def start(self) -> list[float]:
+        """Return where the play of each factor stands: nowhere before the first sample."""
+        return [np.nan] * self.forms.count("play")
+
+    def step(
+        self, inputs: Mapping[str, float], shape: Sequence[float], state: list[float]
+    ) -> Sequence[float]:
+        """Return the one value."""
+        made, played = 1.0, 0
+        for form, value, own in self._factors(inputs, shape):
+            if form == "play":
+                crossed = np.empty(1)
+                state[played] = followed(np.array([value]), own[0], state[played], crossed)
+                made *= float(crossed[0])
+                played += 1
+            else:
+                made *= float(FORMS[form].of(value, *own))
+        return [made]
+
+    def _factors(
+        self, inputs: Mapping[str, Any], shape: Sequence[float]
+    ) -> list[tuple[str, Any, Sequence[float]]]:
+        """Return form, values and shape of each factor."""
+        factors, at = [], 0
+        for form, role in zip(self.forms, self.roles, strict=True):
+            count = len(FORMS[form].shape)
+            factors.append((form, inputs[role], shape[at : at + count]))
+            at += count
+        return factors
+
+    def in_words(self, variables: Mapping[str, str], shape: Sequence[float]) -> str:
+        """Return the product as a person writes it.
+
+        Args:
+            variables: Role to the name of its variable.
+            shape: Values of the shape parameters.
+        """
+        words = []
+        for form, variable, own in self._factors(variables, shape):
+            middle = own[0] * own[1] if len(own) == 2 else 0.0
+            words.append(FORMS[form].text.format(*own, x=variable, middle=middle))
+        return " ".join(words)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to other processes by name."""
+        return product, (self.id,)
+
+
+def product_id(*forms: str) -> str:
+    """Return the id of a product of forms."""
+    return ".".join((UNKNOWN, *forms))
+
+
+@cache
+def product(name: str) -> Product | None:
+    """Return the product of that id; None when it names none."""
+    family, *forms = name.split(".")
+    if family != UNKNOWN or not 1 <= len(forms) <= MOST_FACTORS or not set(forms) <= set(FORMS):
+        return None
+    roles = dict(list(ROLES.items())[: len(forms)])
+    powers = [role for role, form in zip(roles, forms, strict=True) for _ in range(_power(form))]
+    unit = " / ".join(["target", *powers])
+    kind = type(
+        "Product",
+        (Product,),
+        {
+            "__doc__": Product.__doc__,
+            "id": name,
+            "family": UNKNOWN,
+            "forms": tuple(forms),
+            "roles": roles,
+            "amplitudes": (Parameter("amplitude", unit, "its size"),),
+            "shape": tuple(
+                _parameter(role, *known)
+                for role, form in zip(roles, forms, strict=True)
+                for known in FORMS[form].shape
+            ),
+        },
+    )
+    return cast(Product, kind())
+
+
+def _power(form: str) -> int:
+    """Return the power of the variable's unit that a form has."""
+    return {"value": 1, "absolute": 1, "square": 2, "cube": 3}.get(form, 0)
+
+
+def _parameter(role: str, name: str, unit: str, meaning: str) -> Parameter:
+    full, own = f"{role}_{name}", unit.format(role=role)
+    if name == "place":
+        return Parameter(full, own, meaning, -200.0, 200.0, linear=True, points=801)
+    return Parameter(full, own, meaning, *_SCALES, points=124)
+
+
+@numba.njit(cache=True)
+def followed(values: FloatArray, half: float, follower: float, crossed: FloatArray) -> float:
+    """Write how far a slack is crossed, -1 to 1, into `crossed`, and return where it stands.
+
+    Args:
+        values: What drives, shape (n,); a value that is not finite gives NaN and moves nothing.
+        half: Half the slack, in their unit.
+        follower: Where what follows stands before the first value; NaN takes the first value.
+        crossed: Shape (n,), written.
+    """
+    for k in range(len(values)):
+        value = values[k]
+        if np.isfinite(value):
+            if np.isfinite(follower):
+                follower = min(max(follower, value - half), value + half)
+            else:
+                follower = value
+        crossed[k] = (value - follower) / half
+    return follower

@@ -1,0 +1,77 @@
+"""Which candidates a search is given, and which of them are something else in disguise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.candidate import Candidate, pool
+from estimation.diagnosis.design import Run, covered
+from estimation.effects import effect
+from estimation.model import Model, Term
+from estimation.model_file import ModelFileError, parse, to_toml
+
+CHANNELS = ("motor_current_a", "motor_angle_rad", "spindle_angle_rad")
+LINEAR = Model("linear", "motor", "proximal_torque_n_m", (Term(effect("motor.torque_constant")),))
+
+
+def wave(order: float) -> Candidate:
+    return Candidate.of(Term(effect("ripple.output")), [order])
+
+
+def swept(span_rad: float) -> Run:
+    angle = np.linspace(0.0, span_rad, 100)
+    every = np.ones(100, bool)
+    return Run("swept", {"spindle_angle_rad": angle}, every, every, 1)
+
+
+def test_a_wave_is_only_a_wave_where_a_run_covers_a_period():
+    kept = covered([wave(4.0), wave(8.0)], [swept(0.5), swept(1.0)])
+    assert [c.shape for c in kept] == [(8.0,)]
+
+
+def test_an_effect_without_a_wave_is_always_covered():
+    friction = Candidate.of(Term(effect("friction.drag")), [])
+    assert covered([friction], [swept(0.1)]) == [friction]
+
+
+@pytest.mark.parametrize(("place", "limit"), [(0.5, False), (0.8, False), (1.0, True)])
+def test_presliding_over_the_longest_way_is_a_spring(place, limit):
+    kind = effect("hysteresis.presliding")
+    (reach,) = kind.shape
+    value = reach.lower ** (1 - place) * reach.upper**place
+    assert Candidate.of(Term(kind), [value]).is_limit is limit
+
+
+def test_what_acts_at_rest_is_searched_where_samples_at_rest_count():
+    moving = {c.id for c in pool(LINEAR, CHANNELS)}
+    resting = {c.id for c in pool(replace(LINEAR, counted="all"), CHANNELS)}
+    assert {i for i in resting if effect(i).at_rest} == resting - moving
+    assert "friction.load.sticking" in resting
+
+
+def test_a_channel_may_play_the_roles_of_another():
+    instead = {"motor_current_a": "motor_command_ratio", "motor_load_n_m": "motor_command_ratio"}
+    measured = ("motor_command_ratio", "motor_angle_rad", "spindle_angle_rad")
+    found = pool(LINEAR, measured, instead)
+    assert any(("current", "motor_command_ratio") in c.channels for c in found)
+    assert all(name != "motor_current_a" for c in found for _, name in c.channels)
+
+
+@pytest.mark.parametrize("counted", [None, "all", "motion", "closing"])
+def test_a_model_file_says_which_samples_count(counted):
+    model = replace(LINEAR, counted=counted)
+    assert parse(to_toml(model)).counted == counted
+
+
+def test_friction_counts_samples_in_motion_unless_the_file_says_otherwise():
+    terms = (*LINEAR.terms, Term(effect("friction.coulomb"), -1))
+    assert replace(LINEAR, terms=terms).samples == "motion"
+    assert LINEAR.samples == "all"
+    assert replace(LINEAR, terms=terms, counted="all").samples == "all"
+
+
+def test_an_unknown_choice_of_samples_names_the_nearest():
+    text = to_toml(replace(LINEAR, counted="closing")).replace('"closing"', '"closed"')
+    with pytest.raises(ModelFileError, match="closing"):
+        parse(text)
