@@ -22,7 +22,10 @@ class FirmwareProcess:
             raise FirmwareMissingError(
                 "The firmware is not built.", f"There is no {program}.", "Run: make -C firmware"
             )
-        self.process = subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True)  # noqa: S603
+        # a group of its own: what ends the program must not end the board before it is safe
+        self.process = subprocess.Popen(  # noqa: S603
+            [str(program)], stdout=subprocess.PIPE, text=True, process_group=0
+        )
         assert self.process.stdout is not None  # noqa: S101
         self.path = self.process.stdout.readline().strip()
         self._port: Transport = open_transport(self.path)

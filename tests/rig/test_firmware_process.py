@@ -1,5 +1,7 @@
 """The firmware as a process on a pseudo-terminal, in real time; asserted is its own clock."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -99,3 +101,34 @@ def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:
 def test_a_missing_program_says_what_to_type(tmp_path: Path) -> None:
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
         FirmwareProcess(tmp_path / "none")
+
+
+WATCHER = """
+from pathlib import Path
+from rig.config import load_config
+from rig.logger import open_logger
+from rig.session import Session
+
+config = load_config(Path("pty"))
+try:
+    with Session(config, open_logger(config)) as session:
+        for _ in session.watch():
+            print("watching", flush=True)
+except BaseException as error:
+    print(repr(error), flush=True)
+"""
+
+
+def test_a_signal_to_the_whole_group_ends_the_program_after_the_board_is_safe(
+    program: Path,
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", WATCHER], stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as host:
+        assert host.stdout is not None
+        assert host.stdout.readline().strip() == "watching"
+        os.killpg(host.pid, signal.SIGTERM)
+        told = host.stdout.read().splitlines()[-1]
+    assert "not confirm" not in told
+    assert "SafetyTripError" not in told
+    assert told.startswith(("KeyboardInterrupt", "SystemExit", "Terminated")), told
