@@ -302,7 +302,8 @@ def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
-    if left is not None and left.p <= gates.level:
+    told = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
+    if left is not None and left.p <= gates.level and left.variables not in told:
         worth = left.gain * _share_left(claims, balance)
         # also what a named effect's form leaves of its own cause is no second cause
         if worth >= gates.map_floor and left.agree <= gates.agree:

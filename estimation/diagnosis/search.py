@@ -383,7 +383,11 @@ class Search:
         }
         terms = [*self.balance.terms, *others]
         flat = best_map(self.balance, terms, 0, self.seed)
-        better = flat is not None and self._vetoes(flat, mine)
+        better = (
+            flat is not None
+            and flat.variables != found[k].effect.any_function_of
+            and self._vetoes(flat, mine)
+        )
         return Named(
             found[k],
             trial,

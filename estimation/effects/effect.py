@@ -69,6 +69,8 @@ class Effect(ABC):
             whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        any_function_of: Variables of which any function, whatever its form, is this effect: a map
+            of them is no other name.
         at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
     """
 
@@ -82,6 +84,7 @@ class Effect(ABC):
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     at_rest: ClassVar[bool] = False
+    any_function_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         """Let the family be the id where none is stated."""

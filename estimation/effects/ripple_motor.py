@@ -19,6 +19,7 @@ class MotorRipple(Pointwise):
     id = "ripple.motor"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
+    any_function_of = ("motor_angle",)
     amplitudes = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
