@@ -3,135 +3,44 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from estimation.campaign import Campaign, with_campaign_time
-from estimation.derived import GEAR_RATIO
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.balance import Balance, as_model, intervals, lay_out
-from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
+from estimation.diagnosis.balance import intervals, lay_out
+from estimation.diagnosis.candidate import UNKNOWN, pool
+from estimation.diagnosis.claims import claims_of
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
-from estimation.diagnosis.formula import Formula, formulas
+from estimation.diagnosis.findings import moved, one_cause_one_finding
+from estimation.diagnosis.formula import formulas
 from estimation.diagnosis.frozen import (
     Frozen,
-    Part,
     errors,
     freeze,
-    samples_of,
     settled,
     squares,
 )
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
-from estimation.diagnosis.maps import CHANNELS, LOAD, Map, needed_channels, projection
-from estimation.diagnosis.result import Diagnosis, Error, Finding, Stated, Value
-from estimation.diagnosis.search import Discovery, Gates, Named, Search
+from estimation.diagnosis.maps import needed_channels, projection
+from estimation.diagnosis.result import Diagnosis, Error
+from estimation.diagnosis.search import Gates, Search
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.diagnosis.story import Claim, Story
 from estimation.diagnosis.twin import Bootstrap, Twin
-from estimation.effects import Parameter
 from estimation.errors import EstimationError
 from estimation.fitting import fit
-from estimation.model import Estimate, Model
-from estimation.recording import FloatArray, Recording
+from estimation.model import Model
+from estimation.recording import Recording
 
 Maker = Callable[[Model, Sequence[Recording]], Twin]
 """Fitted model and discovery runs to their simulated twin."""
 
 Stage = Callable[[str], None]
 """Told what begins, in words."""
-
-Added = Mapping[str, FloatArray]
-"""Run to what a finding changes in the estimate at its valid samples, shape (n,)."""
-
-SAME_CAUSE = 0.9
-"""Two balances show one cause when what it adds to them correlates at least this well."""
-
-SAME_RATE = 0.03
-"""Two waves are one when their periods a turn differ by less than this share."""
-
-_TORQUE = "proximal torque sensor"
-SENSORS = {
-    "motor": {"current sensor", _TORQUE, "motor encoder"},
-    "gearbox": {_TORQUE, "motor encoder", "spindle encoder"},
-    "cable": {_TORQUE, "distal torque sensor", "spindle encoder"},
-    "stretch": {"distal torque sensor", "spindle encoder", "jaw encoder"},
-}
-"""What each balance reads: a sensor at fault shows in all that read it."""
-
-LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
-"""Faults that two balances may name differently."""
-
-TWICE = 2.0
-"""And when the sizes differ by less than this factor."""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One finding before it is confirmed.
-
-    Attributes:
-        part: What it adds.
-        verdict: What is claimed.
-        named: The effect, or None.
-        depends_on: Variables.
-        formulas: What stands for its map in a model, the one that is written first.
-    """
-
-    part: Part
-    verdict: str
-    named: Named | None
-    depends_on: tuple[str, ...]
-    formulas: tuple[Formula, ...] = ()
-
-    @property
-    def written(self) -> Part:
-        """What a model file holds of it: a formula in place of a map; nothing without one."""
-        if self.part.map is None:
-            return self.part
-        return Part(formula=self.formulas[0].terms) if self.formulas else Part()
-
-
-@dataclass(frozen=True)
-class Story:
-    """All that a report needs about one balance.
-
-    Attributes:
-        balance: The balance on the runs that discover.
-        discovery: What the search did.
-        claims: Claims that the confirm runs bore out.
-        refused: Claims they did not, in words.
-        before: Declared model, frozen.
-        after: Model with the claims, frozen.
-        values: Parameters of `after`'s effects, in their order.
-        written: What a model file holds: `after` with formulas in place of maps, frozen.
-        written_values: Parameters of its effects, in their order.
-        confirm: The confirm runs.
-        candidates: Grid points tried.
-        families: Families tried.
-        unused: Runs without a usable sample in this balance.
-    """
-
-    balance: Balance
-    discovery: Discovery
-    claims: tuple[Claim, ...]
-    refused: tuple[str, ...]
-    before: Frozen
-    after: Frozen
-    values: tuple[Mapping[str, Estimate], ...]
-    written: Frozen
-    written_values: tuple[Mapping[str, Estimate], ...]
-    confirm: tuple[Run, ...]
-    candidates: int
-    families: tuple[str, ...]
-    unused: tuple[str, ...] = ()
-
-    @property
-    def model(self) -> Model:
-        """The fitted model with what was found: named effects, and formulas in place of maps."""
-        return as_model(self.written.balance, self.written.terms, self.written_values)
 
 
 def diagnose(
@@ -185,7 +94,7 @@ def diagnose(
     on_stage("opening the confirm runs")
     on_open()
     stories = {name: _confirmed(story, gates) for name, story in stories.items()}
-    findings = _one_cause_one_finding(stories)
+    findings = one_cause_one_finding(stories)
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
     }
@@ -194,7 +103,7 @@ def diagnose(
         errors=found,
         unit={name: s.balance.model.unit for name, s in stories.items()},
         noise_floor=dict.fromkeys(stories),
-        moved={name: _moved(s) for name, s in stories.items()},
+        moved={name: moved(s) for name, s in stories.items()},
         sealed=sealed,
         undecided={name: str(error) for name, error in failed.items()},
         notes=(*audit(discovering), *_notes(sealed, twins, stories)),
@@ -243,7 +152,7 @@ def _balance(
         source = maker(fitted, discover)
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
     discovery = Search(balance, tried, gates, sealed.seed, twin).run()
-    claims = _claims(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
+    claims = claims_of(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
     beside = [c.part.candidate for c in claims if c.part.candidate is not None]
     claims = [
         c
@@ -287,66 +196,6 @@ def _usable(
                 raise
             unused.append(recording.name)
     return runs, unused
-
-
-def _claims(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
-    """Return what is claimed, and no more than that."""
-    claims: list[Claim] = []
-    for named in discovery.named:
-        if named.veto is not None:
-            continue  # the map of what is left then speaks for it
-        if may_name:
-            sure = not named.rivals and named.confidence >= gates.sure
-            verdict = "identified" if sure else "one_of"
-            claims.append(Claim(Part(named.candidate), verdict, named, _variables(named)))
-        else:
-            claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
-    left = discovery.left_map
-    told = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
-    if left is not None and left.p <= gates.level and left.variables not in told:
-        worth = left.gain * _share_left(claims, balance)
-        # also what a named effect's form leaves of its own cause is no second cause
-        if worth >= gates.map_floor and left.agree <= gates.agree:
-            claims.append(_map_claim(left, may_name))
-        elif worth >= gates.map_floor and not claims:
-            claims.append(Claim(Part(map=left), "something_missing", None, ()))
-    vetoes = [named.veto for named in discovery.named if named.veto is not None]
-    if not claims and vetoes:
-        # the effect is proved; that its name fell to this map makes it no smaller
-        claims.append(_map_claim(vetoes[0], may_name))
-    last = discovery.steps[-1] if discovery.steps else None
-    if not claims and last is not None and last.stands_out(gates):
-        claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
-    return claims
-
-
-def _map_claim(found: Map, may_name: bool) -> Claim:
-    if not may_name:
-        return Claim(Part(map=found), "something_missing", None, ())
-    return Claim(Part(map=found), "depends_on", None, found.variables)
-
-
-def _share_left(claims: Sequence[Claim], balance: Balance) -> float:
-    """Return the share of the declared model's squared error that the claims leave."""
-    found = [c.part.candidate for c in claims if c.part.candidate is not None]
-    return balance.loss([*balance.terms, *found]) / max(balance.loss(balance.terms), 1e-300)
-
-
-def _variables(named: Named) -> tuple[str, ...]:
-    """Return the variables of an effect, from the channels it reads."""
-    by_channel: dict[str, str] = {}
-    for variable, channel in CHANNELS.items():
-        by_channel[channel] = variable  # of two on one channel the last but history
-    by_channel["spindle_angle_rad"] = "spindle_angle"
-    by_channel[LOAD] = "load"
-    by_channel["distal_torque_n_m"] = "load"
-    family = named.candidate.family
-    found = [by_channel[c] for _, c in named.candidate.channels if c in by_channel]
-    signs = family.startswith("friction.") and family.split(".")[1] not in ("viscous", "drag")
-    found = ["velocity_sign" if signs and v == "velocity" else v for v in found]
-    if family.startswith("hysteresis."):
-        found.append("history")
-    return tuple(dict.fromkeys(found))
 
 
 def _confirmed(story: Story, gates: Gates) -> Story:
@@ -410,157 +259,6 @@ def _refusal(before: Frozen, after: Frozen, confirm: Sequence[Run], gates: Gates
             f" all samples by {100 * (whole[1] / whole[0] - 1):+.1f} %"
         )
     return None
-
-
-def _findings(story: Story) -> list[tuple[Finding, Added]]:
-    """Return the findings of one balance, each with what it changes in the estimate."""
-    found = []
-    last = story.before
-    for k, claim in enumerate(story.claims):
-        now = freeze(story.balance, [c.part for c in story.claims[: k + 1]])
-        runs = [*story.balance.runs, *story.confirm]
-        old, new = squares(last, runs, at_rest=True), squares(now, runs, at_rest=True)
-        held = slice(len(story.balance.runs), None)
-        samples = samples_of(story.confirm).sum()
-        named = claim.named if claim.verdict in ("identified", "one_of") else None
-        found.append(
-            (
-                Finding(
-                    balance=story.balance.model.balance,
-                    family=named.candidate.family if named else UNKNOWN,
-                    verdict=claim.verdict,
-                    rmse_before=float(np.sqrt(old[held].sum() / samples)),
-                    rmse_after=float(np.sqrt(new[held].sum() / samples)),
-                    runs_improved=int(np.count_nonzero(new[held] < old[held])),
-                    runs_total=len(story.confirm),
-                    runs_affected=tuple(
-                        r.name for r, a, b in zip(runs, old, new, strict=True) if b < 0.98 * a
-                    ),
-                    alternatives=named.rivals if named else (),
-                    depends_on=claim.depends_on,
-                    confidence=named.confidence if named else None,
-                    parameters=_parameters(story, named.candidate) if named else {},
-                    formulas=_stated(story, claim, samples),
-                ),
-                _added(last, now, story.balance.runs),
-            )
-        )
-        last = now
-    return found
-
-
-def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
-    """Return the formulas of a claim; the first is written, and its error is confirmed.
-
-    A map is the last of a balance's claims, so the written model is the one with its formula.
-    """
-    found = claim.formulas
-    if not found:
-        return ()
-    left = squares(story.written, story.confirm, at_rest=True).sum()
-    confirmed = [float(np.sqrt(left / samples)), *(None for _ in found[1:])]
-    return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, confirmed, strict=True))
-
-
-def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
-    own = story.values[story.after.terms.index(candidate)]
-    units = {p.name: candidate.term.unit(p, story.balance.model.target) for p in _all(candidate)}
-    return {name: Value(e.value, units[name], e.ci95) for name, e in own.items()}
-
-
-def _all(candidate: Candidate) -> tuple[Parameter, ...]:
-    return candidate.term.parameters
-
-
-def _one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
-    """Report a cause seen in several balances once, where it explains the largest share."""
-    found = [pair for story in stories.values() for pair in _findings(story)]
-    # a named fault of a sensor speaks for what other balances only show
-    found.sort(
-        key=lambda pair: (
-            not pair[0].family.startswith("sensor."),
-            pair[0].rmse_after / max(pair[0].rmse_before, 1e-300),
-        )
-    )
-    kept: list[tuple[Finding, Added]] = []
-    for finding, added in found:
-        for k, (first, other) in enumerate(kept):
-            if finding.balance in (first.balance, *first.also_in):
-                continue
-            units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
-            if _same_cause(other, added, units[0] == units[1]) or _same_fault(first, finding):
-                kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
-                break
-        else:
-            kept.append((finding, added))
-    order = list(stories)
-    ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
-    return [finding for finding, _ in ranked]
-
-
-def _same_fault(first: Finding, second: Finding) -> bool:
-    """Say whether a second balance shows a fault that the first one names.
-
-    A sensor that both balances read, or a wave of as many periods a turn.
-    """
-    if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
-        return False
-    if first.family.startswith("sensor."):
-        akin = second.family.startswith("sensor.") or second.family == UNKNOWN
-        return akin and (second.family in (first.family, UNKNOWN, *LIKE.get(first.family, ())))
-    rates = [_periods_per_turn(finding) for finding in (first, second)]
-    return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
-
-
-def _periods_per_turn(finding: Finding) -> float | None:
-    """Return a wave's periods a turn of the spindle, or None for what is no wave."""
-    order = finding.parameters.get("order")
-    if order is None:
-        return None
-    return order.value * (GEAR_RATIO if "motor_angle" in finding.depends_on else 1.0)
-
-
-def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:
-    """Return what a claim changes in the estimate of each run, its mean removed.
-
-    What the declared parameters had taken up of the effect is not part of it, so that one cause has
-    one shape in every balance.
-    """
-    changes = {run.name: last.error(run, True) - now.error(run, True) for run in runs}
-    return {name: change - change.mean() for name, change in changes.items()}
-
-
-def _same_cause(first: Added, second: Added, same_unit: bool) -> bool:
-    """Say whether two contributions are the same torque: alike in course, sign and size.
-
-    Balances of different units are compared by their course alone.
-    """
-    shared = [n for n in first if n in second and first[n].shape == second[n].shape]
-    if not shared:
-        return False
-    one, other = (np.concatenate([part[n] for n in shared]) for part in (first, second))
-    size = float(np.linalg.norm(one)), float(np.linalg.norm(other))
-    if min(size) == 0:
-        return False
-    alike = float(one @ other) / (size[0] * size[1])
-    if not same_unit:
-        return abs(alike) >= SAME_CAUSE
-    return alike >= SAME_CAUSE and 1 / TWICE <= size[0] / size[1] <= TWICE
-
-
-def _moved(story: Story) -> dict[str, dict[str, float]]:
-    """Return each declared amplitude before and after the findings."""
-    moved: dict[str, dict[str, float]] = {}
-    at = 0
-    for term in story.before.terms:
-        for parameter in term.effect.amplitudes:
-            key = f"{term.id}.{parameter.name}"
-            moved[key] = {
-                "before": float(story.before.weights[at]),
-                "after": float(story.after.weights[at]),
-            }
-            at += 1
-    return moved
 
 
 def _notes(

@@ -14,8 +14,8 @@ import numpy as np
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, pool
 from estimation.diagnosis.design import Run, targets
-from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.result import Finding
+from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray
 
 COST_PER_MINUTE = 0.01

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimation.diagnosis.design import Run
-from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.frozen import Frozen
+from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray, Recording
 
 ASKED = ("target_angle_rad", "load_command_a")

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from estimation import model_file
 from estimation.diagnosis.clock import steady
-from estimation.diagnosis.diagnose import Story, diagnose
+from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import Sealed, evidence, split
+from estimation.diagnosis.story import Story
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger

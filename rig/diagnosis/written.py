@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.diagnose import Story
+from estimation.diagnosis.story import Story
 from estimation.model import Model, predict
 from estimation.recording import Recording
 from rig.diagnosis.run import Diagnosed

@@ -8,10 +8,10 @@ from markupsafe import Markup
 
 from estimation.channels import unit_of
 from estimation.diagnosis.design import Run
-from estimation.diagnosis.diagnose import Story
 from estimation.diagnosis.frozen import Frozen
 from estimation.diagnosis.maps import CHANNELS
 from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
 from rig.reports import figures

@@ -1,0 +1,195 @@
+"""From claims to findings: one cause is told once, whatever balances show it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.derived import GEAR_RATIO
+from estimation.diagnosis.candidate import UNKNOWN, Candidate
+from estimation.diagnosis.design import Run
+from estimation.diagnosis.frozen import (
+    Frozen,
+    freeze,
+    samples_of,
+    squares,
+)
+from estimation.diagnosis.result import Finding, Stated, Value
+from estimation.diagnosis.story import Claim, Story
+from estimation.effects import Parameter
+from estimation.recording import FloatArray
+
+Added = Mapping[str, FloatArray]
+"""Run to what a finding changes in the estimate at its valid samples, shape (n,)."""
+
+SAME_CAUSE = 0.9
+"""Two balances show one cause when what it adds to them correlates at least this well."""
+
+TWICE = 2.0
+"""And when the sizes differ by less than this factor."""
+
+SAME_RATE = 0.03
+"""Two waves are one when their periods a turn differ by less than this share."""
+
+_TORQUE = "proximal torque sensor"
+SENSORS = {
+    "motor": {"current sensor", _TORQUE, "motor encoder"},
+    "gearbox": {_TORQUE, "motor encoder", "spindle encoder"},
+    "cable": {_TORQUE, "distal torque sensor", "spindle encoder"},
+    "stretch": {"distal torque sensor", "spindle encoder", "jaw encoder"},
+}
+"""What each balance reads: a sensor at fault shows in all that read it."""
+
+LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
+"""Faults that two balances may name differently."""
+
+
+def _findings(story: Story) -> list[tuple[Finding, Added]]:
+    """Return the findings of one balance, each with what it changes in the estimate."""
+    found = []
+    last = story.before
+    for k, claim in enumerate(story.claims):
+        now = freeze(story.balance, [c.part for c in story.claims[: k + 1]])
+        runs = [*story.balance.runs, *story.confirm]
+        old, new = squares(last, runs, at_rest=True), squares(now, runs, at_rest=True)
+        held = slice(len(story.balance.runs), None)
+        samples = samples_of(story.confirm).sum()
+        named = claim.named if claim.verdict in ("identified", "one_of") else None
+        found.append(
+            (
+                Finding(
+                    balance=story.balance.model.balance,
+                    family=named.candidate.family if named else UNKNOWN,
+                    verdict=claim.verdict,
+                    rmse_before=float(np.sqrt(old[held].sum() / samples)),
+                    rmse_after=float(np.sqrt(new[held].sum() / samples)),
+                    runs_improved=int(np.count_nonzero(new[held] < old[held])),
+                    runs_total=len(story.confirm),
+                    runs_affected=tuple(
+                        r.name for r, a, b in zip(runs, old, new, strict=True) if b < 0.98 * a
+                    ),
+                    alternatives=named.rivals if named else (),
+                    depends_on=claim.depends_on,
+                    confidence=named.confidence if named else None,
+                    parameters=_parameters(story, named.candidate) if named else {},
+                    formulas=_stated(story, claim, samples),
+                ),
+                _added(last, now, story.balance.runs),
+            )
+        )
+        last = now
+    return found
+
+
+def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
+    """Return the formulas of a claim; the first is written, and its error is confirmed.
+
+    A map is the last of a balance's claims, so the written model is the one with its formula.
+    """
+    found = claim.formulas
+    if not found:
+        return ()
+    left = squares(story.written, story.confirm, at_rest=True).sum()
+    confirmed = [float(np.sqrt(left / samples)), *(None for _ in found[1:])]
+    return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, confirmed, strict=True))
+
+
+def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
+    own = story.values[story.after.terms.index(candidate)]
+    units = {p.name: candidate.term.unit(p, story.balance.model.target) for p in _all(candidate)}
+    return {name: Value(e.value, units[name], e.ci95) for name, e in own.items()}
+
+
+def _all(candidate: Candidate) -> tuple[Parameter, ...]:
+    return candidate.term.parameters
+
+
+def one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
+    """Report a cause seen in several balances once, where it explains the largest share."""
+    found = [pair for story in stories.values() for pair in _findings(story)]
+    # a named fault of a sensor speaks for what other balances only show
+    found.sort(
+        key=lambda pair: (
+            not pair[0].family.startswith("sensor."),
+            pair[0].rmse_after / max(pair[0].rmse_before, 1e-300),
+        )
+    )
+    kept: list[tuple[Finding, Added]] = []
+    for finding, added in found:
+        for k, (first, other) in enumerate(kept):
+            if finding.balance in (first.balance, *first.also_in):
+                continue
+            units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
+            if _same_cause(other, added, units[0] == units[1]) or same_fault(first, finding):
+                kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
+                break
+        else:
+            kept.append((finding, added))
+    order = list(stories)
+    ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
+    return [finding for finding, _ in ranked]
+
+
+def same_fault(first: Finding, second: Finding) -> bool:
+    """Say whether a second balance shows a fault that the first one names.
+
+    A sensor that both balances read, or a wave of as many periods a turn.
+    """
+    if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
+        return False
+    if first.family.startswith("sensor."):
+        akin = second.family.startswith("sensor.") or second.family == UNKNOWN
+        return akin and (second.family in (first.family, UNKNOWN, *LIKE.get(first.family, ())))
+    rates = [_periods_per_turn(finding) for finding in (first, second)]
+    return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
+
+
+def _periods_per_turn(finding: Finding) -> float | None:
+    """Return a wave's periods a turn of the spindle, or None for what is no wave."""
+    order = finding.parameters.get("order")
+    if order is None:
+        return None
+    return order.value * (GEAR_RATIO if "motor_angle" in finding.depends_on else 1.0)
+
+
+def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:
+    """Return what a claim changes in the estimate of each run, its mean removed.
+
+    What the declared parameters had taken up of the effect is not part of it, so that one cause has
+    one shape in every balance.
+    """
+    changes = {run.name: last.error(run, True) - now.error(run, True) for run in runs}
+    return {name: change - change.mean() for name, change in changes.items()}
+
+
+def _same_cause(first: Added, second: Added, same_unit: bool) -> bool:
+    """Say whether two contributions are the same torque: alike in course, sign and size.
+
+    Balances of different units are compared by their course alone.
+    """
+    shared = [n for n in first if n in second and first[n].shape == second[n].shape]
+    if not shared:
+        return False
+    one, other = (np.concatenate([part[n] for n in shared]) for part in (first, second))
+    size = float(np.linalg.norm(one)), float(np.linalg.norm(other))
+    if min(size) == 0:
+        return False
+    alike = float(one @ other) / (size[0] * size[1])
+    if not same_unit:
+        return abs(alike) >= SAME_CAUSE
+    return alike >= SAME_CAUSE and 1 / TWICE <= size[0] / size[1] <= TWICE
+
+
+def moved(story: Story) -> dict[str, dict[str, float]]:
+    """Return each declared amplitude before and after the findings."""
+    moved: dict[str, dict[str, float]] = {}
+    at = 0
+    for term in story.before.terms:
+        for parameter in term.effect.amplitudes:
+            key = f"{term.id}.{parameter.name}"
+            moved[key] = {
+                "before": float(story.before.weights[at]),
+                "after": float(story.after.weights[at]),
+            }
+            at += 1
+    return moved

@@ -1,0 +1,80 @@
+"""What is told of one balance: its claims, and all that a report needs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimation.diagnosis.balance import Balance, as_model
+from estimation.diagnosis.design import Run
+from estimation.diagnosis.formula import Formula
+from estimation.diagnosis.frozen import (
+    Frozen,
+    Part,
+)
+from estimation.diagnosis.search import Discovery, Named
+from estimation.model import Estimate, Model
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One finding before it is confirmed.
+
+    Attributes:
+        part: What it adds.
+        verdict: What is claimed.
+        named: The effect, or None.
+        depends_on: Variables.
+        formulas: What stands for its map in a model, the one that is written first.
+    """
+
+    part: Part
+    verdict: str
+    named: Named | None
+    depends_on: tuple[str, ...]
+    formulas: tuple[Formula, ...] = ()
+
+    @property
+    def written(self) -> Part:
+        """What a model file holds of it: a formula in place of a map; nothing without one."""
+        if self.part.map is None:
+            return self.part
+        return Part(formula=self.formulas[0].terms) if self.formulas else Part()
+
+
+@dataclass(frozen=True)
+class Story:
+    """All that a report needs about one balance.
+
+    Attributes:
+        balance: The balance on the runs that discover.
+        discovery: What the search did.
+        claims: Claims that the confirm runs bore out.
+        refused: Claims they did not, in words.
+        before: Declared model, frozen.
+        after: Model with the claims, frozen.
+        values: Parameters of `after`'s effects, in their order.
+        written: What a model file holds: `after` with formulas in place of maps, frozen.
+        written_values: Parameters of its effects, in their order.
+        confirm: The confirm runs.
+        candidates: Grid points tried.
+        families: Families tried.
+        unused: Runs without a usable sample in this balance.
+    """
+
+    balance: Balance
+    discovery: Discovery
+    claims: tuple[Claim, ...]
+    refused: tuple[str, ...]
+    before: Frozen
+    after: Frozen
+    values: tuple[Mapping[str, Estimate], ...]
+    written: Frozen
+    written_values: tuple[Mapping[str, Estimate], ...]
+    confirm: tuple[Run, ...]
+    candidates: int
+    families: tuple[str, ...]
+    unused: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The fitted model with what was found: named effects, and formulas in place of maps."""
+        return as_model(self.written.balance, self.written.terms, self.written_values)

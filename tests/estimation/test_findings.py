@@ -1,0 +1,45 @@
+"""When two balances show one fault."""
+
+import pytest
+
+from estimation.diagnosis.findings import same_fault
+from estimation.diagnosis.result import Finding, Value
+
+
+def finding(balance: str, family: str, depends_on=(), **parameters: float) -> Finding:
+    return Finding(
+        balance=balance,
+        family=family,
+        verdict="identified",
+        rmse_before=2.0,
+        rmse_after=1.0,
+        runs_improved=4,
+        runs_total=4,
+        runs_affected=(),
+        depends_on=depends_on,
+        parameters={name: Value(value, "1", None) for name, value in parameters.items()},
+    )
+
+
+@pytest.mark.parametrize(
+    ("second", "same"),
+    [
+        (("gearbox", "sensor.creep"), True),
+        (("cable", "unknown"), True),
+        (("cable", "hysteresis.presliding"), False),
+        (("stretch", "sensor.creep"), False),  # it reads no sensor of the motor's
+    ],
+)
+def test_a_sensor_at_fault_shows_in_every_balance_that_reads_it(second, same):
+    assert same_fault(finding("motor", "sensor.creep"), finding(*second)) is same
+
+
+def test_a_lag_and_a_delay_of_one_sensor_are_one_fault():
+    assert same_fault(finding("motor", "sensor.lag"), finding("gearbox", "sensor.delay"))
+
+
+@pytest.mark.parametrize(("order", "same"), [(0.4, True), (0.5, False)])
+def test_waves_are_one_when_they_come_as_often_a_turn(order, same):
+    gear = finding("gearbox", "ripple.output", ("spindle_angle",), order=14.0)
+    motor = finding("motor", "ripple.motor", ("motor_angle",), order=order)
+    assert same_fault(gear, motor) is same
