@@ -10,6 +10,9 @@ from estimation.diagnosis.maps import CHANNELS, LOAD, Map
 from estimation.diagnosis.search import Discovery, Gates, Named
 from estimation.diagnosis.story import Claim
 
+ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
+"""Angles of one rig move together."""
+
 
 def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
     """Return what is claimed, and no more than that."""
@@ -25,7 +28,12 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
     told = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
-    if left is not None and left.p <= gates.level and left.variables not in told:
+    if (
+        left is not None
+        and left.p <= gates.level
+        and left.variables not in told
+        and not _told_already(left, claims)
+    ):
         worth = left.gain * _share_left(claims, balance)
         # also what a named effect's form leaves of its own cause is no second cause
         if worth >= gates.map_floor and left.agree <= gates.agree:
@@ -40,6 +48,14 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
     if not claims and last is not None and last.stands_out(gates):
         claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
     return claims
+
+
+def _told_already(found: Map, claims: Sequence[Claim]) -> bool:
+    """Say whether a map has no variable but those of a named effect: what its form leaves."""
+    said = {variable for claim in claims for variable in claim.depends_on}
+    if said & ANGLES:
+        said |= ANGLES
+    return bool(claims) and set(found.variables) <= said
 
 
 def _map_claim(found: Map, may_name: bool) -> Claim:

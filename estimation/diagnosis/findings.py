@@ -137,9 +137,12 @@ def same_fault(first: Finding, second: Finding) -> bool:
     """
     if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
         return False
-    if first.family.startswith("sensor."):
-        akin = second.family.startswith("sensor.") or second.family == UNKNOWN
-        return akin and (second.family in (first.family, UNKNOWN, *LIKE.get(first.family, ())))
+    if first.family.startswith("sensor.") and second.family in (
+        first.family,
+        UNKNOWN,
+        *LIKE.get(first.family, ()),
+    ):
+        return True
     rates = [_periods_per_turn(finding) for finding in (first, second)]
     return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
 

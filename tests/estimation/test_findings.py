@@ -43,3 +43,9 @@ def test_waves_are_one_when_they_come_as_often_a_turn(order, same):
     gear = finding("gearbox", "ripple.output", ("spindle_angle",), order=14.0)
     motor = finding("motor", "ripple.motor", ("motor_angle",), order=order)
     assert same_fault(gear, motor) is same
+
+
+def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_balance():
+    gear = finding("gearbox", "sensor.encoder_inl", ("spindle_angle",), order=14.0)
+    motor = finding("motor", "eccentric.load", ("spindle_angle", "load"), order=14.1)
+    assert same_fault(gear, motor)
