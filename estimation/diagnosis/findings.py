@@ -31,6 +31,9 @@ TWICE = 2.0
 SAME_RATE = 0.03
 """Two waves are one when their periods a turn differ by less than this share."""
 
+HARMONICS = 3
+"""Or when one comes up to so many times as often: what one balance bends has harmonics there."""
+
 _TORQUE = "proximal torque sensor"
 SENSORS = {
     "motor": {"current sensor", _TORQUE, "motor encoder"},
@@ -143,8 +146,11 @@ def same_fault(first: Finding, second: Finding) -> bool:
         *LIKE.get(first.family, ()),
     ):
         return True
-    rates = [_periods_per_turn(finding) for finding in (first, second)]
-    return None not in rates and abs(rates[0] / rates[1] - 1) < SAME_RATE  # type: ignore[operator]
+    rates = sorted(r for r in map(_periods_per_turn, (first, second)) if r is not None)
+    if len(rates) < 2:
+        return False
+    times = rates[1] / rates[0]
+    return round(times) <= HARMONICS and abs(times / round(times) - 1) < SAME_RATE
 
 
 def _periods_per_turn(finding: Finding) -> float | None:

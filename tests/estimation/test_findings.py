@@ -38,7 +38,7 @@ def test_a_lag_and_a_delay_of_one_sensor_are_one_fault():
     assert same_fault(finding("motor", "sensor.lag"), finding("gearbox", "sensor.delay"))
 
 
-@pytest.mark.parametrize(("order", "same"), [(0.4, True), (0.5, False)])
+@pytest.mark.parametrize(("order", "same"), [(0.4, True), (0.5, False), (0.8, True), (2.0, False)])
 def test_waves_are_one_when_they_come_as_often_a_turn(order, same):
     gear = finding("gearbox", "ripple.output", ("spindle_angle",), order=14.0)
     motor = finding("motor", "ripple.motor", ("motor_angle",), order=order)
