@@ -170,13 +170,6 @@ def settled_places(
     return np.flatnonzero(inner)[::step]
 
 
-def settled(
-    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
-) -> Recording:
-    """Return the samples of `settled_places` alone; an effect with memory needs the whole run."""
-    return channels.at(settled_places(channels, low_pass, step, samples))
-
-
 def zero_phase_channels(
     recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
 ) -> Recording:

@@ -16,7 +16,6 @@ from estimation.diagnosis.frozen import (
 )
 from estimation.diagnosis.result import Finding, Stated, Value
 from estimation.diagnosis.story import Claim, Story
-from estimation.effects import Parameter
 from estimation.recording import FloatArray
 
 Added = Mapping[str, FloatArray]
@@ -99,12 +98,11 @@ def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
 
 def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
     own = story.values[story.after.terms.index(candidate)]
-    units = {p.name: candidate.term.unit(p, story.balance.model.target) for p in _all(candidate)}
+    units = {
+        p.name: candidate.term.unit(p, story.balance.model.target)
+        for p in candidate.term.parameters
+    }
     return {name: Value(e.value, units[name], e.ci95) for name, e in own.items()}
-
-
-def _all(candidate: Candidate) -> tuple[Parameter, ...]:
-    return candidate.term.parameters
 
 
 def one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:

@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -14,6 +14,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
+
+    from rig.reports.table import TextTable
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
@@ -46,6 +48,36 @@ def progress() -> "Progress":
         console=stderr,
         disable=not stderr.is_terminal,
     )
+
+
+def show_result(
+    lines: Iterable[str],
+    tables: Iterable["TextTable"],
+    out: Path | None,
+    markdown: Callable[[], str],
+) -> None:
+    """Show a result to people, and write it where they asked for a file.
+
+    Args:
+        lines: What is said first, a line each.
+        tables: Shown below.
+        out: File for the Markdown, or None for none.
+        markdown: Returns the file's text.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    from estimation.files import write_text_atomic
+    from rig.reports.table import to_rich
+
+    screen = console()
+    for line in lines:
+        screen.print(line, markup=False)
+    for table in tables:
+        screen.print(to_rich(table))
+    if out is not None:
+        write_text_atomic(out, markdown())
+        screen.print(f"Markdown: {out}", markup=False)
 
 
 def plain(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, console, emit_json, progress, show_result
 from rig.cli.study_arm import arm_studies
 
 if TYPE_CHECKING:
@@ -57,10 +57,8 @@ def oneill(
     json: JsonFlag = False,
 ) -> None:
     """Make the results of O'Neill et al. 2018 again: Table I's linear rows, and its networks."""
-    from estimation.files import write_text_atomic
     from rig.reports import oneill as shown
     from rig.reports.render import write_report
-    from rig.reports.table import to_rich
     from rig.studies.oneill import open_reference, run_study
 
     source = _simulated(seed) if data is None else open_reference(data)
@@ -74,18 +72,16 @@ def oneill(
         deep = _train(source, left_out, data, training, seed)
     physical = _fit_states(source, result.study.left_out, data, seed) if states else None
     more = shown.More(deep, physical)
-    screen = console()
-    screen.print(shown.lead(result.study), markup=False)
-    for note in [f"Data: {source.name}.", *shown.all_notes(result.study, more)]:
-        screen.print(note, markup=False)
-    for table in shown.all_tables(result.study, more):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(result.study, more))
-        screen.print(f"Markdown: {out}", markup=False)
+    lines = [
+        shown.lead(result.study),
+        f"Data: {source.name}.",
+        *shown.all_notes(result.study, more),
+    ]
+    tables = shown.all_tables(result.study, more)
+    show_result(lines, tables, out, lambda: shown.markdown(result.study, more))
     if report is not None:
         page = write_report(report / "oneill.html", shown.page(result, more))
-        screen.print(f"Report: {page}", markup=False)
+        console().print(f"Report: {page}", markup=False)
     if json:
         found = {"networks": deep, "states": physical}
         emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
@@ -158,10 +154,8 @@ def zhao(
     json: JsonFlag = False,
 ) -> None:
     """Make Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016 again, simulated."""
-    from estimation.files import write_text_atomic
     from rig.errors import UsageError
     from rig.reports import zhao as shown
-    from rig.reports.table import to_rich
     from rig.simulation.grasper_plant import PROTOTYPES
     from rig.studies.haptics import run_haptics
     from rig.studies.zhao import run_study
@@ -178,16 +172,14 @@ def zhao(
 
         study = run_study(prototype, range(seeds), spread, with_diagnosis=diagnosis, on_step=step)
     haptics = run_haptics(0, spread, prototype)
-    screen = console()
-    for line in [shown.lead(study), *shown.notes(study)]:
-        screen.print(line, markup=False)
-    for table in shown.tables(study, haptics):
-        screen.print(to_rich(table))
     drawn = shown.write_figures(figures, haptics) if figures is not None else []
-    if out is not None:
-        names = [os.path.relpath(path, out.parent) for path in drawn]
-        write_text_atomic(out, shown.markdown(study, haptics, names))
-        screen.print(f"Markdown: {out}", markup=False)
+
+    def markdown() -> str:
+        names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
+        return shown.markdown(study, haptics, names)
+
+    lines = [shown.lead(study), *shown.notes(study)]
+    show_result(lines, shown.tables(study, haptics), out, markdown)
     if json:
         emit_json({"study": study, "haptics": haptics})
 
@@ -203,10 +195,8 @@ def loop(
     json: JsonFlag = False,
 ) -> None:
     """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
-    from estimation.files import write_text_atomic
     from rig.errors import UsageError
     from rig.reports import loop as shown
-    from rig.reports.table import to_rich
     from rig.studies.loop import TASKS, run_study
 
     if any(not 1 <= number <= len(TASKS) for number in task or []):
@@ -217,14 +207,8 @@ def loop(
         study = run_study(
             data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
         )
-    screen = console()
-    for line in [shown.lead(study), *shown.notes(study)]:
-        screen.print(line, markup=False)
-    for table in shown.tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(study))
-        screen.print(f"Markdown: {out}", markup=False)
+    lines = [shown.lead(study), *shown.notes(study)]
+    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
     if json:
         emit_json(study)
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, show_result
 
 arm_studies = typer.Typer(rich_markup_mode=None)
 
@@ -26,9 +26,7 @@ def pique(
     json: JsonFlag = False,
 ) -> None:
     """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
-    from estimation.files import write_text_atomic
     from rig.reports import pique as shown
-    from rig.reports.table import to_rich
     from rig.studies.arm_search import open_paths
     from rig.studies.pique import run_study
 
@@ -38,14 +36,8 @@ def pique(
         study = run_study(
             first, second, also=others, on_step=lambda step: bar.update(task, description=step)
         )
-    screen = console()
-    for line in [shown.lead(study), *shown.notes(study)]:
-        screen.print(line, markup=False)
-    for table in shown.tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(study))
-        screen.print(f"Markdown: {out}", markup=False)
+    lines = [shown.lead(study), *shown.notes(study)]
+    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
     if json:
         emit_json(study)
 
@@ -58,22 +50,13 @@ def wrench(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
-    from estimation.files import write_text_atomic
     from rig.reports import pique_wrench as shown
-    from rig.reports.table import to_rich
     from rig.studies.pique_wrench import run_wrench_study
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_wrench_study(seeds, workers, lambda: bar.advance(task))
-    screen = console()
-    for note in shown.NOTES:
-        screen.print(note, markup=False)
-    for table in shown.tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
-        write_text_atomic(out, shown.markdown(study))
-        screen.print(f"Markdown: {out}", markup=False)
+    show_result(shown.NOTES, shown.tables(study), out, lambda: shown.markdown(study))
     if json:
         emit_json(study)
 
@@ -85,24 +68,21 @@ def delsol(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
-    from estimation.files import write_text_atomic
-    from rig.reports.table import to_markdown, to_rich
+    from rig.reports.table import to_markdown
     from rig.simulation.hydraulic_arm import HYDRAULIC
     from rig.studies.delsol import run_delsol, tables
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_delsol(seeds, lambda: bar.advance(task))
-    screen = console()
     note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
-    screen.print(note, markup=False)
-    for table in tables(study):
-        screen.print(to_rich(table))
-    if out is not None:
+
+    def markdown() -> str:
         title = "# External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
         parts = [title, note, *(to_markdown(table).rstrip() for table in tables(study))]
-        write_text_atomic(out, "\n\n".join([*parts, study.provenance.line()]) + "\n")
-        screen.print(f"Markdown: {out}", markup=False)
+        return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+
+    show_result([note], tables(study), out, markdown)
     if json:
         emit_json(study)
 
@@ -124,8 +104,7 @@ def payload(
     json: JsonFlag = False,
 ) -> None:
     """Find a mass added to an arm's insertion axis from its joints' torque."""
-    from estimation.files import write_text_atomic
-    from rig.reports.table import to_markdown, to_rich
+    from rig.reports.table import to_markdown
     from rig.studies.arm_search import open_paths
     from rig.studies.payload import find_payload, table
 
@@ -135,11 +114,11 @@ def payload(
         found = find_payload(
             fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
         )
-    screen = console()
-    screen.print(to_rich(table(found)))
-    if out is not None:
+
+    def markdown() -> str:
         text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
-        write_text_atomic(out, f"{text}\n{found.provenance.line()}\n")
-        screen.print(f"Markdown: {out}", markup=False)
+        return f"{text}\n{found.provenance.line()}\n"
+
+    show_result([], [table(found)], out, markdown)
     if json:
         emit_json(found)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import stats
 
 from estimation.campaign import Campaign
-from estimation.derived import measured_channels, settled, zero_phase_channels
+from estimation.derived import measured_channels, settled_places, zero_phase_channels
 from estimation.effects import catalogue
 from estimation.fitting import fit
 from estimation.model import Model
@@ -63,7 +63,9 @@ def lay_out(model: Model, campaign: Campaign) -> Table:
         wanted = {c for e in usable for c in e.roles.values()}
         names = [*fitted.channels, fitted.target, *sorted(wanted)]
         whole = zero_phase_channels(recording, names, fitted.low_pass)
-        run = settled(whole, fitted.low_pass, int(recording.sample_rate_hz / RATE_HZ))
+        run = whole.at(
+            settled_places(whole, fitted.low_pass, int(recording.sample_rate_hz / RATE_HZ))
+        )
         target.append(_centred(run[fitted.target]))
         parts = [t.columns(run, t.numbers(t.effect.shape)) for t in fitted.terms]
         declared.append(_centred(np.column_stack(parts)))
