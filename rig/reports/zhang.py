@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation.files import write_text_atomic
-from rig.reports.figures import bars, over_time
+from rig.reports.figures import bars, over_time, write_svgs
 from rig.reports.table import TextTable, to_markdown
-from rig.simulation.psm import KINDS
 from rig.simulation.psm_grasp import CONFIGURATIONS_DEG
+from rig.simulation.psm_instruments import KINDS
 from rig.studies.zhang import (
     PAPER,
     PAPER_FORCE_N,
@@ -123,13 +122,7 @@ def write_figures(folder: Path, study: ZhangStudy) -> list[Path]:
         "zhang-joints": bars(joints, "NRMSE, %", "Free-space torque, gripper moving"),
         "zhang-instruments": bars(instruments, "NRMSE, %", "Gripper torque, networks' transfer"),
     }
-    paths = []
-    for name, figure in drawn.items():
-        path = folder / f"{name}.svg"
-        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
-        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
-        paths.append(path)
-    return paths
+    return write_svgs(folder, drawn)
 
 
 def _better(study: ZhangStudy) -> tuple[int, int]:

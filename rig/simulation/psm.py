@@ -18,6 +18,7 @@ from estimation.arm.wrench import spatial_jacobians
 from estimation.recording import FloatArray
 from rig.grasper.dvrk import dvrk_coupling
 from rig.simulation.arm import HIDDEN_SHARE, SimulatedArm, dahl
+from rig.simulation.psm_instruments import KINDS, Kind
 
 RATE_HZ = 50.0
 JOINTS = 7
@@ -45,58 +46,25 @@ RUB_RAD_S = 0.1
 VIBRATION = np.array([0.0, 0.0, 3.0, 0.006])
 """Ringing of joints 1 to 4 after the gripper turns back, N m or N."""
 
-PRESS_N_M = 0.06
-CLOSED_RAD = 0.02
-"""Torque by which closed jaws touch one another."""
+PRESS_N_M, CLOSED_RAD = 0.06, 0.02
+"""Torque by which closed jaws press on one another, and the angle below which they begin to."""
 
 RINGING_HZ, RINGING_S = 8.0, 0.03
 COUPLING_ERROR = 0.12
 """Standard deviation of the true coupling matrix's elements, relative to the nominal ones."""
 
 SPREAD = 0.15
+"""Standard deviation of the logarithm of each strength between instruments."""
+
 SLIP_SHARE = np.array([0.05, 0.05, 0.04, 0.02, 0.02, 0.02])
 """Motion over which a joint's friction turns, as a share of its range."""
 
 CABLE_SLIP_RAD, GRIPPER_SLIP_RAD = 0.15, 0.15
 NOISE_RAD, NOISE_RAD_S = 2e-5, 2e-3
+"""Noise of positions and velocities; in m and m/s of the insertion."""
+
 CHUNK = 8000
 """Samples whose regressor is held at once."""
-
-
-@dataclass(frozen=True)
-class Kind:
-    """An instrument family as it is drawn around.
-
-    Attributes:
-        name: Name of the instrument.
-        model: Model number, by which its nominal coupling is known.
-        open_rad: Angle to which its gripper opens; closed is 0.
-        offset_n_m: Torque of the resting gripper.
-        spring_n_m_rad: Stiffness of the gripper's cables against opening.
-        friction_n_m: Friction of the gripper.
-        memory_n_m: Friction with memory of the gripper.
-    """
-
-    name: str
-    model: str
-    open_rad: float
-    offset_n_m: float
-    spring_n_m_rad: float
-    friction_n_m: float
-    memory_n_m: float
-
-
-KINDS = {
-    "LND": Kind("Large Needle Driver", "400006", 1.0, 0.010, 0.02, 0.014, 0.016),
-    "CF": Kind("Cadiere Forceps", "400049", 1.0, -0.025, 0.03, 0.011, 0.018),
-    "LTF": Kind("Long Tip Forceps", "400048", 1.0, -0.028, 0.03, 0.010, 0.028),
-    "MCS": Kind("Monopolar Curved Scissors", "400179", 1.0, -0.026, 0.03, 0.018, 0.018),
-    "MBF": Kind("Maryland Bipolar Forceps", "400172", 1.0, -0.031, 0.03, 0.009, 0.034),
-    "PF": Kind("ProGrasp Forceps", "400093", 1.0, -0.020, 0.03, 0.028, 0.010),
-    "RF": Kind("Resano Forceps", "400181", 1.0, -0.023, 0.03, 0.012, 0.025),
-    "SCA": Kind("Small Clip Applier", "400003", 0.7, -0.029, 0.03, 0.016, 0.018),
-}
-"""The paper's eight instruments. Jaw ranges beyond the dVRK's and all torques are assumed."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +75,7 @@ class Psm:
         arm: The arm; its hidden strengths are not used but scale those here.
         kind: The instrument's gripper, as drawn.
         memory: Friction with memory of joints 1 to 6, N m or N.
+        cable_n_m: Friction with memory of the four motors and their cables.
         noise: Standard deviation of the noise of each joint, N m or N.
         true_coupling: From motors to roll, pitch, yaw and gripper, shape (4, 4).
         leak: A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4).

@@ -7,7 +7,8 @@ import numpy as np
 from estimation.arm.identification import nrmsd_percent
 from estimation.recording import FloatArray
 from rig.simulation.arm import SimulatedArm
-from rig.simulation.psm import GRIPPER, KINDS, RATE_HZ, Psm, PsmRun, simulate, with_instrument
+from rig.simulation.psm import GRIPPER, RATE_HZ, Psm, PsmRun, simulate, with_instrument
+from rig.simulation.psm_instruments import KINDS
 from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies.zhang_networks import JointNetwork, trained, transferred
 from rig.studies.zhang_physics import Physics, find_effects, fitted

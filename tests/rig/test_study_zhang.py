@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 from estimation.networks.training import Settings, has_torch
 from rig.cli.study import study_app
 from rig.simulation.arm import draw_arm
-from rig.simulation.psm import GRIPPER, KINDS, RATE_HZ, WRIST, simulate, with_instrument
+from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrument
 from rig.simulation.psm_grasp import configurations, grasp_and_release
+from rig.simulation.psm_instruments import KINDS
 from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies import zhang_free, zhang_networks, zhang_seed
 from rig.studies.zhang import PAPER, run_zhang
