@@ -26,16 +26,16 @@ GRIPPER = 6
 WRIST = slice(3, 7)
 """Roll, pitch, yaw and gripper: what the instrument's four motors drive."""
 
-MEMORY = np.array([0.85, 1.5, 0.72, 0.0, 0.0, 0.0])
+MEMORY = np.array([0.9, 1.45, 0.72, 0.0, 0.0, 0.0])
 """Friction with memory of each joint, as a share of its declared torque's RMS."""
 
-CABLE_N_M = np.array([0.00077, 0.019, 0.0138, 0.0138])
+CABLE_N_M = np.array([0.00077, 0.019, 0.0132, 0.0132])
 """Friction with memory of the instrument's four motors and their cables."""
 
 NOISE = np.array([0.05, 0.06, 0.1, 0.03, 0.03, 0.05])
 """Noise of the torque, white, as a share of the declared torque's RMS."""
 
-PULL = np.array([0.0, 0.0, 4.0, 0.006])
+PULL = np.array([0.0, 0.0, 4.0, 0.004])
 """Pull of the gripper's cables on joints 1 to 4: N m, N or N m a N m of the gripper."""
 
 RUB = np.array([0.0, 0.0, 0.0, 0.011])

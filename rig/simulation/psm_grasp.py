@@ -31,7 +31,7 @@ FREE_S, COMING_S = 12.0, 2.0
 CONFIGURATIONS_DEG = ((0, 0), (60, 0), (30, 0), (0, 60), (0, 30))
 """J5 and J6 of C1 to C5."""
 
-CONTACT_SHARE, CONTACT_DEPTH_M = 0.2, 0.04
+CONTACT_SHARE, CONTACT_DEPTH_M = 0.2, 0.05
 """Share of the ranges moved while touching, and insertion beyond the middle; assumed."""
 
 TURN_S, STAY_S = 1.5, 3.0

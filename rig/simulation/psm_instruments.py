@@ -28,7 +28,7 @@ class Kind:
 
 KINDS = {
     "LND": Kind("Large Needle Driver", "400006", 1.0, 0.010, 0.02, 0.014, 0.016),
-    "CF": Kind("Cadiere Forceps", "400049", 1.0, -0.025, 0.03, 0.011, 0.018),
+    "CF": Kind("Cadiere Forceps", "400049", 1.0, -0.021, 0.03, 0.011, 0.017),
     "LTF": Kind("Long Tip Forceps", "400048", 1.0, -0.028, 0.03, 0.010, 0.028),
     "MCS": Kind("Monopolar Curved Scissors", "400179", 1.0, -0.026, 0.03, 0.018, 0.018),
     "MBF": Kind("Maryland Bipolar Forceps", "400172", 1.0, -0.031, 0.03, 0.009, 0.034),
