@@ -47,9 +47,10 @@ def lead(study: ZhangStudy) -> str:
     better, cells = _better(study)
     return (
         f"On {len(study.seeds)} simulated arms the paper's networks land within {WITHIN:.0%} of the"
-        f" paper in {sum(near)} of {len(near)} numbers (median over arms). The physical model with"
-        f" the effects found and a small network has a smaller error in {better} of {cells}"
-        " numbers, joint by joint and arm by arm."
+        f" paper in {sum(near)} of {len(near)} numbers (median over arms). Of those that are errors"
+        " after training on both conditions, after transfer, in grasps and in contact, arm by arm,"
+        f" the physical model with the effects found and a small network has the smaller one in"
+        f" {better} of {cells}."
     )
 
 
@@ -68,6 +69,9 @@ def notes(study: ZhangStudy) -> list[str]:
         " trained by Levenberg-Marquardt on five samples a second; the paper states neither size"
         " nor window. NRMSE is RMSE over the range of the torque in the test.",
         "Two rows of Table I are cut in our copy of the paper: only J3 is known.",
+        "Ours knows each joint's way since it turned back, however long ago, and takes the gripper"
+        " torque measured as an input of joints 3 to 6. The candidates are the arm catalogue, slips"
+        " over longer ways and drag of the moving gripper; the simulated friction (Dahl) is none.",
     ]
 
 
@@ -126,24 +130,31 @@ def write_figures(folder: Path, study: ZhangStudy) -> list[Path]:
 
 
 def _better(study: ZhangStudy) -> tuple[int, int]:
-    """Return in how many numbers ours is smaller than the networks', and of how many."""
-    pairs = [(f"I | M+C on {test}", slice(None)) for test in "CM"]
-    pairs += [(f"II after | {name}", slice(None)) for name in OTHERS]
-    pairs += [("grasp | RMSE, NRMSE, scale", slice(0, 1)), ("contact | wrench, grasp", slice(None))]
-    wins = [
-        study.values(f"{cell} | {OURS}")[:, at] < study.values(f"{cell} | {NETWORKS}")[:, at]
-        for cell, at in pairs
-    ]
+    """Return in how many numbers ours is smaller than the networks', and of how many.
+
+    Only those count in which the networks land near the paper's.
+    """
+    compared = ["I | M+C on C", "I | M+C on M", *(f"II after | {name}" for name in OTHERS)]
+    wins = []
+    for cell in (*compared, "grasp | RMSE, NRMSE, scale"):
+        near = np.array([word is True for word in study.near(cell)])
+        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is no error
+        ours, theirs = (study.values(f"{cell} | {method}") for method in (OURS, NETWORKS))
+        wins.append((ours < theirs)[:, near])
+    ours, theirs = (
+        np.array([worst_axes(row) for row in study.values(f"contact | wrench, grasp | {method}")])
+        for method in (OURS, NETWORKS)
+    )
+    wins.append((ours < theirs)[:, np.array(study.near_in_contact())])
     return sum(int(won.sum()) for won in wins), sum(won.size for won in wins)
 
 
-def _range(study: ZhangStudy, cell: str, form: str = ".2f") -> list[str]:
-    values = study.values(cell)
+def _range(study: ZhangStudy, cell: str, digits: int = 2) -> list[str]:
+    values = np.round(study.values(cell), digits) + 0.0  # never "-0.00"
+    middles = np.round(np.median(values, axis=0), digits)
     return [
-        f"{middle:{form}} ({low:{form}}-{high:{form}})"
-        for low, middle, high in zip(
-            values.min(0), np.median(values, axis=0), values.max(0), strict=True
-        )
+        f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+        for low, middle, high in zip(values.min(0), middles, values.max(0), strict=True)
     ]
 
 
@@ -157,12 +168,12 @@ def _stated(numbers: Sequence[float | None]) -> list[str]:
 
 def _figure_3(study: ZhangStudy) -> TextTable:
     cases = [cell for cell in study.outcomes[0] if cell.startswith("Figure 3")]
-    rows = [[cell.split(" | ")[1], *_range(study, cell, ".4f")] for cell in cases]
+    rows = [[cell.split(" | ")[1], *_range(study, cell, 4)] for cell in cases]
     return TextTable(
         "Figure 3: torque on one path, beside that with the gripper held at 0",
         ["gripper", *(f"{j}, {'N' if j == 'J3' else 'N m'}" for j in JOINTS)],
         rows,
-        "RMS of the difference, median (least-greatest). The paper shows curves, no numbers.",
+        "RMS of the difference, median (least to greatest). The paper shows curves, no numbers.",
     )
 
 
@@ -177,7 +188,7 @@ def _table_1(study: ZhangStudy) -> TextTable:
         "Table I: NRMSE of torque in free space, %",
         ["trained on, tested on", *JOINTS],
         rows,
-        "M: gripper moving, C: closed. Median (least-greatest) over the arms.",
+        "M: gripper moving, C: closed. Median (least to greatest) over the arms.",
     )
 
 
@@ -262,7 +273,7 @@ def _contact(study: ZhangStudy) -> TextTable:
         name = f"{cell} | {method}"
         worst = worst_axes(study.median(name))
         shown = [f"{value:.3f}" for value in worst]
-        rows.append([method, *(_range(study, name, ".3f")), *shown])
+        rows.append([method, *(_range(study, name, 3)), *shown])
     rows.append([f"within {WITHIN:.0%}", *[""] * 7, *_words(study.near_in_contact())])
     axes = ["Fx, N", "Fy, N", "Fz, N", "Tx, N m", "Ty, N m", "Tz, N m", "grasp, N"]
     columns = ["", *axes, "worst force", "worst moment", "grasp"]
