@@ -6,7 +6,7 @@ variables are what may be said.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,8 +38,17 @@ CHANNELS = {
 
 LOAD, PROJECTED_LOAD = "proximal_torque_n_m", "projected_load_n_m"
 
+SPEEDS = ("spindle_velocity_rad_s", "jaw_velocity_rad_s")
+LOADS = (LOAD, "distal_torque_n_m", "motor_load_n_m")
+
 BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",)}
 """Variables that reach a balance only through its load, and would stand for that load."""
+
+ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
+"""Angles of one rig move together."""
+
+OF_SPEED = ("viscous", "viscous_asymmetry", "drag", "stribeck", "load_viscous")
+"""Frictions that go with the speed, not with its sign alone."""
 
 KNOTS = 7
 ORDERS = 8
@@ -118,6 +127,27 @@ class Map:
         """Return the map's columns on one whole run, shape (n, k)."""
         parts = [basis.columns(run) for basis in self.bases]
         return parts[0] if len(parts) == 1 else _products(*parts)
+
+
+def variables_of(effect: Candidate) -> tuple[str, ...]:
+    """Return the variables of a named effect, from the channels it reads."""
+    # of two on one channel the last but history
+    by_channel = {channel: variable for variable, channel in CHANNELS.items()}
+    by_channel |= dict.fromkeys((CHANNELS["velocity"], *SPEEDS), "velocity")
+    by_channel |= {"spindle_angle_rad": "spindle_angle"} | dict.fromkeys(LOADS, "load")
+    found = [by_channel[channel] for _, channel in effect.channels if channel in by_channel]
+    kind, _, name = effect.family.partition(".")
+    if kind == "friction" and name not in OF_SPEED:
+        found = ["velocity_sign" if variable == "velocity" else variable for variable in found]
+    if kind == "hysteresis":
+        found.append("history")
+    return tuple(dict.fromkeys(found))
+
+
+def within(variables: Sequence[str], others: Collection[str]) -> bool:
+    """Say whether variables are no more than others; the angles of one rig move together."""
+    known = {*others, *(ANGLES if ANGLES & {*others} else ())}
+    return {*variables} <= known
 
 
 def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int) -> Map | None:

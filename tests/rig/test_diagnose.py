@@ -13,8 +13,8 @@ from estimation.campaign import Campaign
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.design import prepare
 from estimation.diagnosis.frozen import freeze, samples_of, squares
+from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.result import VERDICTS, Diagnosis, Finding
-from estimation.diagnosis.search import Gates
 from estimation.diagnosis.split import Sealed, split
 from estimation.estimator import load
 from estimation.fitting import fit
