@@ -104,7 +104,8 @@ def run_case(
         "right": right(answer, result),
         "seconds": seconds,
         "hidden": [effect.name for effect in answer.effects],
-        "variant": answer.variant,
+        "excitation": answer.excitation,
+        "chain": answer.chain,
         "found": [
             (f["verdict"], f["balance"], f["family"]) for f in (diagnosis or {}).get("findings", [])
         ],

@@ -11,13 +11,16 @@ import typer
 from typer.testing import CliRunner
 
 from estimation.derived import zero_phase_channels
+from estimation.diagnosis.candidate import FAMILIES
 from rig.importers.registry import open_campaign
 from rig.simulation.hidden import NAMES, HiddenEffect
 from tests.blind import baselines
-from tests.blind.generate import CLASSES, CONTROLS, Answer, draw, write
+from tests.blind.excitation import EXCITATIONS
+from tests.blind.generate import CHAINS, CLASSES, CONTROLS, Answer, draw, write
 from tests.blind.run import blind
 from tests.blind.score import outcome, right, wilson
-from tests.blind.truths import TRUTHS
+from tests.blind.strength import shown
+from tests.blind.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 
 FAKE = """
 import json, pathlib, sys
@@ -39,11 +42,30 @@ def said(*findings: dict[str, Any], following: object = None) -> dict[str, Any]:
 
 
 def hidden(kind: str, *names: str, either: tuple[str, ...] = ()) -> Answer:
-    return Answer("case-x", kind, tuple(HiddenEffect(n) for n in names), (0,), "", either)
+    return Answer("case-x", kind, tuple(HiddenEffect(n) for n in names), (0,), either=either)
 
 
 def test_every_hidden_effect_has_an_answer() -> None:
     assert set(TRUTHS) == set(NAMES)
+
+
+def test_every_family_is_hidden_in_some_case_or_cannot_be() -> None:
+    hidden_ = {truth.family for truth in CATALOGUED.values()}
+    assert not hidden_ & NOT_HIDDEN.keys()
+    assert hidden_ | NOT_HIDDEN.keys() == set(FAMILIES)
+
+
+@pytest.mark.parametrize("name", ["torque_lag", "jaw_weight", "gear_wear", "cable_dwell"])
+def test_a_strong_effect_is_a_clear_share_of_what_is_left(name: str) -> None:
+    assert max(one.share for one in shown(name, range(1, 14, 4))) > 0.25
+
+
+def test_what_comes_or_fades_does_so_from_run_to_run() -> None:
+    wear = Answer("case-x", "strong", (HiddenEffect("gear_wear"),), (7, 8, 9))
+    assert (wear.in_run(6), wear.in_run(8)) == ((), wear.effects)
+    stiff = Answer("case-x", "strong", (HiddenEffect("cable_stiff"),), tuple(range(14)))
+    strengths = [stiff.in_run(index)[0].strength for index in (0, 4, 12)]
+    assert strengths == pytest.approx([1.0, 0.5, 0.25])
 
 
 @pytest.mark.parametrize("kind", CLASSES)
@@ -52,6 +74,7 @@ def test_a_draw_is_seeded_and_its_name_gives_nothing_away(kind: str) -> None:
     assert drawn == [draw(kind, number, 7) for number in range(30)]
     assert len({answer.case for answer in drawn}) == 30
     assert all(kind not in answer.case for answer in drawn)
+    assert all(a.excitation in EXCITATIONS and len(a.runs) > 0 for a in drawn)
     assert all(len(a.effects) == {"pair": 2, "control": 0}.get(kind, 1) for a in drawn)
 
 
@@ -71,12 +94,13 @@ def test_a_case_is_a_folder_of_logs_and_the_answer_lies_elsewhere(
     folder = write(answer, tmp_path / "cases", tmp_path / "answers", runs=1)
     assert [path.suffix for path in folder.iterdir()] == [".mcap"]
     kept = json.loads((tmp_path / "answers" / f"{answer.case}.json").read_text())
-    assert kept["variant"] == CONTROLS[number]
+    assert (kept["chain"], kept["excitation"]) == CONTROLS[number]
     (recording,) = open_campaign(folder)
     assert 13.0 < recording.duration_s < 15.0
     assert len(zero_phase_channels(recording, ["motor_velocity_rad_s"])) == len(recording)
+    assert ("wrist_pitch_rad" in recording) == (CONTROLS[number][1] == "wrist")
     for text in (recording.source, recording.notes, recording.rig):
-        assert CONTROLS[number] not in text
+        assert not any(word in text for word in CHAINS[1:])
 
 
 def test_a_hidden_effect_is_in_the_runs_that_have_it_only(tmp_path: Path) -> None:
