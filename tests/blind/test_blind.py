@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,11 @@ from rig.importers.registry import open_campaign
 from rig.simulation.hidden import NAMES, HiddenEffect
 from tests.blind import baselines
 from tests.blind.excitation import EXCITATIONS
-from tests.blind.generate import CHAINS, CLASSES, CONTROLS, Answer, draw, write
-from tests.blind.run import blind
+from tests.blind.generate import CHAINS, CLASSES, CONTROLS, Answer, draw, record, write
+from tests.blind.run import _ratio, blind
 from tests.blind.score import outcome, right, wilson
 from tests.blind.strength import shown
+from tests.blind.true_structure import told, true_rmse
 from tests.blind.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 
 FAKE = """
@@ -28,7 +30,9 @@ case, out = map(pathlib.Path, sys.argv[1:])
 assert sorted(p.suffix for p in case.iterdir()) == [".mcap"], "logs only"
 with (out.parent / "asked.txt").open("a") as log:
     print(case.name, file=log)
-pathlib.Path(out).write_text(json.dumps({"findings": [], "next_experiment": None}))
+runs = {"discover": [], "confirm": []}
+answer = {"findings": [], "next_experiment": None, "runs": runs, "rmse_after": {}}
+pathlib.Path(out).write_text(json.dumps(answer))
 """
 
 
@@ -231,12 +235,45 @@ def test_a_study_scores_reports_and_resumes(tmp_path: Path) -> None:
     assert "seed 1" in text
 
 
-def test_textbook_methods_find_a_plain_effect_and_more() -> None:
+def test_textbook_methods_find_a_plain_effect_and_a_true_sum_of_squares() -> None:
     random = np.random.default_rng(0)
     declared, clear, idle = (random.standard_normal((4000, 1)) for _ in range(3))
     noise = 0.1 * random.standard_normal(4000)
-    table = baselines.Table(
-        declared[:, 0] + 0.5 * clear[:, 0] + noise, declared, {"clear": clear, "idle": idle}
-    )
+    target = declared[:, 0] + 0.5 * clear[:, 0] + noise
+    given = baselines.Library.of(target, declared, [("clear", clear), ("idle", idle)])
     for name, method in baselines.METHODS.items():
-        assert method(table) == ["clear"], name
+        assert method(given) == ["clear"], name
+    _, squares, *_ = np.linalg.lstsq(declared, target)
+    assert given.target @ given.target == pytest.approx(squares[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "balance"),
+    [("gear_stribeck", "motor"), ("proximal_bend", "gearbox"), ("wrist_pull", "stretch")],
+)
+def test_the_true_structure_leaves_what_a_rig_without_the_effect_does(
+    name: str, balance: str
+) -> None:
+    truth = TRUTHS[name]
+    places = range(1, 14, 3)
+    effects = (HiddenEffect(name, truth.scale),)
+    hiding = Answer("case-00000000ab", "strong", effects, tuple(range(14)), truth.needs)
+    plain = replace(hiding, effects=())
+    assert told(hiding, balance)
+
+    def left(told_: Answer, played: Answer) -> float:
+        recordings = list(record(played, places))
+        return true_rmse(told_, balance, recordings, [r.name for r in recordings[::2]])
+
+    true, clean, declared = left(hiding, hiding), left(plain, plain), left(plain, hiding)
+    assert true == pytest.approx(clean, rel=0.3)
+    assert true < 0.7 * declared
+
+
+def test_the_error_is_held_against_the_true_structure_of_named_cases_only(tmp_path: Path) -> None:
+    answer = replace(hidden("strong", "gear_backlash"), case="case-00000000ab")
+    folder = write(answer, tmp_path / "cases", tmp_path / "answers", runs=1)
+    nothing = said() | {"runs": {"discover": [], "confirm": []}}
+    assert _ratio(folder, answer, nothing) is None
+    untold = said(finding("identified", "transmission.backlash", "gearbox"))
+    assert _ratio(folder, answer, nothing | untold) is None
