@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.candidate import FAMILIES
 from rig.importers.registry import open_campaign
+from rig.log.reader import read_log
 from rig.simulation.hidden import NAMES, HiddenEffect
 from tests.blind import baselines
 from tests.blind.excitation import EXCITATIONS
@@ -113,6 +114,11 @@ def test_a_hidden_effect_is_in_the_runs_that_have_it_only(tmp_path: Path) -> Non
     for runs in ((), (0,)):
         answer = Answer("case-00000000ab", "partial", effect, runs)
         folder = write(answer, tmp_path / str(len(runs)), tmp_path / "answers", runs=2)
+        for path in folder.iterdir():
+            log = read_log(path)
+            told_ = [dict(log.run.conditions), log.run.notes, log.run.source, dict(log.run.details)]
+            words = json.dumps(told_) + "".join(a.data.decode() for a in log.attachments)
+            assert not [name for name in NAMES if name in words]
         torque.append([recording["proximal_torque_n_m"] for recording in open_campaign(folder)])
     assert np.std(torque[1][0] - torque[0][0]) > 1e-3
     assert np.array_equal(torque[1][1], torque[0][1])
