@@ -59,7 +59,7 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
         ModelFileError: The file cannot be read.
     """
     if path is not None:
-        models = [model_file.read(path)]
+        models = model_file.read_all(path)
     else:
         models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
     chosen = [model for model in models if balance in (None, model.balance)]

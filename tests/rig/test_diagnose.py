@@ -63,6 +63,14 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     assert "spring.position is missing" in captured.err
 
 
+def test_every_balance_that_is_decided_goes_into_the_model_file(campaign, tmp_path):
+    path = tmp_path / "found.model.toml"
+    found = run(tmp_path, "--model-out", str(path), "--quick")
+    assert set(found["undecided"]) == {"stretch"}  # no jaw encoder
+    decided = [m.balance for m in model_file.read_all(path)]
+    assert decided == list(found["unit"]) == ["motor", "gearbox", "cable"]
+
+
 def test_what_has_no_name_is_written_as_a_formula_that_runs_live(monkeypatch, tmp_path, capsys):
     recordings = runs(tight_spot, count=9, seconds=4.0)
     monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(recordings))
