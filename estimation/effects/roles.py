@@ -148,7 +148,17 @@ def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
         return _of_joint(int(number))
     if kind == "calibration":
         return _IN_CALIBRATION
-    return CHANNELS[kind] if kind in CHANNELS else _of_axis(kind)
+    if kind not in AXES:
+        return CHANNELS[kind]
+    own = _of_axis(kind)
+    if kind not in CHANNELS:
+        return own
+    # the grasp of a single-axis rig, or the one of three axes of a wrist
+    rig = CHANNELS[kind]
+    return {
+        role: tuple(dict.fromkeys((*rig.get(role, ()), *own.get(role, ()))))
+        for role in {**rig, **own}
+    }
 
 
 OF_CALIBRATION: Mapping[str, int] = {

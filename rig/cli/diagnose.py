@@ -51,11 +51,12 @@ def diagnose(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from estimation import model_file
+    from estimation.effects.roles import AXES
     from estimation.files import write_text_atomic
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import declared_models, run_diagnosis
+    from rig.diagnosis.run import REFERENCE_RIG, declared_models, rig_of, run_diagnosis
     from rig.diagnosis.written import with_cost_of_causal_filters
     from rig.errors import UsageError
     from rig.reports.diagnosis import page
@@ -64,7 +65,9 @@ def diagnose(
     from rig.reports.render import write_report
 
     screen = console()
-    models = declared_models(model, balance)
+    is_open = model is None and balance in (None, *AXES)  # else the recordings do not matter
+    of_rig = rig_of(path, format_) if is_open else REFERENCE_RIG
+    models = declared_models(model, balance, of_rig)
     if model_out is not None and len(models) > 1:
         raise UsageError(
             f"--model-out names one file, and there are {len(models)} balances.",

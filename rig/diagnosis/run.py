@@ -1,6 +1,6 @@
 """A diagnosis from a path: read the runs, seal the split, search, confirm, remember the look."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +26,9 @@ Stage = Callable[[str], None]
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 """Shipped models that together declare the reference rig, measured or simulated."""
 
+WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
+"""Those that declare the kinematics of a grasper with three degrees of freedom."""
+
 
 @dataclass(frozen=True)
 class Diagnosed:
@@ -46,13 +49,31 @@ class Diagnosed:
     seen: tuple[str, ...]
 
 
-def declared_models(path: Path | None, balance: str | None) -> list[Model]:
+def rig_of(path: Path, format_name: str | None = None) -> tuple[str, ...]:
+    """Return the shipped models of the rig that a path's recordings are of, told by its channels.
+
+    Args:
+        path: File, folder or archive of recordings.
+        format_name: Importer to use; guessed when None.
+
+    Raises:
+        UsageError: The path does not exist.
+        DataError: It cannot be read.
+    """
+    first = next(iter(open_campaign(path, format_name).evidence), None)
+    wanted = (model_file.read(Path(name)).target for name in WRIST)
+    return WRIST if first is not None and set(wanted) <= set(first.columns) else REFERENCE_RIG
+
+
+def declared_models(
+    path: Path | None, balance: str | None, shipped: Sequence[str] = REFERENCE_RIG
+) -> list[Model]:
     """Return the declared models to diagnose.
 
     Args:
-        path: A model file or the name of a shipped one; the balances of the reference rig when
-            None.
+        path: A model file or the name of a shipped one; None for the shipped ones of a rig.
         balance: Only this balance.
+        shipped: Names of that rig's models.
 
     Raises:
         UsageError: No model of that balance.
@@ -61,7 +82,7 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     if path is not None:
         models = [model_file.read(path)]
     else:
-        models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
+        models = [model_file.read(Path(name)) for name in shipped]
     chosen = [model for model in models if balance in (None, model.balance)]
     if not chosen:
         known = ", ".join(dict.fromkeys(model.balance for model in models))
