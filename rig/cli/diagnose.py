@@ -51,12 +51,12 @@ def diagnose(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from estimation import model_file
-    from estimation.effects.roles import AXES
     from estimation.files import write_text_atomic
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import REFERENCE_RIG, declared_models, rig_of, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters
     from rig.errors import UsageError
     from rig.reports.diagnosis import page
@@ -65,9 +65,8 @@ def diagnose(
     from rig.reports.render import write_report
 
     screen = console()
-    is_open = model is None and balance in (None, *AXES)  # else the recordings do not matter
-    of_rig = rig_of(path, format_) if is_open else REFERENCE_RIG
-    models = declared_models(model, balance, of_rig)
+    asked = subject(path, model, balance, format_)
+    models = asked.models
     if model_out is not None and len(models) > 1:
         raise UsageError(
             f"--model-out names one file, and there are {len(models)} balances.",
@@ -75,11 +74,10 @@ def diagnose(
         )
     with engine(workers, scheduler) as executor:
         done = run_diagnosis(
-            path,
+            asked.campaign,
             models,
             Ledger(ledger or default_ledger()),
             seed=seed,
-            format_name=format_,
             executor=executor,
             quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),
