@@ -10,6 +10,7 @@ import numpy as np
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.design import tables
+from estimation.diagnosis.endogeneity import kept_share
 from estimation.diagnosis.evidence import (
     Losses,
     chance,
@@ -41,6 +42,8 @@ class Gates:
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        kept: Least share of what an effect adds that is left when it is fitted through instruments:
+            less, and it is made of the noise of a regressor.
         leftover: Least share that an effect has in what all found in a balance remove together:
             what a name's form leaves of its own cause is no second cause.
         parameters: Named parameters of the whole model at most, or None for no limit.
@@ -59,6 +62,7 @@ class Gates:
     veto: float = 0.9
     sure: float = 0.9
     map_floor: float = 0.2
+    kept: float = 0.5
     leftover: float = 0.15
     parameters: int | None = None
     akin: bool = False
@@ -210,8 +214,8 @@ class Search:
         while len(found) < self.gates.most:
             ranked = self.ranked(found, self.gates.draws)
             ranking = ranking or ranked
-            trial = next(iter(ranked), None)
-            if not found and ranked and not ranked[0].passes(self.gates):
+            trial = self._best(ranked, found)
+            if trial is not None and not found and not trial.passes(self.gates):
                 trial = self._pair(ranked) or trial
             if trial is None:
                 break
@@ -226,6 +230,16 @@ class Search:
             self.balance = replace(self.balance, terms=terms[: -len(found)])
             found = terms[-len(found) :]
         return found, trials, steps, ranking
+
+    def _best(self, ranked: Sequence[Trial], found: Sequence[Candidate]) -> Trial | None:
+        """Return the best trial, but those that would pass and are made of a regressor's noise."""
+        return next((t for t in ranked if not self._hangs_on_noise(t, found)), None)
+
+    def _hangs_on_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
+        if not trial.passes(self.gates):
+            return False  # it is refused for less
+        share = kept_share(self.balance, [*self.balance.terms, *found], trial.candidates)
+        return share is not None and share < self.gates.kept
 
     @property
     def floor(self) -> float:
@@ -328,7 +342,9 @@ class Search:
         for k in np.argsort(-losses.gain[:, 0])[:5]:
             trial = self._trial(pairs[k], losses, int(k), null)
             worth = trial.gain >= 1.2 * ranked[0].gain + self.gates.floor
-            if worth and trial.passes(self.gates) and self._signs_hold(terms, pairs[k]):
+            if not (worth and trial.passes(self.gates) and self._signs_hold(terms, pairs[k])):
+                continue
+            if not self._hangs_on_noise(trial, ()):
                 return trial
         return None
 
