@@ -15,7 +15,7 @@ class KinematicCoupling(Proportional):
     """
 
     id = "coupling.kinematic"
-    balances: ClassVar = {"stretch": 1, "pitch": 1, "yaw": 1}
+    balances: ClassVar = {"stretch": 1, "grasp": 1, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"other_angle": "wrist_pitch_rad"}
     amplitudes = (Parameter("ratio", "target / other_angle", "angle that one radian there moves"),)
     confused_with = ("spring.position", "sensor.encoder_inl")

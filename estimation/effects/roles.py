@@ -147,28 +147,74 @@ def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
     if kind == "joint":
         return _of_joint(int(number))
     if kind == "calibration":
-        return _IN_CALIBRATION
-    return CHANNELS[kind] if kind in CHANNELS else _of_axis(kind)
+        if number in PARTS:
+            return CHANNELS[PARTS[number]]
+        return _ENCODER if number == "encoder" else _SENSOR
+    if kind not in AXES:
+        return CHANNELS[kind]
+    own = _of_axis(kind)
+    if kind not in CHANNELS:
+        return own
+    # the grasp of a single-axis rig, or the one of three axes of a wrist
+    rig = CHANNELS[kind]
+    return {
+        role: tuple(dict.fromkeys((*rig.get(role, ()), *own.get(role, ()))))
+        for role in {**rig, **own}
+    }
 
 
-OF_CALIBRATION: Mapping[str, int] = {
+OF_SENSOR: Mapping[str, int] = {
     "hysteresis.presliding": 1,
     "hysteresis.presliding.maxwell": 1,
     "sensor.creep": 1,
     "sensor.drift": 1,
     "sensor.gain_nonlinear": 1,
+    "sensor.crosstalk": 1,
 }
-"""Effects that may enter the balance of a calibration, `reference = calibrated`, and their side.
-What makes a sensor lag behind its load adds to the reference while the load rises."""
+"""Effects that may enter the balance of a sensor's calibration, `reference = calibrated`, and their
+side. What makes a sensor lag behind its load adds to the reference while the load rises. Where the
+load is known exactly the balance is `read = applied`."""
 
-_CALIBRATED = ("calibrated_n", "calibrated_n_m")
-_IN_CALIBRATION = {
+_CALIBRATED = ("calibrated_n", "applied_n", "applied_n_m")
+_SENSOR = {
     "travel": _CALIBRATED,
     "reading": _CALIBRATED,
     "creeping": _CALIBRATED,
+    "other_reading": ("second_axis_n", "third_axis_n"),
     "clock": ("time_s",),
     "elapsed": ("time_s",),
 }
+
+OF_ENCODER: Mapping[str, int] = {
+    "sensor.encoder_inl": 1,
+    "sensor.encoder_inl.harmonics": 1,
+    "hysteresis.presliding": -1,
+    "sensor.delay": 1,
+    "sensor.drift": 1,
+}
+"""Effects that may enter the balance of an encoder's calibration against another one."""
+
+_ENCODER = {
+    "encoder": ("reference_angle_rad",),
+    "travel": ("reference_angle_rad",),
+    "reading": ("reference_angle_rad",),
+    "clock": ("time_s",),
+    "elapsed": ("time_s",),
+}
+
+PARTS = {"current": "motor", "gearbox": "gearbox"}
+"""Calibrations of a part of the rig, and the balance of the rig that each is."""
+
+
+def _side(effect: Effect, kind: str, number: str) -> int | None:
+    """Return the side of a balance that an effect stands on; None where it has no business."""
+    if kind == "calibration" and number in PARTS:
+        return effect.balances.get(PARTS[number])
+    if kind == "calibration":
+        return (OF_ENCODER if number == "encoder" else OF_SENSOR).get(effect.id)
+    if kind in AXES:  # an axis of the wrist is like the grasp unless stated
+        return effect.balances.get(kind, effect.balances.get("grasp"))
+    return effect.balances.get(kind)
 
 
 def entries(effect: Effect, balance: str) -> list[Entry]:
@@ -179,9 +225,7 @@ def entries(effect: Effect, balance: str) -> list[Entry]:
         balance: Balance id, such as `motor` or `joint.3`.
     """
     kind, _, number = balance.partition(".")
-    sign = OF_CALIBRATION.get(effect.id) if kind == "calibration" else effect.balances.get(kind)
-    if sign is None and kind in AXES:  # an axis of the wrist is like the grasp unless stated
-        sign = effect.balances.get("grasp")
+    sign = _side(effect, kind, number)
     if sign is None:
         return []
     known = _known(kind, number)
