@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arm.kinematics import ArmError, pinocchio
 from estimation.arm.motion import Motion
-from estimation.arm.regressor import LINK
+from estimation.arm.recursion import LINK, Tree, fill_links
 from estimation.arm.tables import DhRow
 from estimation.recording import FloatArray
 
@@ -114,14 +114,24 @@ def closed_regressor(chain: ClosedChain, motion: Motion, sign_rad_s: float) -> F
             f"It has {closure.shape[1]} actuated joints; every value must be finite.",
         )
     position, velocity, acceleration = (x @ closure.T for x in state)
-    model, compute = tree(chain), pinocchio().computeJointTorqueRegressor
-    data = model.createData()
-    rows = zip(position, velocity, acceleration, strict=True)
-    links = np.stack([closure.T @ compute(model, data, q, v, a) for q, v, a in rows])
+    bodies = len(chain.bodies)
+    links = np.zeros((len(position), bodies, len(LINK) * bodies))
+    to = np.arange(links.shape[2], dtype=np.int64).reshape(bodies, len(LINK))
+    fill_links(_tree(chain), (position, velocity, acceleration), to, links)
     frictions = [
         values[:, None, :] * closure.T for values in (np.tanh(velocity / sign_rad_s), velocity)
     ]
-    return np.concatenate([links, *frictions], axis=2)
+    return np.concatenate([closure.T @ links, *frictions], axis=2)
+
+
+@lru_cache(maxsize=8)
+def _tree(chain: ClosedChain) -> Tree:
+    return Tree.of(
+        [body.row for body in chain.bodies],
+        [body.parent - 1 for body in chain.bodies],
+        [False] * len(chain.bodies),
+        chain.gravity_m_s2,
+    )
 
 
 def closed_jacobians(chain: ClosedChain, position: FloatArray) -> FloatArray:

@@ -1,19 +1,19 @@
 """Regressor of an arm: its joint torques as columns times parameters, tau = Y delta.
 
-Links by Pinocchio's torque regressor (parameters about the joint's origin: mass, first moments,
-inertia); then springs, viscous and Coulomb friction, drive inertia and offsets (equation 2.5 of
-G. A. Piqué's thesis, 2018).
+Links (parameters about the joint's origin: mass, first moments, inertia); then springs, viscous and
+Coulomb friction, drive inertia and offsets (equation 2.5 of G. A. Piqué's thesis, 2018).
 """
 
-import numpy as np
+from functools import lru_cache
 
-from estimation.arm.kinematics import ArmError, built, pinocchio
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import Motion
+from estimation.arm.recursion import LINK, Tree, fill_links
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
-
-LINK = ("m", "lx", "ly", "lz", "Lxx", "Lxy", "Lyy", "Lxz", "Lyz", "Lzz")
-"""A link's parameters in Pinocchio's order: kg, kg m, kg m^2; about the joint's origin."""
 
 SIGN_WIDTH = 0.005
 """Share of a joint's top speed over which Coulomb friction changes sign: tanh(velocity / width)."""
@@ -55,41 +55,41 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
             f"A motion of shape {motion.position.shape} does not fit {arm.name}.",
             f"It needs {joints} joints and finite values.",
         )
+    table = np.zeros((len(q), joints, len(names(arm))))
+    fill_links(_tree(arm), (q, v, a), _link_columns(arm), table)
     width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
+    own = (np.tanh(v / width), a, np.ones_like(q))
     springs = [k for k, joint in enumerate(arm.joints) if joint.spring]
-    coupled = np.zeros((len(q), joints, len(arm.viscous_pairs)))
-    for column, (row, other) in enumerate(arm.viscous_pairs):
-        coupled[:, row, column] = v[:, other]
-    return np.concatenate(
-        [
-            _links(arm, q, v, a),
-            on_own_joint(q)[:, :, springs],
-            on_own_joint(v),
-            coupled,
-            on_own_joint(np.tanh(v / width)),
-            on_own_joint(a),
-            on_own_joint(np.ones_like(q)),
-        ],
-        axis=2,
+    damped = [(k, k) for k in range(joints)]
+    at = int(_link_columns(arm).max()) + 1
+    for values, places in (
+        (q, [(k, k) for k in springs]),
+        (v, [*damped, *arm.viscous_pairs]),
+        *((each, damped) for each in own),
+    ):
+        for row, other in places:
+            table[:, row, at] = values[:, other]
+            at += 1
+    return table
+
+
+@lru_cache(maxsize=8)
+def _tree(arm: Arm) -> Tree:
+    return Tree.of(
+        [joint.row for joint in arm.joints],
+        [k - 1 for k in range(len(arm.joints))],
+        [joint.kind == "prismatic" for joint in arm.joints],
+        arm.gravity_m_s2,
     )
 
 
-def on_own_joint(values: FloatArray) -> FloatArray:
-    """Return columns that act on their own joint only: (n, joints) to (n, joints, joints)."""
-    columns: FloatArray = values[:, :, None] * np.eye(values.shape[1])
-    return columns
-
-
-def _links(arm: Arm, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
-    """Return the columns of the links' parameters that count."""
-    model, compute = built(arm), pinocchio().computeJointTorqueRegressor
-    data = model.createData()
-    full = np.empty((len(q), len(arm.joints), len(LINK) * len(arm.joints)))
-    for k in range(len(q)):
-        full[k] = compute(model, data, q[k], v[k], a[k])
-    kept = [
-        len(LINK) * k + j
-        for k, joint in enumerate(arm.joints)
-        for j in (range(len(LINK)) if joint.link == "full" else range(1, 4))
-    ]
-    return full[:, :, kept]
+@lru_cache(maxsize=8)
+def _link_columns(arm: Arm) -> NDArray[np.int64]:
+    """Return the column of each link's parameters, -1 for those that do not count."""
+    to, at = np.full((len(arm.joints), len(LINK)), -1, np.int64), 0
+    for k, joint in enumerate(arm.joints):
+        counts = slice(None) if joint.link == "full" else slice(1, 4)
+        size = len(LINK[counts])
+        to[k, counts] = np.arange(at, at + size)
+        at += size
+    return to
