@@ -6,7 +6,7 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.frozen import (
     Part,
 )
-from estimation.diagnosis.maps import CHANNELS, LOAD, Map
+from estimation.diagnosis.maps import LOAD, Map, channels_of
 from estimation.diagnosis.search import Discovery, Gates, Named
 from estimation.diagnosis.story import Claim
 
@@ -23,7 +23,8 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
         if may_name:
             sure = not named.rivals and named.confidence >= gates.sure
             verdict = "identified" if sure else "one_of"
-            claims.append(Claim(Part(named.candidate), verdict, named, _variables(named)))
+            depends_on = _variables(named, balance)
+            claims.append(Claim(Part(named.candidate), verdict, named, depends_on))
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
@@ -70,12 +71,15 @@ def _share_left(claims: Sequence[Claim], balance: Balance) -> float:
     return balance.loss([*balance.terms, *found]) / max(balance.loss(balance.terms), 1e-300)
 
 
-def _variables(named: Named) -> tuple[str, ...]:
+def _variables(named: Named, balance: Balance) -> tuple[str, ...]:
     """Return the variables of an effect, from the channels it reads."""
     by_channel: dict[str, str] = {}
-    for variable, channel in CHANNELS.items():
-        by_channel[channel] = variable  # of two on one channel the last but history
-    by_channel["spindle_angle_rad"] = "spindle_angle"
+    for variable, channel in channels_of(balance.model.balance, balance.runs[0].channels).items():
+        if variable != "history":
+            by_channel[channel] = variable  # of two on one channel the last
+    for _, channel in named.candidate.channels:
+        if "_drive_" in channel:  # a motor behind the coupling of an arm's wrist
+            by_channel[channel] = "motor_angle" if channel.endswith("_angle_rad") else "velocity"
     by_channel[LOAD] = "load"
     by_channel["distal_torque_n_m"] = "load"
     family = named.candidate.family

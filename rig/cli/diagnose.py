@@ -64,17 +64,20 @@ def diagnose(
     from rig.reports.render import write_report
 
     screen = console()
-    models = declared_models(model, balance)
-    if model_out is not None and len(models) > 1:
+    # without a name, what the recordings hold tells: the reference rig or an arm
+    told = model is not None or not (balance is None or balance.startswith("joint."))
+    models = declared_models(model, balance) if told else None
+    if model_out is not None and model is None and balance is None:
         raise UsageError(
-            f"--model-out names one file, and there are {len(models)} balances.",
-            fix=f"Choose one with --balance: {', '.join(m.balance for m in models)}.",
+            "--model-out names one file, and there are several balances.",
+            fix="Choose one with --balance, such as motor, cable or joint.1.",
         )
     with engine(workers, scheduler) as executor:
         done = run_diagnosis(
             path,
             models,
             Ledger(ledger or default_ledger()),
+            balance=balance,
             seed=seed,
             format_name=format_,
             executor=executor,

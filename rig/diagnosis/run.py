@@ -1,11 +1,14 @@
 """A diagnosis from a path: read the runs, seal the split, search, confirm, remember the look."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from estimation import model_file
+from estimation.arm.balances import balances_of
+from estimation.arm.shared import shared_fit, with_links
+from estimation.arm.twin import ArmTwin
 from estimation.diagnosis.clock import steady
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
@@ -17,7 +20,7 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.twins import twins_of
+from rig.diagnosis.twins import Twins, twins_of
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 
@@ -46,20 +49,26 @@ class Diagnosed:
     seen: tuple[str, ...]
 
 
-def declared_models(path: Path | None, balance: str | None) -> list[Model]:
+def declared_models(
+    path: Path | None, balance: str | None, recordings: Sequence[Recording] = ()
+) -> list[Model]:
     """Return the declared models to diagnose.
 
     Args:
-        path: A model file or the name of a shipped one; the balances of the reference rig when
-            None.
+        path: A model file or the name of a shipped one; when None, the joints of an arm where the
+            recordings hold one, else the balances of the reference rig.
         balance: Only this balance.
+        recordings: What is diagnosed.
 
     Raises:
         UsageError: No model of that balance.
         ModelFileError: The file cannot be read.
     """
+    arm = balances_of(recordings[0]) if recordings else None
     if path is not None:
         models = [model_file.read(path)]
+    elif arm is not None:
+        models = [*arm.models]
     else:
         models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
     chosen = [model for model in models if balance in (None, model.balance)]
@@ -75,9 +84,10 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
 
 def run_diagnosis(
     path: Path,
-    models: list[Model],
+    models: list[Model] | None,
     ledger: Ledger,
     *,
+    balance: str | None = None,
     seed: int = 0,
     format_name: str | None = None,
     executor: Executor | None = None,
@@ -88,8 +98,9 @@ def run_diagnosis(
 
     Args:
         path: File, folder or archive of recordings.
-        models: Declared models, one a balance.
+        models: Declared models, one a balance; those of what the recordings hold when None.
         ledger: Remembers the look.
+        balance: Only this balance, where no models are given.
         seed: Seed of the split and of everything random.
         format_name: Importer to use; guessed when None.
         executor: Runs work in parallel.
@@ -111,8 +122,17 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
+    models = declared_models(None, balance, recordings) if models is None else models
+    discover = [r for r in recordings if r.name in sealed.discover]
+    arm = balances_of(recordings[0])
     on_stage("building the simulated twin of the declared models")
-    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
+    if arm is None:
+        twins = twins_of(models, discover)
+    else:
+        fitted = shared_fit(arm, discover)
+        recordings = with_links(arm, recordings, fitted)
+        twin = ArmTwin.of(arm, [r for r in recordings if r.name in sealed.discover], fitted)
+        twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
     diagnosis, stories = diagnose(
         recordings,
         models,

@@ -10,18 +10,15 @@ import numpy as np
 from estimation.arm.base import base_of
 from estimation.arm.effects import ArmEffect, row_count
 from estimation.arm.identification import smoothed
-from estimation.arm.motion import LOW_PASS, joint_channels, motion_of
+from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.signed import Block, Normal, Products, solve
 from estimation.arm.tables import PSM
 from estimation.arm.wrist import candidates, gripper
-from estimation.filters import LowPass, zero_phase
+from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
-
-FINE = LowPass(cutoff_hz=20.0, order=3)
-"""Filter of the motion that columns are made from before they are filtered as the torque is."""
 
 EDGE_S = 1.0
 """Left out at either end: the filters' transients, and elements that have not slipped yet."""
