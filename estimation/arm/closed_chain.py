@@ -14,27 +14,10 @@ import numpy as np
 from estimation.arm.kinematics import ArmError, pinocchio
 from estimation.arm.motion import Motion
 from estimation.arm.recursion import LINK, Tree, fill_links
-from estimation.arm.tables import DhRow
+from estimation.arm.tables import Body, DhRow
 from estimation.recording import FloatArray
 
 FRICTION = ("fc", "fv")
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """One body of the spanning tree, on a revolute joint about its z axis.
-
-    Attributes:
-        name: What it is called.
-        parent: Number of the body it hangs on, from 1; 0 is the base.
-        row: Where its joint sits on that body.
-        closure: How far its joint turns for a turn of each actuated joint: its row of G.
-    """
-
-    name: str
-    parent: int
-    row: DhRow
-    closure: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +97,8 @@ def closed_regressor(chain: ClosedChain, motion: Motion, sign_rad_s: float) -> F
             f"It has {closure.shape[1]} actuated joints; every value must be finite.",
         )
     position, velocity, acceleration = (x @ closure.T for x in state)
-    bodies = len(chain.bodies)
-    links = np.zeros((len(position), bodies, len(LINK) * bodies))
-    to = np.arange(links.shape[2], dtype=np.int64).reshape(bodies, len(LINK))
+    links = np.zeros((len(position), len(closure), len(LINK) * len(closure)))
+    to = np.arange(links.shape[2], dtype=np.int64).reshape(len(closure), len(LINK))
     fill_links(_tree(chain), (position, velocity, acceleration), to, links)
     frictions = [
         values[:, None, :] * closure.T for values in (np.tanh(velocity / sign_rad_s), velocity)
@@ -126,12 +108,7 @@ def closed_regressor(chain: ClosedChain, motion: Motion, sign_rad_s: float) -> F
 
 @lru_cache(maxsize=8)
 def _tree(chain: ClosedChain) -> Tree:
-    return Tree.of(
-        [body.row for body in chain.bodies],
-        [body.parent - 1 for body in chain.bodies],
-        [False] * len(chain.bodies),
-        chain.gravity_m_s2,
-    )
+    return Tree.of(chain.bodies, chain.gravity_m_s2)
 
 
 def closed_jacobians(chain: ClosedChain, position: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ same columns sample by sample and is what the tests hold this against; called fr
 it costs several times as much as its own work.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
 
@@ -13,11 +14,14 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.arm.tables import DhRow
+from estimation.arm.tables import Body, DhRow
 from estimation.recording import FloatArray
 
 LINK = ("m", "lx", "ly", "lz", "Lxx", "Lxy", "Lyy", "Lxz", "Lyz", "Lzz")
 """A link's parameters in Pinocchio's order: kg, kg m, kg m^2; about the joint's origin."""
+
+COUNTING = {"full": slice(0, 10), "first moments": slice(1, 4), "thin": slice(0, 2)}
+"""Which of them count, by what a body's table says of its link."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +43,13 @@ class Tree:
     gravity: FloatArray
 
     @classmethod
-    def of(
-        cls,
-        rows: list[DhRow],
-        parents: list[int],
-        prismatic: list[bool],
-        gravity_m_s2: tuple[float, float, float],
-    ) -> "Tree":
-        """Lay out modified Denavit-Hartenberg rows."""
+    def of(cls, bodies: Sequence[Body], gravity_m_s2: tuple[float, float, float]) -> "Tree":
+        """Lay out bodies on modified Denavit-Hartenberg rows."""
         return cls(
-            np.array(parents, np.int64),
-            np.array(prismatic, np.bool_),
-            np.stack([_turn(row) for row in rows]),
-            np.stack([_place(row) for row in rows]),
+            np.array([body.parent - 1 for body in bodies], np.int64),
+            np.array([body.prismatic for body in bodies], np.bool_),
+            np.stack([_turn(body.row) for body in bodies]),
+            np.stack([_place(body.row) for body in bodies]),
             np.array(gravity_m_s2),
         )
 
@@ -184,6 +182,8 @@ def _row(u, c, w, t, r, to, i, table, sample, j):  # type: ignore[no-untyped-def
     # force of a first moment l: t x l + w x (w x l); its moment: l x r
     ct, ru = _cross(c, t), _cross(r, u)
     for k in range(3):
+        if to[i, 1 + k] < 0:
+            continue
         table[sample, j, to[i, 1 + k]] = ct[k] + cw * w[k] - ww * c[k] + ru[k]
     if to[i, 4] < 0:
         return

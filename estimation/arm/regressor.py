@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import Motion
-from estimation.arm.recursion import LINK, Tree, fill_links
+from estimation.arm.recursion import COUNTING, LINK, Tree, fill_links
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
@@ -22,9 +22,7 @@ SIGN_WIDTH = 0.005
 def names(arm: Arm) -> tuple[str, ...]:
     """Return the names of the columns of `regressor`; numbers count joints from 1."""
     own = [
-        f"{parameter}{k + 1}"
-        for k, joint in enumerate(arm.joints)
-        for parameter in (LINK if joint.link == "full" else LINK[1:4])
+        f"{parameter}{body.label}" for body in arm.bodies for parameter in LINK[COUNTING[body.link]]
     ]
     own += [f"Ke{k + 1}" for k, joint in enumerate(arm.joints) if joint.spring]
     every = range(1, len(arm.joints) + 1)
@@ -56,12 +54,19 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
             f"It needs {joints} joints and finite values.",
         )
     table = np.zeros((len(q), joints, len(names(arm))))
-    fill_links(_tree(arm), (q, v, a), _link_columns(arm), table)
+    to = _link_columns(arm)
+    at = int(to.max()) + 1
+    if arm.loops:
+        closure = np.array([body.closure for body in arm.bodies])
+        links = np.zeros((len(q), len(closure), at))
+        fill_links(_tree(arm), (q @ closure.T, v @ closure.T, a @ closure.T), to, links)
+        table[:, :, :at] = closure.T @ links
+    else:
+        fill_links(_tree(arm), (q, v, a), to, table)
     width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
     own = (np.tanh(v / width), a, np.ones_like(q))
     springs = [k for k, joint in enumerate(arm.joints) if joint.spring]
     damped = [(k, k) for k in range(joints)]
-    at = int(_link_columns(arm).max()) + 1
     for values, places in (
         (q, [(k, k) for k in springs]),
         (v, [*damped, *arm.viscous_pairs]),
@@ -75,20 +80,15 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _tree(arm: Arm) -> Tree:
-    return Tree.of(
-        [joint.row for joint in arm.joints],
-        [k - 1 for k in range(len(arm.joints))],
-        [joint.kind == "prismatic" for joint in arm.joints],
-        arm.gravity_m_s2,
-    )
+    return Tree.of(arm.bodies, arm.gravity_m_s2)
 
 
 @lru_cache(maxsize=8)
 def _link_columns(arm: Arm) -> NDArray[np.int64]:
-    """Return the column of each link's parameters, -1 for those that do not count."""
-    to, at = np.full((len(arm.joints), len(LINK)), -1, np.int64), 0
-    for k, joint in enumerate(arm.joints):
-        counts = slice(None) if joint.link == "full" else slice(1, 4)
+    """Return the column of each body's parameters, -1 for those that do not count."""
+    to, at = np.full((len(arm.bodies), len(LINK)), -1, np.int64), 0
+    for k, body in enumerate(arm.bodies):
+        counts = COUNTING[body.link]
         size = len(LINK[counts])
         to[k, counts] = np.arange(at, at + size)
         at += size
