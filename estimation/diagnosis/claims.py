@@ -21,9 +21,8 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
         if may_name:
             sure = not named.rivals and named.confidence >= gates.sure
             verdict = "identified" if sure else "one_of"
-            claims.append(
-                Claim(Part(named.candidate), verdict, named, variables_of(named.candidate))
-            )
+            of = variables_of(named.candidate, balance)
+            claims.append(Claim(Part(named.candidate), verdict, named, of))
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map

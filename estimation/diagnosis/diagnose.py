@@ -139,7 +139,7 @@ def _balance(
     measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
-    wanted = [model.target, *model.channels, *needed_channels(measured)]
+    wanted = [model.target, *model.channels, *needed_channels(model.balance, measured)]
     wanted += [*instruments(measured), *(channel for c in tried for _, channel in c.channels)]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map

@@ -120,7 +120,7 @@ def _losses_beside(search: Search, others: Sequence[Candidate], rival: Candidate
 
 def _of_its_form(search: Search, named: Candidate, gain: float, flat: Map) -> bool:
     """Say whether a map only bends a name's formula: its variables, and little more gain."""
-    own = within(flat.variables, variables_of(named))
+    own = within(flat.variables, variables_of(named, search.balance))
     return own and gain >= search.gates.form * flat.gain
 
 
