@@ -171,7 +171,7 @@ def contact_motion(rng: np.random.Generator, seconds: float) -> Motion:
 
 def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     """Return spatial wrenches of touching and letting go in turns: up to 7 N, smooth."""
-    time = np.arange(len(motion)) / RATE_HZ
+    time = np.arange(len(motion)) * motion.period_s
     force = sum(
         np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6.28, 3))
         for f in rng.uniform(0.1, 0.7, 5)
@@ -179,7 +179,7 @@ def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     touching = np.clip(3 * np.sin(2 * np.pi * 0.08 * time + rng.uniform(0, 6.28)), 0, 1)
     force = force * (touching * rng.uniform(5, 7) / np.abs(force).max())[:, None]
     twist = 0.1 * touching * np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
-    tips = np.array([tip_pose(PSM, q)[:3, [2, 3]] for q in motion.position])
+    tips = np.array([tip_pose(PSM, q[:6])[:3, [2, 3]] for q in motion.position])
     axis, tip = tips[:, :, 0], tips[:, :, 1]
     moment = np.cross(tip, force) + twist[:, None] * axis
     return np.hstack([force, moment])
