@@ -11,11 +11,11 @@ import numba
 import numpy as np
 
 from estimation.arm.kinematics import tip_pose
-from estimation.arm.motion import Motion
+from estimation.arm.motion import JointNames, Motion
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import spatial_jacobians
-from estimation.recording import FloatArray
+from estimation.recording import FloatArray, Recording
 
 RATE_HZ = 100.0
 
@@ -50,6 +50,25 @@ class SimulatedArm:
     values: FloatArray
     hidden: FloatArray
     slip: FloatArray
+
+
+def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:
+    """Return what an arm's sensors tell as a recording; six joints are the PSM's, others turn.
+
+    Args:
+        name: Name of the run.
+        position: Shape (n, joints).
+        torque: Shape (n, joints).
+        rate_hz: Sample rate, Hz.
+    """
+    slides = position.shape[1] == len(PSM.joints)
+    columns = {}
+    for k in range(position.shape[1]):
+        names = JointNames(k + 1, slides and PSM.joints[k].kind == "prismatic")
+        columns[names.position] = position[:, k]
+        columns[names.velocity] = np.gradient(position[:, k], 1 / rate_hz)
+        columns[names.torque] = torque[:, k]
+    return Recording(name, np.arange(len(position)) / rate_hz, columns)
 
 
 @dataclass(frozen=True)

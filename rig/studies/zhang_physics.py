@@ -183,6 +183,7 @@ def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmE
         position=np.zeros((len(torque), GRIPPER)),
         torque=torque,
         thesis=table[:, :, :0],
+        closed=table[:, :, :0],
         table=table,
         blocks=blocks_of(effects, widths),
         independent_share=1.0,
