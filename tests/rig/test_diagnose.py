@@ -174,17 +174,6 @@ def test_a_damaged_ledger_is_told(tmp_path):
         Ledger(tmp_path / "looks.jsonl").seen(first, split(first))
 
 
-def test_a_missing_channel_exits_5_and_names_nothing(monkeypatch, tmp_path, capsys):
-    recordings = runs(spring, count=6, seconds=2.0)
-    spoilt = [r.with_columns(motor_current_a=np.full(len(r), np.nan)) for r in recordings]
-    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(spoilt))
-    ledger = tmp_path / "looks.jsonl"
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--ledger", str(ledger)]
-    assert main(words) == 5
-    assert "not finite" in capsys.readouterr().err
-    assert not ledger.exists()  # the confirm runs were not opened
-
-
 def jumping(recording):
     time_s = recording.time_s.copy()
     time_s[700:] += 0.4
