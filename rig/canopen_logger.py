@@ -18,11 +18,12 @@ from drivers.teensy.guard import (
     CURRENT,
     MOTOR,
     SPINDLE,
-    STATE,
     Drive,
     drive_tick,
 )
-from drivers.teensy.protocol import MISSING, STATUS_ARMED, STATUS_HOLDING, TICK_US
+from drivers.teensy.protocol import MISSING
+from drivers.teensy.reference import TICK_US
+from drivers.teensy.watches import STATE, is_in_force
 from drivers.transport.can_bus import CanBus
 
 SERIAL_PREFIX = "EPOS4-"
@@ -31,7 +32,6 @@ TICKS_A_READ = 20
 ANSWER_S = 0.005
 MOST_MISSED = 3
 """SYNCs on end without an answer after which the motor's position is missing."""
-_IN_FORCE = STATUS_ARMED | STATUS_HOLDING
 
 
 class Epos4Bench:
@@ -68,7 +68,7 @@ class Epos4Bench:
             row[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
             row[CURRENT] = self._current_ma
             drive_tick(row, target[k], load_ma[k], *drive.arrays)
-            self._command(int(row[COMMAND_E4]), bool(drive.guard[STATE] & _IN_FORCE))
+            self._command(int(row[COMMAND_E4]), is_in_force(drive.guard[STATE]))
         return rows
 
     def follow(self, in_force: bool) -> None:

@@ -24,7 +24,7 @@ def open_logger(
     if config.logger.url == PTY_URL:
         from rig.simulation.firmware_process import FirmwareProcess
 
-        return FirmwareProcess()
+        return FirmwareProcess(config.logger.profile)
     if config.logger.driver == "epos4":
         return _open_canopen_logger(config)
     if config.is_simulated:
@@ -32,7 +32,12 @@ def open_logger(
         from rig.simulation.logger import open_simulated_logger
 
         return open_simulated_logger(
-            config.simulation, config.logger.url, pace, config.safety.watchdog_s, step_s
+            config.simulation,
+            config.logger.url,
+            config.logger.profile,
+            pace,
+            config.safety.watchdog_s,
+            step_s,
         )
     if config.logger.driver == "teensy-can":
         from drivers.teensy.can_device import open_can_transport

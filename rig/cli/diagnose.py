@@ -55,7 +55,8 @@ def diagnose(
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import declared_models, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
@@ -63,14 +64,14 @@ def diagnose(
     from rig.reports.render import write_report
 
     screen = console()
-    models = declared_models(model, balance)
+    asked = subject(path, model, balance, format_)
+    models = asked.models
     with engine(workers, scheduler) as executor:
         done = run_diagnosis(
-            path,
+            asked.campaign,
             models,
             Ledger(ledger or default_ledger()),
             seed=seed,
-            format_name=format_,
             executor=executor,
             quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),

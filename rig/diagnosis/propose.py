@@ -75,7 +75,7 @@ def _scored(
     recordings: Sequence[Recording],
     twin: Twin,
 ) -> list[tuple[Protocol, Worth]]:
-    limits = load_config().limits
+    limits = load_config().reference_limits
     balance = story.balance
     known = list(balance.runs[0].channels)
     made = {"time_s", PROJECTED_LOAD, *(projected(name) for name in known)}

@@ -159,7 +159,7 @@ def _ratio(folder: Path, answer: Answer, diagnosis: Mapping[str, Any]) -> float 
 
 
 def _baselines(folder: Path, answer: Answer) -> list[dict[str, Any]]:
-    from rig.diagnosis.run import declared_models
+    from rig.diagnosis.subject import declared_models
     from rig.importers.registry import open_campaign
     from tests.blind.baselines import run_all
 

@@ -12,7 +12,7 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.recording import Instrument, Recording
 from rig.cli.main import main
-from rig.diagnosis import run as diagnosis_run
+from rig.diagnosis import subject
 from tests.estimation.test_diagnosis import runs, spring
 
 Spoil = Callable[[list[Recording]], list[Recording]]
@@ -79,7 +79,7 @@ CASES: dict[str, tuple[Spoil, str]] = {
 
 
 def diagnosed(monkeypatch, folder: Path, recordings: list[Recording]) -> dict[str, Any]:
-    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(recordings))
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
     words += ["--ledger", str(folder / "looks.jsonl"), "--json", str(folder / "diagnosis.json")]
     assert main(words) == 0
@@ -107,7 +107,7 @@ def test_what_never_varies_is_said(monkeypatch, tmp_path):
 def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys, what) -> None:
     spoil, reason = CASES[what]
     recordings = spoil(runs(spring, count=9, seconds=2.0))
-    monkeypatch.setattr(diagnosis_run, "open_campaign", lambda *_: Campaign.of(recordings))
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     ledger, out = tmp_path / "looks.jsonl", tmp_path / "diagnosis.json"
     words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick"]
     assert main([*words, "--ledger", str(ledger), "--json", str(out)]) == 5

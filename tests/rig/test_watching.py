@@ -12,7 +12,7 @@ from estimation.fitting import fit
 from estimation.model import NotFittedError
 from estimation.recording import Recording
 from rig.cli.main import main
-from rig.diagnosis.run import declared_models
+from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
 from rig.live.estimator import ModelEstimator
 from rig.live.replay import replay_blocks
