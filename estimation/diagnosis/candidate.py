@@ -106,10 +106,12 @@ class Candidate:
         """Whether a shape stands where the effect turns into a simpler one.
 
         Presliding over a way that no run covers is a spring; friction whose direction takes more
-        speed than any run has is viscous.
+        speed than any run has is viscous; a bend of a spring at no load is play.
         """
+        below = self.effect.other_below
         return any(
-            not p.linear and value > step(p, p.upper, -0.5)
+            (not p.linear and value > step(p, p.upper, -0.5))
+            or (p.name in below and value < step(p, p.lower, 0.5))
             for p, value in zip(self.effect.shape, self.shape, strict=True)
         )
 

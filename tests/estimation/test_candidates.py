@@ -75,3 +75,11 @@ def test_an_unknown_choice_of_samples_names_the_nearest():
     text = to_toml(replace(LINEAR, counted="closing")).replace('"closing"', '"closed"')
     with pytest.raises(ModelFileError, match="closing"):
         parse(text)
+
+
+@pytest.mark.parametrize(("knee_n_m", "is_play"), [(0.02, True), (0.1, False)])
+def test_a_knee_at_no_load_is_play_and_no_stiffening(knee_n_m, is_play):
+    bend = Candidate.of(
+        Term(effect("transmission.stiffening"), -1, {"load": "proximal_torque_n_m"}), [knee_n_m]
+    )
+    assert bend.is_limit is is_play
