@@ -58,6 +58,18 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     page = (report / "diagnosis.html").read_text()
     assert "spring.position is missing" in page
     assert page.count("<svg") == 2
+    for part in (
+        "the residual of the confirm runs before and after",
+        "error of each confirm run before and after",
+        "Error on the confirm runs",
+        "Parameters of what was found",
+        "What was tried: motor",
+        "Declared parameters: motor",
+        "What else it could be",
+        "What this cannot tell",
+        "Next experiment",
+    ):
+        assert part in page
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "spring.position is missing" in captured.err
