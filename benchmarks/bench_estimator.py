@@ -20,7 +20,7 @@ def measure() -> list[Ratio]:
     """Estimate the same 20 s of a sweep from rows of channels and from raw blocks."""
     bank = Bank("motor_current_a")
     draw = np.random.default_rng(0)
-    ranges = np.array([[-1e9] * 6, [1e9] * 6])
+    ranges = np.array([[-1e9], [1e9]]).repeat(bank.judged, axis=1)
     weights = draw.normal(size=bank.size) / bank.size
     estimator = BankEstimator(
         bank, "proximal_torque_n_m", weights, None, ranges, np.ones(bank.size)
@@ -32,7 +32,7 @@ def measure() -> list[Ratio]:
         "motor_angle_rad": 35 * spindle,
         "motor_current_a": 0.2 + 0.1 * spindle + draw.normal(0, 0.003, SAMPLES),
     }
-    rows = np.column_stack([spindle, measured["motor_current_a"], *[spindle] * 4])
+    rows = np.column_stack([measured.get(name, spindle) for name in bank.channels])
 
     def compiled() -> None:
         for block in np.split(rows, SAMPLES // 1000):

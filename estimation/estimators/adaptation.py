@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.bank.fitting import Normal, Settings, pull, spread
-from estimation.bank.states import Bank
+from estimation.bank.fitting import Normal, Pool, pull
+from estimation.bank.states import LAGS, Bank
 from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
 from estimation.estimators.network import NetworkEstimator
 from estimation.networks import training
@@ -115,7 +115,7 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
         NetworkError: There is no run, or torch is missing.
     """
     if isinstance(like, BankEstimator):
-        return fit_runs(_reduced(like, runs), like.bank, like.target, Settings())
+        return fit_runs(_reduced(like, runs), like.bank, like.target)
     rows, truth = (np.concatenate(part) for part in zip(*(r.fitted for r in runs), strict=True))
     nodes = len(like.network.hidden)
     names = (like.network.inputs, like.network.outputs)
@@ -152,7 +152,7 @@ def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> Netw
     prior = np.roll(network.output[0], 1)  # the bias first
     stiff = np.full(len(prior), OUTPUT)
     stiff[0] = 0.0
-    moved = np.roll(pull(normals, prior, spread(normals), stiff), -1)
+    moved = np.roll(pull(normals, prior, Pool.of(normals).spread, stiff), -1)
     return replace(source, network=replace(network, output=moved[None]))
 
 
@@ -162,7 +162,7 @@ def stiffness(bank: Bank) -> FloatArray:
     for k, product in enumerate(bank.products):
         if set(product) == {"q"}:
             found[k] = POSITION
-        elif set(product) in ({"q", "c"}, {"c"}):
+        elif set(product) <= {"q", "c", *LAGS}:
             found[k] = LOAD
     found[0] = 0.0  # the zero is free
     return found

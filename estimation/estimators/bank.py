@@ -1,6 +1,6 @@
 """Products of physical states as an estimator, with an interval and a range of validity."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.bank.fitting import Normal, Settings, solve, spread
+from estimation.bank.fitting import Normal, Pool, Settings, chosen, solve
 from estimation.bank.interval import COVERAGE, Interval, calibrate
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
@@ -53,13 +53,13 @@ class BankEstimator:
         target: Channel that is estimated.
         weights: Weight of each product, shape (size,).
         interval: What is known of the error; None where too few runs were fitted to know it.
-        ranges: Lowest and highest value of each channel fitted on, shape (2, channels).
+        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
     """
 
-    SCHEMA: ClassVar[str] = "rig.bank/1"
+    SCHEMA: ClassVar[str] = "rig.bank/2"
 
     bank: Bank
     target: str
@@ -74,7 +74,7 @@ class BankEstimator:
         for name, shape in {
             "weights": (self.bank.size,),
             "scale": (self.bank.size,),
-            "ranges": (2, len(self.bank.channels)),
+            "ranges": (2, self.bank.judged),
         }.items():
             values = read_only(getattr(self, name))
             if values.shape != shape or np.isnan(values).any():
@@ -110,11 +110,15 @@ class BankEstimator:
 
     def of_rows(self, rows: FloatArray) -> Estimates:
         """Return the estimates for rows of filtered channels, shape (n, channels)."""
-        design = self.bank.design(rows)
+        return self.of_design(self.bank.design(rows), rows)
+
+    def of_design(self, design: FloatArray, rows: FloatArray) -> Estimates:
+        """Return the estimates for a design of the bank and the rows it was made of."""
         width = np.full(len(rows), np.nan)
         if self.interval is not None:
             width = self.interval.half_width(design)
-        within = (rows >= self.ranges[0]) & (rows <= self.ranges[1])
+        judged = rows[:, : self.bank.judged]
+        within = (judged >= self.ranges[0]) & (judged <= self.ranges[1])
         return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
 
     def for_any_instrument(self) -> "BankEstimator":
@@ -220,7 +224,7 @@ class RunEvidence:
         design: The bank's products, shape (n, size).
         truth: The target without lag, shape (n,).
         normal: The run's share in the normal equations.
-        ranges: Lowest and highest value of each channel, shape (2, channels).
+        ranges: Lowest and highest value of each judged channel, shape (2, judged).
     """
 
     design: FloatArray
@@ -238,7 +242,8 @@ class RunEvidence:
             truths: The targets, shape (n, targets).
         """
         design = bank.design(rows)
-        ranges = np.array([rows.min(axis=0), rows.max(axis=0)])
+        judged = rows[:, : bank.judged]
+        ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
         whole = Normal.of(design, truths)
         return [
             cls(design, truth, whole.only(k), ranges)
@@ -250,7 +255,7 @@ def fit_runs(
     runs: Sequence[RunEvidence],
     bank: Bank,
     target: str,
-    settings: Settings,
+    settings: Settings | None = None,
     coverage: float = COVERAGE,
 ) -> BankEstimator:
     """Fit weights and, from runs left out in turn, the interval.
@@ -259,7 +264,7 @@ def fit_runs(
         runs: The runs.
         bank: The bank they were reduced with.
         target: Channel that is estimated.
-        settings: How weights are found.
+        settings: How weights are found; chosen on runs left out in turn if None.
         coverage: Share of the samples of unseen runs that the interval covers.
 
     Raises:
@@ -267,24 +272,20 @@ def fit_runs(
     """
     if not runs:
         raise NetworkError("There is no closing sample to fit a state estimator on.")
-
-    def weights(part: Iterable[RunEvidence]) -> FloatArray:
-        return solve([run.normal for run in part], settings)[:, 0]
-
+    whole = Pool.of([run.normal for run in runs])
     interval = None
     if len(runs) >= INNER_FOLDS:
-        held_out = [
-            weights(run for k, run in enumerate(runs) if k % INNER_FOLDS != fold)
-            for fold in range(INNER_FOLDS)
-        ]
+        folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
+        settings = settings or chosen(whole, folds)
+        held_out = [solve(whole.without(part), settings)[:, 0] for part in folds]
         residuals = [
             run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
         ]
         interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
-    ranges, scale = np.array([lowest, highest]), spread([run.normal for run in runs])
-    return BankEstimator(bank, target, weights(runs), interval, ranges, scale)
+    weights = solve(whole, settings or Settings())[:, 0]
+    return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,7 @@ class BankRecipe:
     Attributes:
         target: Channel to estimate.
         bank: The states and products.
-        settings: How weights are found.
+        settings: How weights are found; chosen on runs left out in turn if None.
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
         low_pass: Filter of every channel.
         coverage: Share of the samples of unseen runs that the interval covers.
@@ -302,7 +303,7 @@ class BankRecipe:
 
     target: str
     bank: Bank = field(default_factory=Bank)
-    settings: Settings = field(default_factory=Settings)
+    settings: Settings | None = None
     causal: bool = False
     low_pass: LowPass = PAPER
     coverage: float = COVERAGE

@@ -46,6 +46,9 @@ def oneill(
     states: Annotated[
         bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
     ] = False,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
+    ] = None,
     minutes: Annotated[
         float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
     ] = None,
@@ -70,7 +73,9 @@ def oneill(
         left_out = result.study.left_out
         training = Training(minutes, every, workers, state)
         deep = _train(source, left_out, data, training, seed)
-    physical = _fit_states(source, result.study.left_out, data, seed) if states else None
+    physical, drawn = None, []
+    if states:
+        physical, drawn = _fit_states(source, result.study.left_out, data, seed, figures)
     more = shown.More(deep, physical)
     lines = [
         shown.lead(result.study),
@@ -78,7 +83,16 @@ def oneill(
         *shown.all_notes(result.study, more),
     ]
     tables = shown.all_tables(result.study, more)
-    show_result(lines, tables, out, lambda: shown.markdown(result.study, more))
+
+    def markdown() -> str:
+        placed = [
+            (caption, os.path.relpath(path, out.parent))
+            for caption, path in drawn
+            if out is not None
+        ]
+        return shown.markdown(result.study, more, placed)
+
+    show_result(lines, tables, out, markdown)
     if report is not None:
         page = write_report(report / "oneill.html", shown.page(result, more))
         console().print(f"Report: {page}", markup=False)
@@ -122,21 +136,31 @@ def _train(
 
 
 def _fit_states(
-    source: "Source", left_out: dict[str, str], data: Path | None, seed: int
-) -> "StateStudy":
+    source: "Source",
+    left_out: dict[str, str],
+    data: Path | None,
+    seed: int,
+    figures: Path | None,
+) -> tuple["StateStudy", list[tuple[str, Path]]]:
+    from rig.reports.oneill_figures import write
+    from rig.studies.oneill_shown import Shown
     from rig.studies.oneill_states import run_states
+
+    kept: list[Shown] = []
 
     with progress() as bar:
         task = bar.add_task("closing samples", total=None)
         fitted = bar.add_task("estimates from states", total=None)
-        return run_states(
+        study = run_states(
             source.campaign,
             left_out,
             data,
             seed=seed,
             on_run=lambda name: bar.advance(task),
             on_row=lambda done, total: bar.update(fitted, completed=done, total=total),
+            on_shown=kept.append if figures is not None else None,
         )
+    return study, write(figures, kept) if figures is not None else []
 
 
 @study_app.command()

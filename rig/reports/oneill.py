@@ -1,5 +1,6 @@
 """The study of O'Neill et al. 2018 as tables for any medium, as Markdown and as a page."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,9 +133,16 @@ class More:
 NOTHING_MORE = More()
 
 
-def markdown(study: Study, more: More = NOTHING_MORE) -> str:
-    """Return the study, and what goes beyond where there is any, as a Markdown page."""
+def markdown(study: Study, more: More = NOTHING_MORE, drawn: Sequence[tuple[str, str]] = ()) -> str:
+    """Return the study, and what goes beyond where there is any, as a Markdown page.
+
+    Args:
+        study: The linear rows.
+        more: What goes beyond.
+        drawn: Caption and place of each figure, relative to the page.
+    """
     parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, more)]
+    parts += [f"![{caption}]({place})\n\n{caption}" for caption, place in drawn]
     parts += [to_markdown(table).rstrip() for table in all_tables(study, more)]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
