@@ -153,7 +153,7 @@ def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> Netw
     stiff = np.full(len(prior), OUTPUT)
     stiff[0] = 0.0
     moved = np.roll(pull(normals, prior, Pool.of(normals).spread, stiff), -1)
-    return replace(source, network=replace(network, output=moved[None]))
+    return replace(source, network=replace(network, output=moved[None]), instrument="")
 
 
 def stiffness(bank: Bank) -> FloatArray:

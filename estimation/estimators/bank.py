@@ -13,7 +13,7 @@ from estimation.bank.interval import COVERAGE, Interval, calibrate
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
-from estimation.errors import EstimationError
+from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.oneill import is_closing, processed
@@ -23,10 +23,6 @@ from estimation.scores import Score, score
 INNER_FOLDS = 5
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
-
-
-class InstrumentError(EstimationError):
-    """An estimator is asked about an instrument it was not fitted on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +96,7 @@ class BankEstimator:
         Raises:
             InstrumentError: The recording is of another instrument.
         """
-        self._require_own(instrument_of(recording))
+        require_own(self.instrument, recording)
         names = self.bank.channels
         if causal:
             channels = causal_channels(recording, names, self.low_pass, tracked=True)
@@ -124,14 +120,6 @@ class BankEstimator:
     def for_any_instrument(self) -> "BankEstimator":
         """Return the estimator for use on instruments it was not fitted on."""
         return replace(self, instrument="")
-
-    def _require_own(self, instrument: str) -> None:
-        if self.instrument and instrument and instrument != self.instrument:
-            raise InstrumentError(
-                f"The estimator was fitted on {self.instrument}, the recording is of {instrument}.",
-                "Another instrument has other friction and another zero.",
-                "Adapt it: rig adapt MODEL PATH --runs NAMES.",
-            )
 
     def stepper(self, sample_rate_hz: float) -> "BankStepper":
         """Return the estimator as it runs live."""
@@ -322,8 +310,7 @@ class BankRecipe:
                 runs.append(run)
             instruments.add(instrument_of(recording))
         fitted = fit_runs(runs, self.bank, self.target, self.settings, self.coverage)
-        known = instruments.pop() if len(instruments) == 1 else ""
-        return replace(fitted, instrument=known, low_pass=self.low_pass)
+        return replace(fitted, instrument=only_one(instruments), low_pass=self.low_pass)
 
     def evidence_of(self, recording: Recording) -> RunEvidence | None:
         """Reduce a raw run; None where it has no valid closing sample.
@@ -368,9 +355,3 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
         estimates += [runs[k].design @ weights for k in held_out]
         truths += [runs[k].truth for k in held_out]
     return score(np.concatenate(estimates), np.concatenate(truths))
-
-
-def instrument_of(recording: Recording) -> str:
-    """Return the model and serial number of a recording's instrument, empty if not known."""
-    own = recording.instrument
-    return " ".join(part for part in (own.model, own.serial) if part)

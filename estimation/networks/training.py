@@ -157,7 +157,8 @@ def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
 
 def _blocks(x: "Tensor", y: "Tensor") -> Iterator[tuple["Tensor", "Tensor"]]:
     """Cut rows into blocks of at most `BLOCK`."""
-    yield from zip(x.split(BLOCK), y.split(BLOCK), strict=True)
+    for first in range(0, len(x), BLOCK):
+        yield x[first : first + BLOCK], y[first : first + BLOCK]
 
 
 def _normal(

@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.bank.fitting import Normal, Pool, Settings, solve
+from estimation.bank.fitting import CHOICES, Normal, Pool, Settings, chosen, solve
 from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
 from estimation.campaign import Campaign
 from estimation.derived import ago_of, causal_channels, fall_of, rise_of, zero_phase_channels
+from estimation.estimator import load
 from estimation.estimators.adaptation import adapted, evidence
 from estimation.estimators.bank import (
     BankEstimator,
     BankRecipe,
-    InstrumentError,
 )
-from estimation.networks.network import NetworkError
+from estimation.estimators.instrument import InstrumentError
+from estimation.estimators.network import NetworkEstimator
+from estimation.networks.network import Network, NetworkError
 from estimation.oneill import closing_samples, processed
 from estimation.recording import Instrument, Recording
 from tests.estimation.synthetic import campaign
@@ -157,6 +159,38 @@ def test_another_instrument_is_refused_unless_told(runs):
         fitted.for_any_instrument().predict(foreign),
         fitted.predict(replace(foreign, instrument=own)),
     )
+
+
+def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_path):
+    own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
+    inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[0.0, 0.0], [1.0, 1.0]])
+    hidden, output = np.ones((2, 3)), np.ones((1, 3))
+    network = Network(inputs, (TARGET,), bounds, np.array([[0.0], [1.0]]), hidden, output)
+    NetworkEstimator(network, instrument="Maryland 1").save(tmp_path / "net.npz")
+    kept = load(tmp_path / "net.npz")
+    assert isinstance(kept, NetworkEstimator)
+    assert np.isfinite(kept.predict(replace(runs[0], instrument=own))).all()
+    with pytest.raises(InstrumentError, match="recording is of Maryland 2"):
+        kept.predict(replace(runs[0], instrument=other))
+    assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
+
+
+def test_settings_are_chosen_by_runs_left_out(runs):
+    bank = Bank("motor_current_a")
+    recipe = BankRecipe(TARGET, bank)
+    found = [run for run in map(recipe.evidence_of, runs) if run is not None]
+    parts = [[run.normal for run in found[k::3]] for k in range(3)]
+    whole, folds = Pool.of([n for part in parts for n in part]), [Pool.of(p) for p in parts]
+
+    def error(settings: Settings) -> float:
+        total = 0.0
+        for k in range(3):
+            rest = [run.normal for j in range(3) if j != k for run in found[j::3]]
+            weights = solve(Pool.of(rest), settings)[:, 0]
+            total += sum(float(np.sum((r.design @ weights - r.truth) ** 2)) for r in found[k::3])
+        return total
+
+    assert chosen(whole, folds) == min(CHOICES, key=error)
 
 
 def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, runs):
