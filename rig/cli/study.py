@@ -12,6 +12,7 @@ from rig.cli.study_arm import arm_studies
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
+    from rig.studies.oneill_kinds import KindRow
     from rig.studies.oneill_networks import NetworkStudy
     from rig.studies.oneill_states import StateStudy
 
@@ -46,6 +47,10 @@ def oneill(
     states: Annotated[
         bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
     ] = False,
+    kinds: Annotated[
+        bool,
+        typer.Option("--kinds", help="Also fit every kind of estimator on the same folds."),
+    ] = False,
     figures: Annotated[
         Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
     ] = None,
@@ -76,7 +81,8 @@ def oneill(
     physical, drawn = None, []
     if states:
         physical, drawn = _fit_states(source, result.study.left_out, data, seed, figures)
-    more = shown.More(deep, physical)
+    every_kind = _fit_kinds(source, result.study.left_out, seed) if kinds else ()
+    more = shown.More(deep, physical, every_kind)
     lines = [
         shown.lead(result.study),
         f"Data: {source.name}.",
@@ -97,7 +103,7 @@ def oneill(
         page = write_report(report / "oneill.html", shown.page(result, more))
         console().print(f"Report: {page}", markup=False)
     if json:
-        found = {"networks": deep, "states": physical}
+        found = {"networks": deep, "states": physical, "kinds": every_kind or None}
         emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
 
 
@@ -161,6 +167,19 @@ def _fit_states(
             on_shown=kept.append if figures is not None else None,
         )
     return study, write(figures, kept) if figures is not None else []
+
+
+def _fit_kinds(source: "Source", left_out: dict[str, str], seed: int) -> "tuple[KindRow, ...]":
+    from rig.studies.oneill_kinds import run_kinds
+
+    with progress() as bar:
+        task = bar.add_task("kinds of estimators", total=None)
+        return run_kinds(
+            source.campaign,
+            left_out,
+            seed,
+            on_fit=lambda done, total: bar.update(task, completed=done, total=total),
+        )
 
 
 @study_app.command()
