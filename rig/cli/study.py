@@ -256,6 +256,37 @@ def loop(
         emit_json(study)
 
 
+@study_app.command()
+def instruments(
+    data: Annotated[Path, typer.Option(help="Folder of the measured data's folders or archives.")],
+    source: Annotated[str, typer.Option(help="Instrument to fit on.")] = "Tool_4_Maryland_L_4",
+    other: Annotated[
+        list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Adapt one instrument's estimators to others, with one run or three."""
+    from rig.importers.registry import open_campaign
+    from rig.reports import instruments as shown
+    from rig.studies.instruments import run_instruments
+    from rig.studies.oneill import part_of
+
+    others = other or ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
+    with progress() as bar:
+        task = bar.add_task("instruments", total=None)
+        study = run_instruments(
+            (source, open_campaign(part_of(data, source))),
+            {name: open_campaign(part_of(data, name)) for name in others},
+            seed=seed,
+            on_row=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    show_result([shown.lead(study)], [shown.table(study)], out, lambda: shown.markdown(study))
+    if json:
+        emit_json(study)
+
+
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.studies.oneill import Source

@@ -194,8 +194,7 @@ def run_states(
             on_run(recording.name)
         for kind, alike in groupby(own, key=lambda job: (job.bank, job.filters)):
             evidence = _evidence(kind, runs)
-            found = _rows(list(alike), runs, evidence, seed)
-            rows += found
+            rows += _rows(list(alike), runs, evidence, seed)
             on_row(len(rows), len(planned))
             if on_shown is not None and kind == DRAWN:
                 for target in (PROXIMAL, DISTAL):
@@ -294,7 +293,7 @@ def _fitted(
     job: StateJob, evidence: Sequence[RunEvidence], runs: Sequence[_Run], seed: int
 ) -> dict[int, BankEstimator]:
     """Return the estimator that was fitted without each run; none where it cannot be done."""
-    found = {}
+    found: dict[int, BankEstimator] = {}
     for held_out in _splits(runs, job.protocol, seed):
         rest = [run for k, run in enumerate(evidence) if k not in held_out]
         estimator = fit_runs(rest, job.bank, job.target)
