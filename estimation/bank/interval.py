@@ -73,6 +73,26 @@ class Interval:
         )
 
 
+def rescaled(
+    source: Interval,
+    designs: Sequence[FloatArray],
+    residuals: Sequence[FloatArray],
+    coverage: float = COVERAGE,
+) -> Interval:
+    """Return an interval of the same shape that covers a few runs' errors; never a narrower one.
+
+    Args:
+        source: The interval before.
+        designs: Design of each run, shape (n, size).
+        residuals: Error of each run, shape (n,).
+        coverage: The share, raised for few runs as in `calibrate`: up to 19 runs, all of them.
+    """
+    widths = np.concatenate([source.half_width(design) for design in designs])
+    level = min(coverage * (1 + 1 / len(designs)), 1.0)
+    factor = max(float(np.quantile(np.abs(np.concatenate(residuals)) / widths, level)), 1.0)
+    return Interval(source.columns, factor * source.weights, factor * source.least)
+
+
 def calibrate(
     bank: Bank,
     designs: Sequence[FloatArray],

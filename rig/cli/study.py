@@ -78,7 +78,8 @@ def oneill(
         left_out = result.study.left_out
         training = Training(minutes, every, workers, state)
         deep = _train(source, left_out, data, training, seed)
-    physical, drawn = None, []
+    physical: StateStudy | None = None
+    drawn: list[tuple[str, Path]] = []
     if states:
         physical, drawn = _fit_states(source, result.study.left_out, data, seed, figures)
     every_kind = _fit_kinds(source, result.study.left_out, seed) if kinds else ()

@@ -36,10 +36,13 @@ def table(study: InstrumentStudy) -> TextTable:
             row.instrument,
             ", ".join(name.rsplit("/", 1)[-1] for name in found.used),
             *("" if score is None else f"{1e3 * score.rmse:.2f}" for score in errors),
+            "" if found.covered is None else f"{found.covered:.1%}",
             str(len(found.unused)),
         ])  # fmt: skip
     columns = ["estimator", "instrument", "runs used", "as it is", "adapted", "fitted anew"]
-    return TextTable("Other instruments", [*columns, "runs not used"], cells, NOTE)
+    return TextTable(
+        "Other instruments", [*columns, "interval of 95 % covers", "runs not used"], cells, NOTE
+    )
 
 
 def markdown(study: InstrumentStudy) -> str:
