@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.channels import UNIT_BY_SUFFIX
@@ -33,6 +32,7 @@ from estimation.filters import (
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
+from estimation.window import lowest, since_lowest
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -65,7 +65,6 @@ TRAVEL_WINDOW_S = 0.5
 CLOCKS = ("time_s", CAMPAIGN_TIME)
 
 Operator = Callable[[FloatArray], FloatArray]
-Places = NDArray[np.int64]
 
 
 def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
@@ -142,12 +141,12 @@ def _derive(
                 filtered["motor_angle_rad"] / GEAR_RATIO - filtered["spindle_angle_rad"]
             )
         elif name.endswith(TRAVEL):
-            channels[name] = _since_lowest(filtered[_turning(name)], window)
+            channels[name] = since_lowest(filtered[_turning(name)], window)
         elif name.endswith(TURNED):
             angle = filtered[_turning(name)]
             channels[name] = (np.arange(len(angle)) - lowest(angle, window)) / sample_rate_hz
         elif FALL in name:
-            channels[name] = _since_lowest(-filtered[_plain(name)], window)
+            channels[name] = since_lowest(-filtered[_plain(name)], window)
         elif RISE in name:
             channel = filtered[_plain(name)]
             channels[name] = channel - channel[lowest(filtered[TURNING], window)]
@@ -166,32 +165,6 @@ def _derive(
             for _ in range(times):
                 channels[name] = derivative(channels[name])
     return channels
-
-
-def _since_lowest(values: FloatArray, window: int) -> FloatArray:
-    """Return each value less the lowest of itself and the `window - 1` before it."""
-    return np.asarray(values - values[lowest(values, window)])
-
-
-@njit(cache=True)
-def lowest(values: FloatArray, window: int) -> Places:
-    """Return the place of the lowest of each value and the `window - 1` before it.
-
-    Of equal ones it is the last. Values that rise are kept in a queue, so each one is looked at
-    twice at the most.
-    """
-    found = np.empty(len(values), np.int64)
-    queue = np.empty(len(values), np.int64)
-    first, end = 0, 0
-    for i in range(len(values)):
-        while end > first and values[queue[end - 1]] >= values[i]:
-            end -= 1
-        queue[end] = i
-        end += 1
-        if queue[first] <= i - window:
-            first += 1
-        found[i] = queue[first]
-    return found
 
 
 def settled_places(
