@@ -29,7 +29,7 @@ def require_own(instrument: str, recording: Recording) -> None:
         raise InstrumentError(
             f"The estimator was fitted on {instrument}, the recording is of {other}.",
             "Another instrument has other friction and another zero.",
-            "Adapt it: rig adapt MODEL PATH --runs NAMES.",
+            "Adapt it: rig adapt MODEL PATH --runs NAMES; or tell rig replay --any-instrument.",
         )
 
 
