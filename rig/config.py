@@ -328,6 +328,13 @@ class Config(_Section):
             whole[name] = {**whole[name], **change} if isinstance(change, dict) else change
         return Config.model_validate(whole)
 
+    def logged(self) -> dict[str, Any]:
+        """Return what a log holds of it: all but what is hidden, which a diagnosis is to find."""
+        whole = self.model_dump()
+        for secret in ("hidden", "draw_hidden"):
+            del whole["simulation"][secret]
+        return whole
+
 
 def is_simulated(url: str) -> bool:
     """Say whether a URL names a fake."""

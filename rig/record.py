@@ -5,6 +5,7 @@ rest. Each run's log is complete in itself, so an aborted campaign resumes at th
 has no log.
 """
 
+import hashlib
 import itertools
 import json
 import shutil
@@ -137,7 +138,12 @@ def open_campaign_folder(
     """
     folder.mkdir(parents=True, exist_ok=True)
     manifest = folder / MANIFEST
-    described = {"protocol": protocol.model_dump(), "config": config.model_dump()}
+    whole = json.dumps(config.model_dump(), sort_keys=True).encode()
+    described = {
+        "protocol": protocol.model_dump(),
+        "config": config.logged(),
+        "config_sha256": hashlib.sha256(whole).hexdigest(),
+    }
     if manifest.exists():
         if not resume:
             raise UsageError(
@@ -259,7 +265,7 @@ def _new_log(
             **_clock_residuals(session),
         },
     )
-    settings = json.dumps(config.model_dump(), indent=1).encode()
+    settings = json.dumps(config.logged(), indent=1).encode()
     attachments = [
         Attached("config.json", "application/json", settings),
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),

@@ -1,6 +1,7 @@
 """The functions of one variable that a formula is made of, at the shapes a search tries."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -36,9 +37,9 @@ def live_channel(balance: Balance, basis: Basis) -> str | None:
 
 def word(basis: Basis) -> str:
     """Return what a formula calls a variable."""
-    return {"velocity_sign": "velocity", "history": "spindle_angle"}.get(
-        basis.variable, basis.variable
-    )
+    if basis.variable == "history":
+        return re.sub(r"_rad$|_m$|(?<=joint_\d)_.*", "", basis.channel)
+    return "velocity" if basis.variable == "velocity_sign" else basis.variable
 
 
 def library(basis: Basis, channel: str) -> list[Unary]:

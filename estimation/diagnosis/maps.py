@@ -6,7 +6,7 @@ variables are what may be said.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,12 +34,24 @@ CHANNELS = {
     "wrist_pitch": "wrist_pitch_rad",
     "wrist_roll": "wrist_roll_rad",
 }
-"""Variables of a map, simplest first, and the channel each is taken from."""
+"""Variables of a map, simplest first, and the channel each is taken from; of an arm see
+`channels_of`."""
+
+ARM_JOINTS = range(1, 8)
 
 LOAD, PROJECTED_LOAD = "proximal_torque_n_m", "projected_load_n_m"
 
+SPEEDS = ("spindle_velocity_rad_s", "jaw_velocity_rad_s")
+LOADS = (LOAD, "distal_torque_n_m", "motor_load_n_m")
+
 BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",)}
 """Variables that reach a balance only through its load, and would stand for that load."""
+
+ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
+"""Angles of one rig move together."""
+
+OF_SPEED = ("viscous", "viscous_asymmetry", "drag", "stribeck", "load_viscous")
+"""Frictions that go with the speed, not with its sign alone."""
 
 KNOTS = 7
 ORDERS = 8
@@ -120,6 +132,30 @@ class Map:
         return parts[0] if len(parts) == 1 else _products(*parts)
 
 
+def variables_of(effect: Candidate, balance: Balance) -> tuple[str, ...]:
+    """Return the variables of a named effect in a balance, from the channels it reads."""
+    known = channels_of(balance.model.balance, balance.runs[0].channels)
+    # of two on one channel the last but history
+    by_channel = {channel: name for name, channel in known.items() if name != "history"}
+    by_channel |= dict.fromkeys(SPEEDS, "velocity") | dict.fromkeys(LOADS, "load")
+    for _, channel in effect.channels:
+        if "_drive_" in channel:  # a motor behind the coupling of an arm's wrist
+            by_channel[channel] = "motor_angle" if channel.endswith("_angle_rad") else "velocity"
+    found = [by_channel[channel] for _, channel in effect.channels if channel in by_channel]
+    kind, _, name = effect.family.partition(".")
+    if kind == "friction" and name not in OF_SPEED:
+        found = ["velocity_sign" if variable == "velocity" else variable for variable in found]
+    if kind == "hysteresis":
+        found.append("history")
+    return tuple(dict.fromkeys(found))
+
+
+def within(variables: Sequence[str], others: Collection[str]) -> bool:
+    """Say whether variables are no more than others; the angles of one rig move together."""
+    known = {*others, *(ANGLES if ANGLES & {*others} else ())}
+    return {*variables} <= known
+
+
 def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int) -> Map | None:
     """Return the smallest map that is about as good as the best one.
 
@@ -130,8 +166,9 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         seed: Their seed.
     """
     offered = bases(balance)
-    base = [b[::THIN] for b in balance.base(terms)]
-    left = [r[::THIN] for r in balance.left(terms)]
+    folds = stretches if balance.one_path else list
+    base = folds([b[::THIN] for b in balance.base(terms)])
+    left = folds([r[::THIN] for r in balance.left(terms)])
     drawn = surrogates(left, count, seed)
     aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
     singles = {basis: _thinned(balance, basis) for basis in offered}
@@ -142,7 +179,7 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
             _centred(p[0] if len(p) == 1 else _products(*p), balance.demean)
             for p in zip(*(singles[basis] for basis in subset), strict=True)
         ]
-        losses = leave_one_run_out(base, columns, [columns[0].shape[1]], aims, RIDGE)
+        losses = leave_one_run_out(base, folds(columns), [columns[0].shape[1]], aims, RIDGE)
         null = np.maximum(null, losses.gain[0, 1:])
         ratio = losses.joint[:, 0, 0] / np.maximum(losses.base[:, 0], np.finfo(float).tiny)
         found.append(
@@ -167,6 +204,21 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         chance(chosen.gain, null),
         chosen.agree,
     )
+
+
+def stretches(periods: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return as many stretches of a path as there are periods, each cut out of every period.
+
+    On a path that repeats itself two positions tell where on the path one is: a map of them learns
+    the residual by heart and knows it in every other period. Where stretches are left out, it has
+    to predict what it has not seen.
+    """
+    longest, count = max(map(len, periods)), len(periods)
+    ends = [longest * k // count for k in range(count + 1)]
+    return [
+        np.concatenate([period[first:last] for period in periods])
+        for first, last in itertools.pairwise(ends)
+    ]
 
 
 def play(x: FloatArray, width: float) -> FloatArray:
@@ -197,16 +249,44 @@ def projection(balance: Balance) -> Callable[[Run], Run]:
     return added
 
 
-def needed_channels(measured: Sequence[str]) -> list[str]:
+def channels_of(balance: str, there: Collection[str]) -> Mapping[str, str]:
+    """Return the variables of a balance's maps, simplest first, and the channel of each.
+
+    Args:
+        balance: Balance id.
+        there: Channels that the runs have; they tell whether a joint of an arm slides.
+    """
+    kind, _, number = balance.partition(".")
+    if kind != "joint":
+        return CHANNELS
+    slides = {j for j in ARM_JOINTS if f"joint_{j}_position_m" in there}
+    places = {j: f"joint_{j}_" + ("position_m" if j in slides else "angle_rad") for j in ARM_JOINTS}
+    own = int(number)
+    metres = own in slides
+    speed = f"joint_{own}_velocity_" + ("m_s" if metres else "rad_s")
+    return {
+        "velocity_sign": speed,
+        "velocity": speed,
+        f"joint_{own}": places[own],
+        "acceleration": f"joint_{own}_acceleration_" + ("m_s2" if metres else "rad_s2"),
+        "time": "time_s",
+        **{f"joint_{j}": places[j] for j in ARM_JOINTS if j != own},
+        "history": places[own],
+    }
+
+
+def needed_channels(balance: str, measured: Sequence[str]) -> list[str]:
     """Return the channels of the variables that runs with these measured channels have."""
-    wanted = [LOAD, *(c for c in CHANNELS.values() if c != PROJECTED_LOAD)]
+    variables = channels_of(balance, measured)
+    wanted = [LOAD, *(c for c in variables.values() if c != PROJECTED_LOAD)]
     return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
 
 
 def bases(balance: Balance) -> list[Basis]:
     """Return the variables that the balance's residual may be mapped over, simplest first."""
     found = []
-    for variable, channel in CHANNELS.items():
+    variables = channels_of(balance.model.balance, balance.runs[0].channels)
+    for variable, channel in variables.items():
         if variable in BEHIND.get(balance.model.balance, ()):
             continue
         if balance.model.target in (channel, *measured_channels([channel])):

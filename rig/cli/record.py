@@ -91,5 +91,5 @@ def record(
     )
     if json:
         told = {"folder": folder, "runs": results, "look_at": bad}
-        emit_json(told if watch is None else {**told, "model": watch.to_json()})
+        emit_json(told if watch is None else {**told, "models": watch.to_json()})
     return 1 if bad else 0

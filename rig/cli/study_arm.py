@@ -1,5 +1,6 @@
-"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, external force."""
+"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, grasp."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -83,6 +84,36 @@ def delsol(
         return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
     show_result([note], tables(study), out, markdown)
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def zhang(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
+    state: Annotated[
+        Path | None, typer.Option(help="Folder of finished arms; a cache folder by default.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
+    from rig.reports import zhang as shown
+    from rig.studies.zhang import run_zhang
+
+    kept = state or Path.home() / ".cache" / "rig" / "zhang"
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))
+    drawn = shown.write_figures(figures, study) if figures is not None else []
+
+    def markdown() -> str:
+        names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
+        return shown.markdown(study, names)
+
+    show_result([shown.lead(study), *shown.notes(study)], shown.tables(study), out, markdown)
     if json:
         emit_json(study)
 

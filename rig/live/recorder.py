@@ -66,7 +66,7 @@ class LiveRecorder:
             zeros_before={f"{name}_counts": zero for name, zero in session.zeros.items()},
             details={"rig_version": __version__, "logger_serial": session.identity.serial},
         )
-        settings = json.dumps(session.config.model_dump(), indent=1).encode()
+        settings = json.dumps(session.config.logged(), indent=1).encode()
         lines = session.calibrations.to_json().encode()
         attached = [
             Attached("config.json", "application/json", settings),

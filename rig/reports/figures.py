@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -13,6 +14,7 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
 
 COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
@@ -246,3 +248,22 @@ def scattered(
         if len(series) <= len(COLOURS):
             _legend_above(ax)
     return _drawn(figure, caption)
+
+
+def write_svgs(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
+    """Write figures as files of their own, in a colour that reads on light and dark pages.
+
+    Args:
+        folder: Where to.
+        drawn: Name of the file to figure.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    paths = []
+    for name, figure in drawn.items():
+        path = folder / f"{name}.svg"
+        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
+        paths.append(path)
+    return paths

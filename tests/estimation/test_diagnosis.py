@@ -10,8 +10,8 @@ import pytest
 from estimation import model_file
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.maps import bases
-from estimation.diagnosis.search import Gates
 from estimation.diagnosis.split import SplitError, data_hash, split
 from estimation.errors import EstimationError
 from estimation.recording import Flag, Instrument, Stretch
