@@ -31,6 +31,9 @@ OWN = ("F", "f", "Ke", "Ia", "tau0")
 """How the names of parameters begin that belong to one joint and are declared in its balance."""
 
 
+CLOSED_DAMPING = 1e-5
+"""Of an arm with loops, all of whose parameters are fitted and not a base of them."""
+
 SAMPLES = 300
 """Random samples that tell how many changes of the links a joint feels."""
 
@@ -48,6 +51,8 @@ class ArmBalances:
         columns: Motion to the columns of the declared parameters, shape (n, joints, parameters).
         shared: Of each parameter, whether it is the links' and not a joint's own.
         sign_width: Speed over which each joint's Coulomb friction changes sign, shape (joints,).
+        damping: Of the shared fit, as a share of a column's squared length: small enough not to
+            bend what is told, large enough to leave small what is not.
         motors: Positions of a wrist's joints to those of its motors, or None; see `wrist`.
         wrist: First joint, from 0, that motors behind a coupling drive.
     """
@@ -58,6 +63,7 @@ class ArmBalances:
     columns: Columns
     shared: NDArray[np.bool_]
     sign_width: FloatArray
+    damping: float = 1e-9
     motors: FloatArray | None = None
     wrist: int = 0
 
@@ -113,8 +119,8 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
         columns,
         shared,
         SIGN_WIDTH * np.array([joint.speed for joint in arm.joints]),
-        np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
-        arm.wrist or 0,
+        motors=np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
+        wrist=arm.wrist or 0,
     )
 
 
@@ -141,6 +147,7 @@ def closed(chain: ClosedChain, recording: Recording, sign_rad_s: float) -> ArmBa
         columns,
         shared,
         np.full(len(names), sign_rad_s),
+        damping=CLOSED_DAMPING,
     )
 
 
