@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arm.base import base_of
-from estimation.arm.closed_chain import ClosedChain, closed_regressor, parameter_names
 from estimation.arm.motion import LOW_PASS, JointNames, Motion, joint_names
 from estimation.arm.regressor import SIGN_WIDTH, regressor
 from estimation.arm.regressor import names as serial_names
@@ -27,12 +26,9 @@ ARMS = (PSM,)
 CORRECTIONS = 3
 """Changes of the links' parameters that each joint's balance fits anew beside every candidate."""
 
-OWN = ("F", "f", "Ke", "Ia", "tau0")
+OWN = ("F", "Ke", "Ia", "tau0")
 """How the names of parameters begin that belong to one joint and are declared in its balance."""
 
-
-CLOSED_DAMPING = 1e-5
-"""Of an arm with loops, all of whose parameters are fitted and not a base of them."""
 
 SAMPLES = 300
 """Random samples that tell how many changes of the links a joint feels."""
@@ -51,8 +47,6 @@ class ArmBalances:
         columns: Motion to the columns of the declared parameters, shape (n, joints, parameters).
         shared: Of each parameter, whether it is the links' and not a joint's own.
         sign_width: Speed over which each joint's Coulomb friction changes sign, shape (joints,).
-        damping: Of the shared fit, as a share of a column's squared length: small enough not to
-            bend what is told, large enough to leave small what is not.
         motors: Positions of a wrist's joints to those of its motors, or None; see `wrist`.
         wrist: First joint, from 0, that motors behind a coupling drive.
     """
@@ -63,7 +57,6 @@ class ArmBalances:
     columns: Columns
     shared: NDArray[np.bool_]
     sign_width: FloatArray
-    damping: float = 1e-9
     motors: FloatArray | None = None
     wrist: int = 0
 
@@ -121,33 +114,6 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
         SIGN_WIDTH * np.array([joint.speed for joint in arm.joints]),
         motors=np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
         wrist=arm.wrist or 0,
-    )
-
-
-def closed(chain: ClosedChain, recording: Recording, sign_rad_s: float) -> ArmBalances:
-    """Return the balances of an arm with closed loops; its frictions are its actuated joints' own.
-
-    Args:
-        chain: The arm.
-        recording: Any of its recordings; tells the channels' names.
-        sign_rad_s: Speed over which Coulomb friction changes sign.
-    """
-    names = joint_names(recording)[: len(chain.reach)]
-    shared = np.array([not name.startswith(OWN) for name in parameter_names(chain)])
-
-    def columns(motion: Motion) -> FloatArray:
-        return closed_regressor(chain, motion, sign_rad_s)
-
-    source = f"{chain.name}; {chain.source}"
-    each = zip(names, _changes(columns, shared, len(names)), strict=True)
-    return ArmBalances(
-        chain.name,
-        tuple(_model(own, _of_every_joint(own, changes), source) for own, changes in each),
-        tuple(names),
-        columns,
-        shared,
-        np.full(len(names), sign_rad_s),
-        damping=CLOSED_DAMPING,
     )
 
 

@@ -18,6 +18,9 @@ from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 
+DAMPING = 1e-9
+"""Of the shared fit: small enough not to bend what is told, enough for what is not told at all."""
+
 EDGE_S = 0.5
 """Left out of the shared fit at either end of a run: the filter works on a reflection there."""
 
@@ -63,7 +66,7 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
             "They are what the runs that discover hold at the filter's rate.",
             "Record longer runs.",
         )
-    found = fit(table, aim, thesis_weights(aim), arm.damping)
+    found = fit(table, aim, thesis_weights(aim), DAMPING)
     values, vectors = np.linalg.eigh(found.covariance[np.ix_(arm.shared, arm.shared)])
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     corrections = np.zeros((len(arm.joints), table.shape[2], CORRECTIONS))
