@@ -37,6 +37,7 @@ site: $(VENV)/.developing
 
 bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
+	$(BIN)/python docs/figures/diagnosis_cost.py
 
 # resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster,
 # BLIND=--baselines for textbook methods beside it (minutes a case)

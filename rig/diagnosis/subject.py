@@ -60,13 +60,15 @@ def subject(
         return Subject(open_campaign(path, format_name), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
+    of_wrist = {m.balance for m in _shipped(WRIST)}
+    if balance is not None and not balance.startswith("joint.") and balance not in of_wrist:
+        models = declared_models(None, balance)
+        return Subject(open_campaign(path, format_name), models)
     campaign = open_campaign(path, format_name)
     first = next(iter(campaign.evidence), None)
     arm = None if first is None else balances_of(first)
     if arm is not None:
         return Subject(campaign, _of(arm.models, balance))
-    if balance is not None and balance not in {m.balance for m in _shipped(WRIST)}:
-        return Subject(campaign, declared_models(None, balance))
     angles = {m.target for m in _shipped(WRIST)}
     names = WRIST if first is not None and angles <= set(first.columns) else REFERENCE_RIG
     return Subject(campaign, _of(_shipped(names), balance))

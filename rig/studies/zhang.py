@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimation.arm.kinematics import pinocchio
 from estimation.files import write_text_atomic
 from estimation.networks.training import has_torch
 from estimation.recording import FloatArray
@@ -135,6 +136,7 @@ def run_zhang(
             "The paper's networks cannot be trained: torch is not installed.",
             fix="Install it: pip install 'rig[learn]'.",
         )
+    pinocchio()
     source = source_digest()
     places = {seed: state / f"{source}-{seed}.json" for seed in range(seeds)}
     outcomes: dict[int, Outcome] = {}
