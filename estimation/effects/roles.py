@@ -7,7 +7,7 @@ encoder makes a delay that is not there. A load is never the balance's own targe
 both sides of a balance looks like an effect.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -102,26 +102,44 @@ class Entry(NamedTuple):
     channels: Mapping[str, str]
 
 
-def _of_joint(joint: int) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles in the torque balance of one joint of an arm."""
+def _of_joint(joint: int) -> list[Mapping[str, tuple[str, ...]]]:
+    """Return the roles in the torque balance of one joint of an arm.
+
+    Once for a joint that turns, once for one that slides, and once for each motor of a cable-driven
+    wrist that the joint feels: an effect sits in one of these and takes all its motion from there.
+    """
     own = f"joint_{joint}"
     others = [f"joint_{other}" for other in JOINTS if other != joint]
-    return {
-        "speed": (f"{own}_velocity_rad_s",),
-        "acceleration": (f"{own}_acceleration_rad_s2",),
-        "position": (f"{own}_angle_rad",),
-        "travel": (f"{own}_angle_rad",),
-        "output_angle": (f"{own}_angle_rad",),
-        "encoder": (f"{own}_angle_rad",),
-        "stop": (f"{own}_angle_rad",),
-        "tilt": (f"{own}_angle_rad",),
-        "reading": (f"{own}_velocity_rad_s", f"{own}_acceleration_rad_s2"),
-        "other_reading": tuple(f"{other}_torque_n_m" for other in others),
-        "other_torque": tuple(f"{other}_torque_n_m" for other in others),
-        "other_angle": tuple(f"{other}_angle_rad" for other in others),
+    shared = {
+        "other_reading": _either(others, "torque_n_m", "force_n"),
+        "other_torque": _either(others, "torque_n_m", "force_n"),
+        "other_angle": _either(others, "angle_rad", "position_m"),
         "clock": ("time_s",),
         "elapsed": ("time_s", "campaign_time_s"),
         "campaign_clock": ("campaign_time_s",),
+    }
+    turning = ("angle_rad", "velocity_rad_s", "acceleration_rad_s2")
+    sliding = ("position_m", "velocity_m_s", "acceleration_m_s2")
+    drives = [(f"{own}_drive_{motor}", turning) for motor in JOINTS]
+    return [
+        {**_moving(*(f"{name}_{unit}" for unit in units)), **shared}
+        for name, units in [(own, turning), (own, sliding), *drives]
+    ]
+
+
+def _either(names: Sequence[str], *units: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{unit}" for name in names for unit in units)
+
+
+def _moving(position: str, velocity: str, acceleration: str) -> Mapping[str, tuple[str, ...]]:
+    """Return the roles that one motion plays."""
+    return {
+        "speed": (velocity,),
+        "acceleration": (acceleration,),
+        **dict.fromkeys(
+            ("position", "travel", "output_angle", "encoder", "stop", "tilt"), (position,)
+        ),
+        "reading": (velocity, acceleration),
     }
 
 
@@ -147,25 +165,23 @@ def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
     }
 
 
-def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles of a balance."""
+def _known(kind: str, number: str) -> list[Mapping[str, tuple[str, ...]]]:
+    """Return the roles of a balance, once for each motion that may be in it."""
     if kind == "joint":
         return _of_joint(int(number))
     if kind == "calibration":
         if number in PARTS:
-            return CHANNELS[PARTS[number]]
-        return _ENCODER if number == "encoder" else _SENSOR
+            return [CHANNELS[PARTS[number]]]
+        return [_ENCODER if number == "encoder" else _SENSOR]
     if kind not in AXES:
-        return CHANNELS[kind]
+        return [CHANNELS[kind]]
     own = _of_axis(kind)
     if kind not in CHANNELS:
-        return own
+        return [own]
     # the grasp of a single-axis rig, or the one of three axes of a wrist
     rig = CHANNELS[kind]
-    return {
-        role: tuple(dict.fromkeys((*rig.get(role, ()), *own.get(role, ()))))
-        for role in {**rig, **own}
-    }
+    both = {**rig, **own}
+    return [{role: tuple(dict.fromkeys((*rig.get(role, ()), *own.get(role, ())))) for role in both}]
 
 
 OF_SENSOR: Mapping[str, int] = {
@@ -233,6 +249,9 @@ def entries(effect: Effect, balance: str) -> list[Entry]:
     sign = _side(effect, kind, number)
     if sign is None:
         return []
-    known = _known(kind, number)
-    ways = product(*(known[role] for role in effect.roles))
-    return [Entry(sign, dict(zip(effect.roles, way, strict=True))) for way in ways]
+    ways = [
+        tuple(zip(effect.roles, way, strict=True))
+        for known in _known(kind, number)
+        for way in product(*(known[role] for role in effect.roles))
+    ]
+    return [Entry(sign, dict(way)) for way in dict.fromkeys(ways)]

@@ -12,10 +12,11 @@ after D. Nguyen and B. Widrow, IJCNN 1990.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.blas import dsyrk
 
 from estimation.networks.network import Network, NetworkError, to_unit
 from estimation.recording import FloatArray
@@ -23,8 +24,8 @@ from estimation.recording import FloatArray
 if TYPE_CHECKING:
     from torch import Tensor
 
-BLOCK = 8192
-"""Rows whose derivatives are held at once."""
+BLOCK = 1024
+"""Rows whose derivatives are held at once: few enough to stay in a core's cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,8 @@ def train(
     names: tuple[Sequence[str], Sequence[str]],
     settings: Settings | None = None,
     on_step: Callable[[int, float], None] = lambda step, rmse: None,
+    validation: tuple[FloatArray, FloatArray] | None = None,
+    start: Network | None = None,
 ) -> Training:
     """Train a network on all rows at once.
 
@@ -91,10 +94,14 @@ def train(
         names: Names of the inputs and of the outputs.
         settings: How to train; `Settings()` if None.
         on_step: Called with the step's number and the error after each accepted step.
+        validation: Further inputs and targets, which are not trained on: the weights of the step
+            with the least error on them are kept.
+        start: A network to train on, all its weights, as in transfer learning; it keeps its ranges
+            and its number of nodes.
 
     Raises:
-        NetworkError: torch is missing, a column is constant or not finite, or there are too few
-            rows.
+        NetworkError: torch is missing, a column is constant or not finite, there are too few
+            rows, or the network to start from has other inputs or outputs.
     """
     if not has_torch():
         raise NetworkError(
@@ -103,8 +110,21 @@ def train(
             "Install it: pip install 'rig[learn]'.",
         )
     settings = settings or Settings()
-    ranges = [_range(inputs, names[0]), _range(targets, names[1])]
+    if start is None:
+        ranges = [_range(inputs, names[0]), _range(targets, names[1])]
+    else:
+        if (start.inputs, start.outputs) != (tuple(names[0]), tuple(names[1])):
+            raise NetworkError(
+                "The network to start from has other inputs or outputs.",
+                f"It has {', '.join(start.inputs)} and {', '.join(start.outputs)}.",
+            )
+        ranges = [start.input_range, start.output_range]
+        settings = replace(settings, nodes=len(start.hidden))
     fit = _Fit(to_unit(inputs, ranges[0]), to_unit(targets, ranges[1]), settings)
+    if start is not None:
+        fit.start_from(start)
+    if validation is not None:
+        fit.hold_out(to_unit(validation[0], ranges[0]), to_unit(validation[1], ranges[1]))
     reason, converged = fit.run(on_step)
     hidden, output = fit.weights()
     return Training(
@@ -137,7 +157,7 @@ def normal_equations(
     x = torch.from_numpy(np.column_stack([unit, np.ones(len(unit))]))
     y = torch.from_numpy(to_unit(targets, network.output_range))
     hidden, output = (torch.from_numpy(np.array(w)) for w in (network.hidden, network.output))
-    curvature, slope = _normal([(x, y)], hidden, output)
+    curvature, slope = _normal(_blocks(x, y), hidden, output)
     return curvature.numpy(), slope.numpy()
 
 
@@ -154,6 +174,12 @@ def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
     return bounds
 
 
+def _blocks(x: "Tensor", y: "Tensor") -> Iterator[tuple["Tensor", "Tensor"]]:
+    """Cut rows into blocks of at most `BLOCK`."""
+    for first in range(0, len(x), BLOCK):
+        yield x[first : first + BLOCK], y[first : first + BLOCK]
+
+
 def _normal(
     blocks: Iterable[tuple["Tensor", "Tensor"]], hidden: "Tensor", output: "Tensor"
 ) -> tuple["Tensor", "Tensor"]:
@@ -161,22 +187,25 @@ def _normal(
 
     The derivative of output k by hidden weight (j, i) is V_kj a_j (1 - a_j) u_i, and by its output
     weights (a, 1). The part without V is the same for every output, so its products are summed
-    once, and scaled by V at the end.
+    once, and scaled by V at the end. They are symmetric, so one triangle is summed.
     """
     import torch
 
     count, outputs = hidden.numel(), len(output)
     nodes, wide = hidden.shape
     last = nodes + 1
-    products = torch.zeros(count + last, count + last, dtype=torch.float64)
+    upper = np.zeros((count + last, count + last), order="F")
     slopes = torch.zeros(count + last, outputs, dtype=torch.float64)
+    whole = torch.ones(BLOCK, count + last, dtype=torch.float64)  # the last column stays 1
     for x, y in blocks:
+        table = whole[: len(x)]
         node = torch.sigmoid(x @ hidden.T)
-        ones = torch.ones(len(x), 1, dtype=torch.float64)
-        by_hidden = (node * (1 - node))[:, :, None] * x[:, None, :]
-        table = torch.cat([by_hidden.reshape(len(x), -1), node, ones], dim=1)
-        products.addmm_(table.T, table)
+        table[:, count:-1] = node
+        by_hidden = table[:, :count].view(len(x), nodes, wide)
+        torch.mul((node * (1 - node))[:, :, None], x[:, None, :], out=by_hidden)
+        upper = dsyrk(1.0, table.numpy().T, beta=1.0, c=upper, overwrite_c=1)
         slopes.addmm_(table.T, table[:, count:] @ output.T - y)
+    products = torch.from_numpy(np.triu(upper) + np.triu(upper, 1).T)
     scale = output[:, :-1].repeat_interleave(wide, dim=1)  # V_kj for each hidden weight
     curvature = torch.zeros(count + outputs * last, count + outputs * last, dtype=torch.float64)
     curvature[:count, :count] = products[:count, :count] * (scale.T @ scale)
@@ -211,12 +240,32 @@ class _Fit:
         self.count = len(self._w)
         self.steps = 0
         self.gamma = float(self.count)
+        self._held_out: tuple[Tensor, Tensor] | None = None
+        self._best: tuple[float, Tensor] | None = None
+        self._begin()
+
+    def start_from(self, network: Network) -> None:
+        """Take a network's weights for the first ones."""
+        import torch
+
+        weights = np.concatenate([network.hidden.ravel(), network.output.ravel()])
+        self._w = torch.from_numpy(weights)
+        self._begin()
+
+    def hold_out(self, inputs: FloatArray, targets: FloatArray) -> None:
+        """Choose among the steps by mapped rows that are not trained on."""
+        import torch
+
+        rows = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
+        self._held_out = rows, torch.from_numpy(np.ascontiguousarray(targets))
+
+    def _begin(self) -> None:
         self.alpha = 0.0
         self._squares = self._error(self._w)
         self.beta = (self._y.numel() - self.count) / (2 * self._squares)
         if self.beta <= 0:
             raise NetworkError(
-                f"{len(inputs)} rows are too few for {self.count} weights.",
+                f"{len(self._x)} rows are too few for {self.count} weights.",
                 fix="Train on more rows, or with fewer nodes.",
             )
 
@@ -225,21 +274,23 @@ class _Fit:
         return float(np.sqrt(self._squares / self._y.numel()))
 
     def weights(self) -> tuple[FloatArray, FloatArray]:
-        hidden, output = self._parts(self._w)
+        hidden, output = self._parts(self._w if self._best is None else self._best[1])
         return hidden.numpy().copy(), output.numpy().copy()
 
     def run(self, on_step: Callable[[int, float], None]) -> tuple[str, bool]:
         """Train; return why it stopped and whether that is convergence."""
+        self._compare()
         damping = self.FIRST_DAMPING
         history = [self.rmse]
-        curvature, slope = _normal(self._blocks(), *self._parts(self._w))
+        curvature, slope = self._normal()
         while self.steps < self.settings.iterations:
             damping = self._step(curvature, slope, damping)
             if damping > self.MOST_DAMPING:
                 return "no step lowers the objective any more", True
             self.steps += 1
-            curvature, slope = _normal(self._blocks(), *self._parts(self._w))
+            curvature, slope = self._normal()
             self._update_evidence(curvature)
+            self._compare()
             history.append(self.rmse)
             on_step(self.steps, self.rmse)
             if self.steps >= self.settings.patience:
@@ -249,20 +300,28 @@ class _Fit:
                     return f"the error fell by less than {tolerance:g} in {patience} steps", True
         return f"stopped after {self.steps} steps", False
 
+    def _compare(self) -> None:
+        """Keep the weights if none before did better on the rows held out."""
+        if self._held_out is not None:
+            error = self._error(self._w, [self._held_out])
+            if self._best is None or error < self._best[0]:
+                self._best = error, self._w
+
     def _parts(self, w: "Tensor") -> tuple["Tensor", "Tensor"]:
         cut = self._shapes[0][0] * self._shapes[0][1]
         return w[:cut].reshape(self._shapes[0]), w[cut:].reshape(self._shapes[1])
 
-    def _blocks(self) -> Iterator[tuple["Tensor", "Tensor"]]:
-        for first in range(0, len(self._x), BLOCK):
-            yield self._x[first : first + BLOCK], self._y[first : first + BLOCK]
+    def _normal(self) -> tuple["Tensor", "Tensor"]:
+        return _normal(_blocks(self._x, self._y), *self._parts(self._w))
 
-    def _error(self, w: "Tensor") -> float:
+    def _error(
+        self, w: "Tensor", blocks: Iterable[tuple["Tensor", "Tensor"]] | None = None
+    ) -> float:
         import torch
 
         hidden, output = self._parts(w)
         total = 0.0
-        for x, y in self._blocks():
+        for x, y in _blocks(self._x, self._y) if blocks is None else blocks:
             estimate = torch.sigmoid(x @ hidden.T) @ output[:, :-1].T + output[:, -1]
             total += float(((estimate - y) ** 2).sum())
         return total

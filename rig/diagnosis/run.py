@@ -4,6 +4,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
+from estimation.arm.balances import balances_of
+from estimation.arm.shared import shared_fit, with_links
+from estimation.arm.twin import ArmTwin
 from estimation.campaign import Campaign
 from estimation.diagnosis.clock import steady
 from estimation.diagnosis.diagnose import diagnose
@@ -16,7 +19,7 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.twins import twins_of
+from rig.diagnosis.twins import Twins, twins_of
 
 Stage = Callable[[str], None]
 
@@ -75,8 +78,16 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
+    discover = [r for r in recordings if r.name in sealed.discover]
+    arm = balances_of(recordings[0])
     on_stage("building the simulated twin of the declared models")
-    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
+    if arm is None:
+        twins = twins_of(models, discover)
+    else:
+        fitted = shared_fit(arm, discover)
+        recordings = with_links(arm, recordings, fitted)
+        twin = ArmTwin.of(arm, [r for r in recordings if r.name in sealed.discover], fitted)
+        twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
     diagnosis, stories = diagnose(
         recordings,
         models,

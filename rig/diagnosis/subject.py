@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimation import model_file
+from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
 from estimation.model import Model
 from rig.calibrate.declared import Declared
@@ -40,8 +41,8 @@ def subject(
 ) -> Subject:
     """Return the recordings at a path and what is declared of them.
 
-    Without a model, raw logs of a calibration are declared by that calibration, and others by the
-    shipped models of the rig that their channels tell.
+    Without a model, raw logs of a calibration are declared by that calibration, an arm's by its
+    joints, and others by the shipped models of the rig that their channels tell.
 
     Args:
         path: File, folder or archive of recordings.
@@ -59,11 +60,15 @@ def subject(
         return Subject(open_campaign(path, format_name), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
-    if balance is not None and balance not in {m.balance for m in _shipped(WRIST)}:
+    of_wrist = {m.balance for m in _shipped(WRIST)}
+    if balance is not None and not balance.startswith("joint.") and balance not in of_wrist:
         models = declared_models(None, balance)
         return Subject(open_campaign(path, format_name), models)
     campaign = open_campaign(path, format_name)
     first = next(iter(campaign.evidence), None)
+    arm = None if first is None else balances_of(first)
+    if arm is not None:
+        return Subject(campaign, _of(arm.models, balance))
     angles = {m.target for m in _shipped(WRIST)}
     names = WRIST if first is not None and angles <= set(first.columns) else REFERENCE_RIG
     return Subject(campaign, _of(_shipped(names), balance))
@@ -86,7 +91,8 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
         UsageError: No model of that balance.
         ModelFileError: The file cannot be read.
     """
-    return _of(_shipped(REFERENCE_RIG) if path is None else [model_file.read(path)], balance)
+    models = _shipped(REFERENCE_RIG) if path is None else model_file.read_all(path)
+    return _of(models, balance)
 
 
 def _shipped(names: Sequence[str]) -> list[Model]:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -13,6 +14,7 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
 
 COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
@@ -123,11 +125,13 @@ class Panel:
         label: Name and unit of the variable.
         x: The variable, shape (n,).
         y: The values, shape (n,).
+        before: Values to compare with, shape (n,), or None.
     """
 
     label: str
     x: FloatArray
     y: FloatArray
+    before: FloatArray | None = None
 
 
 def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24) -> Markup:
@@ -142,12 +146,17 @@ def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24)
     figure, axes = _axes(7.2, 2.5, len(panels))
     with mpl.rc_context(_STYLE):
         for ax, panel in zip(axes, panels, strict=True):
-            x, mean, low, high = binned(panel.x, panel.y, bins)
-            ax.fill_between(x, low, high, color=COLOURS[0], alpha=0.25, linewidth=0)
-            ax.plot(x, mean, color=COLOURS[0], linewidth=1.4)
+            series = [("before", panel.before, COLOURS[1]), ("after", panel.y, COLOURS[0])]
+            for name, values, colour in series:
+                if values is not None:
+                    x, mean, low, high = binned(panel.x, values, bins)
+                    ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0)
+                    ax.plot(x, mean, color=colour, linewidth=1.4, label=name)
             ax.axhline(0, color=_INK, linewidth=0.6)
             ax.set_xlabel(panel.label)
         axes[0].set_ylabel(y_label)
+        if any(panel.before is not None for panel in panels):
+            _legend_above(axes[0])
         limits = [ax.get_ylim() for ax in axes]
         for ax in axes:
             ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
@@ -246,3 +255,22 @@ def scattered(
         if len(series) <= len(COLOURS):
             _legend_above(ax)
     return _drawn(figure, caption)
+
+
+def write_svgs(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
+    """Write figures as files of their own, in a colour that reads on light and dark pages.
+
+    Args:
+        folder: Where to.
+        drawn: Name of the file to figure.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    paths = []
+    for name, figure in drawn.items():
+        path = folder / f"{name}.svg"
+        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
+        paths.append(path)
+    return paths

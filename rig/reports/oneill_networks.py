@@ -35,11 +35,12 @@ WAYS = {
 def notes(study: NetworkStudy) -> list[str]:
     """Return what a reader must know about the networks."""
     settings = study.settings
-    every = "every closing sample" if study.every == 1 else f"one of {study.every} closing samples"
+    every = " and ".join(f"one of {n} ({pose})" for pose, n in study.every.items())
     told = [
-        f"Networks: trained on {every}, scored on all held-out ones. Converged means that the"
-        f" error fell by less than {settings.tolerance:.1%} in {settings.patience} steps; at most"
-        f" {settings.iterations} steps. Truth is the sensor filtered without lag.",
+        f"Networks: trained on {every} closing samples, scored on all held-out ones."
+        f" Converged means that the error fell by less than {settings.tolerance:.1%} in"
+        f" {settings.patience} steps; at most {settings.iterations} steps. Truth is the sensor"
+        " filtered without lag.",
         *study.notes,
     ]
     if study.grip_force is not None:

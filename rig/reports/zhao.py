@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
 from rig.grasper.current_force import CurrentForce
-from rig.reports.figures import bars, over_time
+from rig.reports.figures import bars, over_time, write_svgs
 from rig.reports.provenance import Provenance
 from rig.reports.table import TextTable, to_markdown
 from rig.simulation.grasper_inputs import hold, periodic
@@ -129,13 +128,7 @@ def write_figures(
         ours = next(answer for answer in haptics[0] if answer.method == "ours")
         heights = {f"place {s.name}": s.mean_n_rad for s in ours.places}
         drawn[f"{stem}-stiffness"] = bars(heights, "stiffness, N/rad", "Stiffness along the edge")
-    paths = []
-    for name, figure in drawn.items():
-        path = folder / f"{name}.svg"
-        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
-        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
-        paths.append(path)
-    return paths
+    return write_svgs(folder, drawn)
 
 
 def _count(study: Study) -> int:

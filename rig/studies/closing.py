@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -38,13 +39,19 @@ class ClosingTable:
         """Return some of the columns, shape (n, names)."""
         return self.values[:, [self.columns.index(name) for name in names]]
 
-    @property
-    def digest(self) -> str:
-        """Hash of the samples."""
-        content = hashlib.sha256(" ".join(self.columns).encode())
-        content.update(np.ascontiguousarray(self.values).tobytes())
-        content.update(self.run.tobytes())
+    def digest(self, names: Iterable[str]) -> str:
+        """Hash of some of the columns, and of which run each sample is of."""
+        content = hashlib.sha256(self.run.tobytes())
+        for name in names:
+            content.update(name.encode() + self._hashes[name])
         return content.hexdigest()[:16]
+
+    @cached_property
+    def _hashes(self) -> dict[str, bytes]:
+        return {
+            name: hashlib.sha256(np.ascontiguousarray(values).tobytes()).digest()
+            for name, values in zip(self.columns, self.values.T, strict=True)
+        }
 
     def save(self, path: Path) -> None:
         """Write the table beside `path`, the values so that they can be mapped into memory."""

@@ -114,7 +114,7 @@ class NetworkStudy:
         not_run: Jobs that were not, or not wholly, trained.
         samples: Closing samples by pose.
         peak_torque_n_m: Largest distal torque of the neutral pose.
-        every: Every n-th closing sample was trained on.
+        every: Every n-th closing sample of a pose was trained on, by pose.
         settings: Settings of the training.
         notes: What a reader must know.
         provenance: When and from what this was made.
@@ -125,7 +125,7 @@ class NetworkStudy:
     not_run: tuple[Job, ...]
     samples: dict[str, int]
     peak_torque_n_m: float
-    every: int
+    every: dict[str, int]
     settings: Settings
     notes: tuple[str, ...]
     provenance: Provenance
@@ -156,7 +156,7 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
         way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in ALONE]
         for way in ("+ travel", "causal", "+ acceleration")
     }
-    motor = [kind for kind in paper if kind[1:3] in MOTOR]
+    motor = _motor(paper)
     rest = [kind for kind in paper if kind not in motor]
     posed_states = [(p, "+ travel", "command", (t,)) for p in ("pitch", "roll") for t in both]
     order: list[tuple[str, Sequence[Kind]]] = [
@@ -167,17 +167,24 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
         ("run-wise", [*ways["causal"], *ways["+ acceleration"]]),
         ("lofo", motor),
         ("lopo", motor),
-        ("run-wise", [*posed_states, *rest]),
         ("random", posed),
-        ("run-wise", posed),
-        *((p, [*rest, *ways["causal"], *ways["+ acceleration"]]) for p in ("lofo", "lopo")),
+        ("run-wise", _motor(posed)),
+        ("run-wise", [*rest, *posed, *posed_states]),
+        *((p, rest) for p in ("lofo", "lopo")),
+        ("lopo", posed),
+        *((p, ways["causal"]) for p in ("lofo", "lopo")),
     ]
-    return [
+    planned = [
         Job(pose, way, surrogate, protocol, targets)
         for protocol, kinds in order
         for pose, way, surrogate, targets in kinds
         if pose in poses
     ]
+    return list(dict.fromkeys(planned))
+
+
+def _motor(kinds: Sequence[Kind]) -> list[Kind]:
+    return [kind for kind in kinds if kind[1:3] in MOTOR]
 
 
 def _of(surrogate: str, kinds: Sequence[Kind]) -> list[Kind]:
@@ -210,10 +217,17 @@ class Trainer:
     ) -> None:
         self.tables, self.state, self.settings = tables, state, settings
         self.every, self.seed = every, seed
-        self.digests = {pose: table.digest for pose, table in tables.items()}
+        self._places = {
+            pose: state / f"{pose}-{table.digest(table.columns)}" for pose, table in tables.items()
+        }
         self._masks: dict[tuple[str, str], list[np.ndarray]] = {}
         for pose, table in tables.items():
-            table.save(self._table(pose))
+            table.save(self._places[pose])
+
+    def step(self, pose: str) -> int:
+        """Return which n-th samples of a pose are trained on: about as many for every pose."""
+        share = len(self.tables[pose].run) / len(self.tables["neutral"].run)
+        return max(1, round(self.every * share))
 
     def masks(self, job: Job) -> list[np.ndarray]:
         """Return which samples each split of the job tests on."""
@@ -231,19 +245,20 @@ class Trainer:
                     yield Task(
                         part,
                         fold,
-                        str(self._table(part.pose)),
+                        str(self._places[part.pose]),
                         self.tables[part.pose].columns,
                         str(path),
-                        np.flatnonzero(~mask)[:: self.every],
+                        np.flatnonzero(~mask)[:: self.step(part.pose)],
                         replace(self.settings, nodes=part.nodes, seed=self.seed),
                     )
 
     def path(self, job: Job, fold: int) -> Path:
         """Return where a network is kept: the name changes with all that made it."""
+        data = self.tables[job.pose].digest((*job.inputs, *job.targets))
         settings = replace(self.settings, nodes=job.nodes, seed=self.seed)
         made_of = (
-            SCHEMA, self.digests[job.pose], job.inputs, job.targets, job.protocol, fold,
-            self.every, FOLDS, sorted(asdict(settings).items()),
+            SCHEMA, data, job.inputs, job.targets, job.protocol, fold,
+            self.step(job.pose), FOLDS, sorted(asdict(settings).items()),
         )  # fmt: skip
         return self.state / f"{hashlib.sha256(repr(made_of).encode()).hexdigest()[:24]}.npz"
 
@@ -273,9 +288,6 @@ class Trainer:
             )
             for k, target in enumerate(job.targets)
         ]  # fmt: skip
-
-    def _table(self, pose: str) -> Path:
-        return self.state / f"{pose}-{self.digests[pose]}"
 
 
 def train_task(task: Task) -> None:
@@ -315,7 +327,7 @@ def run_networks(
         tables: Closing samples by pose.
         state: Folder of the trained networks.
         settings: Settings of the training; nodes and seed are the study's.
-        every: Train on every n-th closing sample.
+        every: Train on every n-th closing sample of the neutral pose, and on as many of others.
         seed: Seed of splits and of first weights.
         workers: Processes; each trains on one core.
         minutes: No network is started after so long.
@@ -350,7 +362,7 @@ def run_networks(
         not_run=tuple(not_run),
         samples={pose: len(table.run) for pose, table in tables.items()},
         peak_torque_n_m=float(np.max(_column(neutral, DISTAL))),
-        every=every,
+        every={pose: trainer.step(pose) for pose in tables},
         settings=settings,
         notes=notes,
         provenance=Provenance.now(seed),
