@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from benchmarks.ratio import Ratio, best_of
 from drivers.framing import decode_frames, encode_frames
-from drivers.teensy.protocol import SAMPLE_DTYPE
+from drivers.teensy.reference import SAMPLE_DTYPE
 
 FRAMES = 60_000
 """One minute at 1 kHz."""

@@ -1,16 +1,17 @@
 """Channels that are computed: speeds, accelerations, the twist of the gearbox.
 
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
-and second derivative of `X_angle_rad`, `X_rate_n_m_s` is the first of `X_n_m`; `X_travel_rad` is
-how far that angle has come since its lowest value of the last `TRAVEL_WINDOW_S`, the state of
-hysteresis after a reversal, and `X_turned_s` how long ago that value was; `X_rise_a` is what the
-channel `X_a` (any unit) has gained since the motor's angle was lowest, and `X_fall_a` how far it is
-below its highest value of that window; `X_20ms_ago_a` is its value that long ago;
-`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
-`motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is the time
-since the campaign's first run began, put beside the measured channels by `Campaign.timed`, and live
-the time since the first sample. Offline they come from a zero-phase filter and a noise-robust
-derivative, live from a causal filter and backward differences: the same names, two sources.
+and second derivative of `X_angle_rad`, and so in metres of `X_position_m`; `X_rate_n_m_s` is the
+first of `X_n_m`; `X_travel_rad` is how far that angle has come since its lowest value of the last
+`TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` how long ago that
+value was; `X_rise_a` is what the channel `X_a` (any unit) has gained since the motor's angle was
+lowest, and `X_fall_a` how far it is below its highest value of that window; `X_20ms_ago_a` is its
+value that long ago; `gearbox_differential_rad` is the motor's angle behind the gear ratio less the
+spindle's; `motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is
+the time since the campaign's first run began, put beside the measured channels by `Campaign.timed`,
+and live the time since the first sample. Offline they come from a zero-phase filter and a
+noise-robust derivative, live from a causal filter and backward differences: the same names, two
+sources.
 """
 
 import re
@@ -50,6 +51,9 @@ set MRDLab/mis-tool-characterization; the width is of the filter's smear at a re
 
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
+
+SLIDES = {"_velocity_m_s": 1, "_acceleration_m_s2": 2}
+"""Derivatives of a sliding joint's `_position_m`, and how many times."""
 
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
 TURNED, FALL, RISE = "_turned_s", "_fall_", "_rise_"
@@ -121,6 +125,9 @@ def _differentiated(name: str) -> tuple[str, int]:
     for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
         if name.endswith(suffix):
             return name.removesuffix(suffix) + "_angle_rad", times
+    for suffix, times in SLIDES.items():
+        if name.endswith(suffix):
+            return name.removesuffix(suffix) + "_position_m", times
     if name.endswith(RATE):
         return name.removesuffix(RATE) + "_n_m", 1
     return name, 0

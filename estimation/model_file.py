@@ -10,12 +10,15 @@ id = "friction.coulomb"
 sign = -1
 channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
+
+A file of several balances holds each under `[[models]]`, with `[models.processing]`,
+`[[models.effects]]` and `[models.fit]`, and has the schema `rig.models/1`.
 """
 
 import json
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -25,13 +28,11 @@ from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term, nearest
+from estimation.model_table import ModelFileError, Table
 from estimation.rest import Samples
 
 SCHEMA = "rig.model/1"
-
-
-class ModelFileError(ModelError):
-    """A model file cannot be read; says which file and which key."""
+SEVERAL = "rig.models/1"
 
 
 def shipped() -> dict[str, Path]:
@@ -41,7 +42,16 @@ def shipped() -> dict[str, Path]:
 
 
 def read(path: Path) -> Model:
-    """Read a model file.
+    """Read a model file; of several balances the first one.
+
+    Raises:
+        ModelFileError: As for `read_all`.
+    """
+    return read_all(path)[0]
+
+
+def read_all(path: Path) -> list[Model]:
+    """Read every model of a model file.
 
     Args:
         path: The file, or the name of a model from `shipped`.
@@ -57,48 +67,68 @@ def read(path: Path) -> Model:
         raise ModelFileError(
             f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(known)}."
         ) from error
-    return parse(text, str(place))
+    return parse_all(text, str(place))
 
 
 def parse(text: str, where: str = "model") -> Model:
-    """Read a model from TOML text.
+    """Read a model from TOML text; of several balances the first one.
+
+    Raises:
+        ModelFileError: As for `parse_all`.
+    """
+    return parse_all(text, where)[0]
+
+
+def parse_all(text: str, where: str = "model") -> list[Model]:
+    """Read every model from TOML text.
 
     Args:
         text: TOML.
         where: Name of the file for messages.
 
     Raises:
-        ModelFileError: As for `read`.
+        ModelFileError: The text is not TOML, or a key is unknown, missing or wrong.
     """
     try:
-        top = _Table(tomllib.loads(text), where)
-        if top.take("schema", str) != SCHEMA:
-            raise ModelFileError(f"{where} is not a model of schema {SCHEMA}.")
-        processing = top.table("processing")
-        evidence = top.table("fit")
-        target = top.take("target", str)
-        model = Model(
-            name=top.take("name", str),
-            balance=top.take("balance", str),
-            target=target,
-            description=top.take("description", str, ""),
-            terms=tuple(_term(entry, target) for entry in top.tables("effects")),
-            low_pass=LowPass(
-                processing.number("cutoff_hz", LowPass().cutoff_hz),
-                processing.take("order", int, LowPass().order),
-            ),
-            run_offsets=processing.take("run_offsets", bool, True),
-            counted=_counted(processing),
-            evidence=_evidence(evidence) if evidence.content else None,
-        )
-        for table in (top, processing, evidence):
-            table.finish()
+        top = Table(tomllib.loads(text), where)
+        schema = top.take("schema", str)
+        if schema == SCHEMA:
+            return [_model(top)]
+        if schema != SEVERAL:
+            raise ModelFileError(f"{where} is not a model of schema {SCHEMA} or {SEVERAL}.")
+        models = [_model(entry) for entry in top.tables("models")]
+        top.finish()
+        if not models:
+            raise ModelFileError(f"{where} holds no model.")
     except tomllib.TOMLDecodeError as error:
         raise ModelFileError(f"{where} is not TOML.", str(error)) from error
     except ModelFileError:
         raise
     except EstimationError as error:
         raise ModelFileError(f"{where}: {error.what}", error.why, error.fix) from error
+    return models
+
+
+def _model(top: Table) -> Model:
+    processing = top.table("processing")
+    evidence = top.table("fit")
+    target = top.take("target", str)
+    model = Model(
+        name=top.take("name", str),
+        balance=top.take("balance", str),
+        target=target,
+        description=top.take("description", str, ""),
+        terms=tuple(_term(entry, target) for entry in top.tables("effects")),
+        low_pass=LowPass(
+            processing.number("cutoff_hz", LowPass().cutoff_hz),
+            processing.take("order", int, LowPass().order),
+        ),
+        run_offsets=processing.take("run_offsets", bool, True),
+        counted=_counted(processing),
+        evidence=_evidence(evidence) if evidence.content else None,
+    )
+    for table in (top, processing, evidence):
+        table.finish()
     return model
 
 
@@ -111,16 +141,33 @@ def write(model: Model, path: Path) -> None:
     write_text_atomic(path, to_toml(model))
 
 
-def to_toml(model: Model) -> str:
-    """Return a model as TOML text; `parse` gives the same model back."""
+def write_all(models: Sequence[Model], path: Path) -> None:
+    """Write one or more models to a file; an existing one is replaced in one step.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    write_text_atomic(path, to_toml(*models))
+
+
+def to_toml(*models: Model) -> str:
+    """Return one or more models as TOML text; `parse_all` gives the same models back."""
+    if len(models) == 1:
+        return "\n".join([f"schema = {_value(SCHEMA)}", *_lines(models[0])]) + "\n"
+    lines = [f"schema = {_value(SEVERAL)}"]
+    for model in models:
+        lines += ["", "[[models]]", *_lines(model, "models.")]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(model: Model, within: str = "") -> list[str]:
     lines = [
-        f"schema = {_value(SCHEMA)}",
         f"name = {_value(model.name)}",
         f"balance = {_value(model.balance)}",
         f"target = {_value(model.target)}",
         f"description = {_value(model.description)}",
         "",
-        "[processing]",
+        f"[{within}processing]",
         f"cutoff_hz = {_value(model.low_pass.cutoff_hz)}",
         f"order = {_value(model.low_pass.order)}",
         f"run_offsets = {_value(model.run_offsets)}",
@@ -128,7 +175,12 @@ def to_toml(model: Model) -> str:
     if model.counted is not None:
         lines.append(f"samples = {_value(model.counted)}")
     for term in model.terms:
-        lines += ["", "[[effects]]", f"id = {_value(term.effect.id)}", f"sign = {term.sign}"]
+        lines += [
+            "",
+            f"[[{within}effects]]",
+            f"id = {_value(term.effect.id)}",
+            f"sign = {term.sign}",
+        ]
         lines += [f"channels.{role} = {_value(name)}" for role, name in term.channels.items()]
         for parameter in term.parameters:
             if (known := term.values.get(parameter.name)) is not None:
@@ -138,14 +190,14 @@ def to_toml(model: Model) -> str:
                 entries |= {"ci95": list(known.ci95)} if known.ci95 is not None else {}
                 lines.append(f"parameters.{parameter.name} = {_value(entries)}")
     if model.evidence is not None:
-        lines += ["", "[fit]"]
+        lines += ["", f"[{within}fit]"]
         lines += [
             f"{key} = {_value(getattr(model.evidence, key))}"
             for key in ("runs", "samples", "rmse", "rmse_with_means", "seed")
         ]
         if model.evidence.run_spread is not None:
             lines.append(f"run_spread = {_value(model.evidence.run_spread)}")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _value(value: Any) -> str:
@@ -163,53 +215,7 @@ def _value(value: Any) -> str:
     return repr(value)
 
 
-class _Table:
-    """A TOML table that knows which of its keys were read."""
-
-    def __init__(self, content: Mapping[str, Any], where: str) -> None:
-        self.content = content
-        self.where = where
-        self._read: list[str] = []
-
-    def take(self, key: str, kind: type, default: Any = None) -> Any:
-        self._read.append(key)
-        if key not in self.content and default is not None:
-            return default
-        if key not in self.content:
-            near = nearest(key, list(self.content)) if self.content else ""
-            raise ModelFileError(f"{self.where} lacks the key {key!r}.", near)
-        value = self.content[key]
-        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            raise ModelFileError(f"{self.where}: {key} = {value!r} is not {kind.__name__}.")
-        return value
-
-    def number(self, key: str, default: float | None = None) -> float:
-        if isinstance(self.content.get(key), int):
-            return float(self.take(key, int))
-        value: float = self.take(key, float, default)
-        if not math.isfinite(value):
-            raise ModelFileError(f"{self.where}: {key} = {value} is not a finite number.")
-        return value
-
-    def table(self, key: str) -> "_Table":
-        return _Table(self.take(key, dict, {}), f"{self.where}, {key}")
-
-    def tables(self, key: str) -> Iterable["_Table"]:
-        for index, entry in enumerate(self.take(key, list), start=1):
-            if not isinstance(entry, dict):
-                raise ModelFileError(f"{self.where}: {key} holds {entry!r}, not a table.")
-            yield _Table(entry, f"{self.where}, {key} {index}")
-
-    def finish(self) -> None:
-        """Raise for the first key that nothing has read."""
-        for key in self.content:
-            if key not in self._read:
-                raise ModelFileError(
-                    f"{self.where} has an unknown key {key!r}.", fix=nearest(key, self._read)
-                )
-
-
-def _term(entry: _Table, target: str) -> Term:
+def _term(entry: Table, target: str) -> Term:
     kind = effect(entry.take("id", str))
     sign = entry.take("sign", int, 1)
     channels = entry.table("channels")
@@ -244,14 +250,14 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
             )
 
 
-def _pair(table: _Table) -> tuple[float, float]:
+def _pair(table: Table) -> tuple[float, float]:
     values = table.take("ci95", list)
     if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
         raise ModelFileError(f"{table.where}: ci95 = {values!r} is not two numbers.")
     return float(values[0]), float(values[1])
 
 
-def _counted(processing: _Table) -> Samples | None:
+def _counted(processing: Table) -> Samples | None:
     """Return which samples count, or None where the file leaves that to the effects."""
     if "samples" not in processing.content:
         return None
@@ -265,7 +271,7 @@ def _counted(processing: _Table) -> Samples | None:
     )
 
 
-def _evidence(table: _Table) -> Evidence:
+def _evidence(table: Table) -> Evidence:
     return Evidence(
         runs=tuple(str(name) for name in table.take("runs", list)),
         samples=table.take("samples", int),

@@ -6,7 +6,7 @@ read-only arrays, and every change makes a new recording that shares the columns
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntFlag
 from types import MappingProxyType
 
@@ -159,6 +159,11 @@ class Recording:
             ("calibrations", MappingProxyType(dict(self.calibrations))),
         ):
             object.__setattr__(self, attribute, value)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to other processes: a view of a mapping does not."""
+        values = [getattr(self, each.name) for each in fields(self)]
+        return Recording, tuple(dict(v) if isinstance(v, Mapping) else v for v in values)
 
     def __len__(self) -> int:
         return int(self.time_s.size)

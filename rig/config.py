@@ -1,11 +1,20 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
 import tomllib
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
@@ -22,6 +31,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Torque = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Current = Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
 Angle = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Force = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 
@@ -41,10 +51,12 @@ class LoggerSection(_Section):
         options: The driver's own options.
         bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
             with from the factory if none.
+        profile: What the board samples and moves: the reference rig, or the 3-DOF grasper.
     """
 
     driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
     url: str
+    profile: Literal["reference", "grasper"] = "reference"
     options: dict[str, Any] = Field(default_factory=dict)
     bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
 
@@ -81,13 +93,46 @@ class ControllerSection(_Section):
 
 
 class LimitsSection(_Section):
-    """Limits checked at every sample, on the absolute value; a crossing ends in the safe state."""
+    """Limits checked at every sample, on the absolute value; a crossing ends in the safe state.
+
+    Every key is the name of a channel; which there are depends on `[logger] profile`.
+    """
+
+
+class ReferenceLimits(LimitsSection):
+    """Limits of the reference rig."""
 
     proximal_torque_n_m: Torque
     distal_torque_n_m: Torque
     motor_current_a: Current
     load_command_a: float = Field(ge=0, le=60)
     spindle_angle_rad: Angle
+
+
+class GrasperLimits(LimitsSection):
+    """Limits of the 3-DOF grasper, for each of its motors: the yaw's, and those of both jaws."""
+
+    yaw_current_a: Current
+    jaw_1_current_a: Current
+    jaw_2_current_a: Current
+    yaw_force_n: Force
+    jaw_1_force_n: Force
+    jaw_2_force_n: Force
+    yaw_angle_rad: Angle
+    jaw_1_angle_rad: Angle
+    jaw_2_angle_rad: Angle
+
+
+def _kind_of_limits(value: Any) -> str:
+    """Say whose limits these are meant to be, by the motors they name."""
+    names = value if isinstance(value, dict) else type(value).model_fields
+    return "grasper" if any(name.startswith(("yaw_", "jaw_")) for name in names) else "reference"
+
+
+AnyLimits = Annotated[
+    Annotated[ReferenceLimits, Tag("reference")] | Annotated[GrasperLimits, Tag("grasper")],
+    Discriminator(_kind_of_limits),
+]
 
 
 class SafetySection(_Section):
@@ -128,11 +173,17 @@ class SafetySection(_Section):
 
 
 class DriftSection(_Section):
-    """Largest change of a sensor's zero over a run that passes; without a limit none is judged."""
+    """Largest change of a sensor's zero over a run that passes; without a limit none is judged.
+
+    The first three are sensors of the reference rig, the others of the grasper.
+    """
 
     proximal_torque_n_m: Torque | None = None
     distal_torque_n_m: Torque | None = None
     motor_current_a: Current | None = None
+    yaw_force_n: Force | None = None
+    jaw_1_force_n: Force | None = None
+    jaw_2_force_n: Force | None = None
 
 
 class InstrumentSection(_Section):
@@ -159,6 +210,7 @@ class SimulationSection(_Section):
         draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
         firmware: Put the compiled firmware core in the loop where it is built.
         plant: `measured`, with losses that no declared model holds, or `declared`, without them.
+        grasper: Prototype of the simulated grasper, where the profile is the grasper's.
     """
 
     seed: int = 0
@@ -167,6 +219,7 @@ class SimulationSection(_Section):
     draw_hidden: int | None = None
     firmware: bool = True
     plant: Literal["measured", "declared"] = "measured"
+    grasper: Literal["third", "journal", "ball"] = "third"
 
 
 class Config(_Section):
@@ -183,7 +236,7 @@ class Config(_Section):
     name: str
     logger: LoggerSection
     controller: ControllerSection
-    limits: LimitsSection
+    limits: AnyLimits
     safety: SafetySection = SafetySection()
     drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
@@ -194,6 +247,31 @@ class Config(_Section):
     devices: dict[Name, DeviceSection] = Field(default_factory=dict)
     lever_arm_m: Length = 0.012
     model: str | None = None
+
+    @model_validator(mode="after")
+    def _limits_are_the_profiles(self) -> "Config":
+        wanted = GrasperLimits if self.logger.profile == "grasper" else ReferenceLimits
+        if not isinstance(self.limits, wanted):
+            raise ValueError(
+                f"[limits] are not those of [logger] profile = {self.logger.profile!r}, which has "
+                + ", ".join(wanted.model_fields)
+            )
+        return self
+
+    @property
+    def reference_limits(self) -> ReferenceLimits:
+        """The limits, of what moves a reference rig.
+
+        Raises:
+            UsageError: The configuration is of another kind of rig.
+        """
+        if not isinstance(self.limits, ReferenceLimits):
+            raise UsageError(
+                f"{self.name} is a {self.logger.profile}.",
+                "This moves a spindle against a load motor.",
+                'Name a configuration with [logger] profile = "reference".',
+            )
+        return self.limits
 
     @property
     def is_simulated(self) -> bool:
@@ -250,6 +328,13 @@ class Config(_Section):
             whole[name] = {**whole[name], **change} if isinstance(change, dict) else change
         return Config.model_validate(whole)
 
+    def logged(self) -> dict[str, Any]:
+        """Return what a log holds of it: all but what is hidden, which a diagnosis is to find."""
+        whole = self.model_dump()
+        for secret in ("hidden", "draw_hidden"):
+            del whole["simulation"][secret]
+        return whole
+
 
 def is_simulated(url: str) -> bool:
     """Say whether a URL names a fake."""
@@ -293,9 +378,17 @@ def _found(path: Path) -> Path:
 
 
 def _keys(model: type[BaseModel]) -> set[str]:
-    keys = set(model.model_fields)
-    for info in model.model_fields.values():
-        for kind in (info.annotation, *get_args(info.annotation)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                keys |= _keys(kind)
-    return keys
+    return set(model.model_fields) | {
+        key
+        for info in model.model_fields.values()
+        for section in _sections(info.annotation)
+        for key in _keys(section)
+    }
+
+
+def _sections(kind: Any) -> Iterator[type[BaseModel]]:
+    """Yield the sections a key's type is made of."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield kind
+    for part in get_args(kind):
+        yield from _sections(part)

@@ -36,6 +36,9 @@ def problems(config: Config) -> list[Problem]:
     found = [
         p for name, section in sections.items() for p in _driver_problems(name, section, known)
     ]
+    if config.logger.profile == "grasper" and config.logger.driver != "teensy":
+        what = f"The driver {config.logger.driver} cannot carry three motors at 2 kHz."
+        found.append(Problem(LOGGER, what, 'Write driver = "teensy", and a board on USB.'))
     if LOGGER in config.devices:
         found.append(Problem(f"devices.{LOGGER}", "The name is the logger's.", "Choose another."))
     sound = {n: s for n, s in sections.items() if not any(p.key == _key(n) for p in found)}

@@ -112,7 +112,9 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     looked = write_report(folder / "first_look.html", look)
     # simulated runs are no evidence of anybody's rig: they stay out of the user's own ledger
     ledger = folder / "looks.jsonl"
-    done = run_diagnosis(logs, [declared], Ledger(ledger), seed=seed, quick=True, on_stage=on_stage)
+    done = run_diagnosis(
+        open_campaign(logs), [declared], Ledger(ledger), seed=seed, quick=True, on_stage=on_stage
+    )
     (story,) = done.stories.values()
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write(story.model, model_path)

@@ -5,12 +5,13 @@ from functools import partial
 
 from drivers.device import Device
 from drivers.registry import fakes, open_device
-from drivers.teensy.channels import RAW
+from drivers.teensy.channels import raw_channels
 from drivers.teensy.device import TeensyDevice
 from drivers.transport.faulty import Faults
 from rig.config import Config, DeviceSection, is_simulated
 from rig.config_check import LOGGER
 from rig.logger import open_logger
+from rig.machines.choose import machine_of
 
 SIMULATED_STEP_S = 0.02
 """A simulated device delivers as often as a real one may; its silences are counted."""
@@ -32,7 +33,11 @@ def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
     counts = {line.counts for line in config.calibration_set().channels.values()}
     if config.logger.driver == "epos4":
         counts -= {"current"}  # a drive that is switched off tells no current at all
-    wired = [channel for channel in RAW if channel.field in counts]
-    yield LOGGER, lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired)
+    profile = machine_of(config).profile
+    wired = [channel for channel in raw_channels(profile) if channel.field in counts]
+    yield (
+        LOGGER,
+        lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired, profile),
+    )
     for name, section in config.devices.items():
         yield name, partial(open_section, section)

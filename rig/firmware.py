@@ -12,9 +12,10 @@ from drivers.teensy.driver import TeensyLogger
 from rig.config import Config
 from rig.errors import RigError, UsageError
 from rig.logger import open_logger
+from rig.machines.choose import machine_of
 
 SOURCES = Path(__file__).parents[1] / "firmware"
-BOARDS = ("teensy35", "teensy41")
+BOARDS = ("teensy35", "teensy41", "teensy41-grasper")
 
 
 class FirmwareToolError(RigError):
@@ -76,13 +77,13 @@ _TABLE = [
 
 def compare(config: Config) -> Versions:
     """Ask the board which firmware it has and hold it against program and sources."""
-    program = (
-        f"{protocol.version_text(protocol.FIRMWARE_VERSION)}, protocol {protocol.PROTOCOL_HASH:08x}"
-    )
+    profile = machine_of(config).profile
+    version = protocol.version_text(protocol.FIRMWARE_VERSION)
+    program = f"{version}, {profile.name} protocol {profile.protocol_hash:08x}"
     sources = source_hash()
     told = "no source tree here" if sources is None else f"build {sources:08x}"
     try:
-        with TeensyLogger(open_logger(config)) as logger:
+        with TeensyLogger(open_logger(config), profile) as logger:
             board = logger.identify()
     except ProtocolMismatchError as error:
         return Versions(program, told, f"{error.what} {error.why}", False, (f"fix: {error.fix}",))
@@ -138,7 +139,7 @@ def flash(board: str) -> None:
 
 def _platformio(board: str, more: list[str]) -> None:
     if board not in BOARDS:
-        raise UsageError(f"There is no board {board!r}.", fix=f"Choose {' or '.join(BOARDS)}.")
+        raise UsageError(f"There is no board {board!r}.", fix=f"Choose {', '.join(BOARDS)}.")
     _require_sources()
     if not (SOURCES / "platformio.ini").is_file():
         raise UsageError("This source tree has no platformio.ini.", fix="Update the checkout.")

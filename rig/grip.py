@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.protocol import MAX_SETPOINTS
+from drivers.teensy.reference import REFERENCE
 from estimation.rest import CLOSING_RAD_S
 from rig import trajectory
 from rig.errors import SafetyTripError, UsageError
@@ -68,7 +68,7 @@ class Grip:
 
     def setpoints(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Yield pieces of spindle angle and load until the time is over and the load is off."""
-        step = MAX_SETPOINTS / trajectory.SAMPLE_RATE_HZ
+        step = REFERENCE.max_setpoints / trajectory.SAMPLE_RATE_HZ
         for k in range(round(self._duration_s / step)):
             yield self._angles(k), self._loads(self._asked_a)
         last = round(self._duration_s / step)
@@ -83,14 +83,14 @@ class Grip:
         return self._asked_a
 
     def _angles(self, piece: int) -> NDArray[np.float64]:
-        number = piece * MAX_SETPOINTS + np.arange(MAX_SETPOINTS)
+        number = piece * REFERENCE.max_setpoints + np.arange(REFERENCE.max_setpoints)
         phase = 2 * np.pi * FREQUENCY_HZ * number / trajectory.SAMPLE_RATE_HZ
         return np.asarray(self._centre_rad + AMPLITUDE_RAD * (1.0 - np.cos(phase)))
 
     def _loads(self, asked_a: float) -> NDArray[np.float64]:
-        most = SLEW_A_S * MAX_SETPOINTS / trajectory.SAMPLE_RATE_HZ
+        most = SLEW_A_S * REFERENCE.max_setpoints / trajectory.SAMPLE_RATE_HZ
         end = self._load_a + float(np.clip(asked_a - self._load_a, -most, most))
-        loads = np.linspace(self._load_a, end, MAX_SETPOINTS)
+        loads = np.linspace(self._load_a, end, REFERENCE.max_setpoints)
         self._load_a = end
         return loads
 
@@ -110,7 +110,7 @@ def hold_grip(
         UsageError: The torque is not within the limits, or not what is estimated.
         SafetyTripError: A limit was crossed, by a sensor or by the estimate; the rig is disarmed.
     """
-    limits = session.config.limits
+    limits = session.config.reference_limits
     most = SHARE * limits.distal_torque_n_m
     if not 0 < torque_n_m <= most:
         raise UsageError(

@@ -32,6 +32,11 @@ class Motion:
     first: int
     last: int
 
+    @property
+    def setpoints(self) -> tuple[NDArray[np.float64], ...]:
+        """Spindle and load motor."""
+        return self.target_angle_rad, self.load_command_a
+
 
 def motion_of(plan: RunPlan, here_rad: float) -> Motion:
     """Return the motion that makes a run, beginning where the spindle stands.

@@ -9,16 +9,17 @@ import itertools
 import json
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from rig import trajectory
 from rig.errors import UsageError
+from rig.grasper_protocol import JointHoldRuns, JointPlan, JointSineRuns
 from rig.validation import explain
 
 SHIPPED = Path(__file__).parent / "protocols"
@@ -44,9 +45,14 @@ class RunPlan:
     conditions: dict[str, float | str] = field(default_factory=dict)
 
     @property
+    def samples(self) -> int:
+        """Samples the run will have."""
+        return self.target_angle_rad.size
+
+    @property
     def duration_s(self) -> float:
         """Length of the run, s."""
-        return self.target_angle_rad.size / trajectory.SAMPLE_RATE_HZ
+        return self.samples / trajectory.SAMPLE_RATE_HZ
 
 
 class _Table(BaseModel):
@@ -203,6 +209,8 @@ TABLES: tuple[type[BaseModel], ...] = (
     StepHoldRuns,
     ChirpRuns,
     DwellRuns,
+    JointHoldRuns,
+    JointSineRuns,
 )
 """Every kind of `[[runs]]` table."""
 
@@ -213,7 +221,9 @@ RunTable = Annotated[
     | LoadStaircaseRuns
     | StepHoldRuns
     | ChirpRuns
-    | DwellRuns,
+    | DwellRuns
+    | JointHoldRuns
+    | JointSineRuns,
     Field(discriminator="kind"),
 ]
 
@@ -233,16 +243,42 @@ class Protocol(BaseModel):
     description: str = ""
     runs: list[RunTable] = Field(min_length=1)
 
+    @property
+    def moves_joints(self) -> bool:
+        """Whether its runs are of a grasper's joints, not of the reference rig's spindle."""
+        return isinstance(self.runs[0], (JointHoldRuns, JointSineRuns))
+
+    @model_validator(mode="after")
+    def _runs_are_of_one_rig(self) -> "Protocol":
+        kinds = {isinstance(table, (JointHoldRuns, JointSineRuns)) for table in self.runs}
+        if len(kinds) > 1:
+            raise ValueError("its runs are of a spindle and of a grasper's joints: no rig has both")
+        return self
+
     def plans(self) -> list[RunPlan]:
-        """Return every run in order, numbered so that names are unique and sort by time."""
-        return [
-            RunPlan(
-                f"{index:03d}-{plan.name}",
-                plan.target_angle_rad,
-                plan.load_command_a,
-                {**plan.conditions, "protocol": self.name},
+        """Return every run in order, numbered so that names are unique and sort by time.
+
+        Raises:
+            UsageError: The runs are of a grasper's joints.
+        """
+        if self.moves_joints:
+            raise UsageError(
+                f"The protocol {self.name!r} moves the joints of a grasper.",
+                "This rig has a spindle.",
+                "Choose a protocol for it, such as quick.",
             )
-            for index, plan in enumerate(plan for table in self.runs for plan in table.plans())
+        return [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
+
+    def any_plans(self) -> list[RunPlan | JointPlan]:
+        """Return every run in order, of whatever rig, numbered likewise."""
+        plans: Iterator[RunPlan | JointPlan] = (p for table in self.runs for p in table.plans())
+        return [
+            replace(
+                plan,
+                name=f"{index:03d}-{plan.name}",
+                conditions={**plan.conditions, "protocol": self.name},
+            )
+            for index, plan in enumerate(plans)
         ]
 
 

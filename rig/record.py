@@ -5,6 +5,7 @@ rest. Each run's log is complete in itself, so an aborted campaign resumes at th
 has no log.
 """
 
+import hashlib
 import itertools
 import json
 import shutil
@@ -27,10 +28,11 @@ from rig.errors import UsageError
 from rig.log.container import Attached
 from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
-from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
+from rig.log.schema import Stream
+from rig.log.streams import COUNTS, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
-from rig.motion import Motion, motion_of
-from rig.protocol import Protocol, RunPlan
+from rig.machines.machine import MachineMotion, MachinePlan
+from rig.protocol import Protocol
 from rig.reading import Reading
 from rig.session import Session
 
@@ -88,13 +90,13 @@ class RunResult:
         return tuple(d.channel for d in self.drift if not d.passes)
 
 
-def check_disk_space(folder: Path, plans: Iterable[RunPlan]) -> None:
+def check_disk_space(folder: Path, plans: Iterable[MachinePlan]) -> None:
     """Refuse to begin what the disk cannot hold.
 
     Raises:
         UsageError: Less is free than the campaign may need.
     """
-    needed = sum(plan.target_angle_rad.size for plan in plans) * BYTES_PER_SAMPLE
+    needed = sum(plan.samples for plan in plans) * BYTES_PER_SAMPLE
     free = shutil.disk_usage(folder).free
     if free < needed:
         raise UsageError(
@@ -127,7 +129,7 @@ def read_manifest(folder: Path) -> tuple[Protocol, Config]:
 
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
-) -> list[RunPlan]:
+) -> list[MachinePlan]:
     """Prepare a campaign's folder and return the runs that are still to be made.
 
     Raises:
@@ -136,7 +138,12 @@ def open_campaign_folder(
     """
     folder.mkdir(parents=True, exist_ok=True)
     manifest = folder / MANIFEST
-    described = {"protocol": protocol.model_dump(), "config": config.model_dump()}
+    whole = json.dumps(config.model_dump(), sort_keys=True).encode()
+    described = {
+        "protocol": protocol.model_dump(),
+        "config": config.logged(),
+        "config_sha256": hashlib.sha256(whole).hexdigest(),
+    }
     if manifest.exists():
         if not resume:
             raise UsageError(
@@ -156,14 +163,14 @@ def open_campaign_folder(
         )
     else:
         write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
-    plans = protocol.plans()
+    plans = protocol.any_plans()
     check_disk_space(folder, plans)
     return [plan for plan in plans if not _is_recorded(_log_path(folder, plan))]
 
 
 def record_campaign(
     session: Session,
-    plans: Iterable[RunPlan],
+    plans: Iterable[MachinePlan],
     folder: Path,
     notes: str = "",
     on_progress: Progress | None = None,
@@ -187,18 +194,18 @@ def record_campaign(
 
 def _record_run(
     session: Session,
-    plan: RunPlan,
+    plan: MachinePlan,
     path: Path,
     epoch_ns: int,
     notes: str,
     on_progress: Progress | None,
 ) -> RunResult:
     before = session.take_zeros(REST_S)
-    motion = motion_of(plan, session.spindle_angle_rad)
+    motion = session.machine.motion(plan, session.here)
     expected = motion.last - motion.first
     lost_before = session.counters["lost"]
     samples = 0
-    readings = session.play(motion.target_angle_rad, motion.load_command_a)
+    readings = session.play(*motion.setpoints)
     first = next(r for r in readings if len(_of_run(r, motion)))
     run_start_us = int(_of_run(first, motion).tick_us[0])
     with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
@@ -206,7 +213,7 @@ def _record_run(
             run = _of_run(reading, motion)
             beside = {c.stream().topic: c.take() for c in session.companions}
             if len(run):
-                _write_reading(log, run, run_start_us, epoch_ns)
+                _write_reading(log, session.machine.counts, run, run_start_us, epoch_ns)
                 line = session.clock.line
                 for topic, block in beside.items():
                     _write_beside(log, topic, block, line, run_start_us, epoch_ns)
@@ -227,14 +234,14 @@ def _record_run(
     return result
 
 
-def _of_run(reading: Reading, motion: Motion) -> Reading:
+def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
     """Return the samples that belong to the run itself, not to its approach or release."""
     return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
 
 
 def _new_log(
     session: Session,
-    plan: RunPlan,
+    plan: MachinePlan,
     path: Path,
     started_at_ns: int,
     before: Mapping[str, SensorZero],
@@ -258,18 +265,21 @@ def _new_log(
             **_clock_residuals(session),
         },
     )
-    settings = json.dumps(config.model_dump(), indent=1).encode()
+    settings = json.dumps(config.logged(), indent=1).encode()
     attachments = [
         Attached("config.json", "application/json", settings),
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
     ]
     _set_aside(path)
-    streams = [sample_stream(tuple(calibrations.channels)), COUNTS_STREAM]
+    raw = session.machine.counts
+    streams = [sample_stream(tuple(calibrations.channels), raw.rate_hz), raw]
     streams += [companion.stream() for companion in session.companions]
     return LogWriter(path, info, streams, attachments=attachments)
 
 
-def _write_reading(log: LogWriter, reading: Reading, run_start_us: int, epoch_ns: int) -> None:
+def _write_reading(
+    log: LogWriter, raw: Stream, reading: Reading, run_start_us: int, epoch_ns: int
+) -> None:
     """Write a stretch of the run to both streams, with the run's own clock in `time_s`."""
     log_time_ns = epoch_ns + reading.tick_us * 1000
     sequence = reading.counts["sequence"]
@@ -279,7 +289,7 @@ def _write_reading(log: LogWriter, reading: Reading, run_start_us: int, epoch_ns
         {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags},
         log_time_ns,
     )
-    counts = {field.name: reading.counts[field.name] for field in COUNTS_STREAM.fields}
+    counts = {field.name: reading.counts[field.name] for field in raw.fields}
     log.write(COUNTS, counts, log_time_ns)
 
 
@@ -320,7 +330,7 @@ def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
     return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
 
 
-def _log_path(folder: Path, plan: RunPlan) -> Path:
+def _log_path(folder: Path, plan: MachinePlan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 

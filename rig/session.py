@@ -19,22 +19,20 @@ from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
 from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import MAX_SETPOINTS, TICK_US, Identity, Trip
+from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError
 from rig.interrupts import leaving_safely
-from rig.logger import PTY_URL
-from rig.motion import settling
+from rig.logger import is_real_time
+from rig.machines.choose import machine_of
 from rig.reading import Reading, reading_of, with_setpoints
-from rig.safety import board_limits, check_samples, check_setpoints
+from rig.safety import check_samples
 from rig.trips import HostWatch, trip_error, tripped
 
 LEAD_S = 0.3
 """Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
-
-TICKS_A_SECOND = 1_000_000 // TICK_US
 
 UNENDING = 2**62
 """Number of setpoints while it is not known how many there will be."""
@@ -53,7 +51,7 @@ STALL_S = 1.0
 
 
 class LoggerStalledError(RigError):
-    """The logger sends nothing although it should stream at 1 kHz."""
+    """The logger sends nothing although it should stream."""
 
 
 class Session:
@@ -68,15 +66,15 @@ class Session:
         self.calibrations: CalibrationSet = config.calibration_set()
         self.zeros: dict[str, float] = {}
         self.identity: Identity
-        self._logger = TeensyLogger(transport)
+        self.machine = machine_of(config)
+        self._logger = TeensyLogger(transport, self.machine.profile)
         self._transport = transport
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
-        self._spindle_angle_rad = 0.0
+        self.here: tuple[float, ...] = ()
+        """Where it stood in the newest sample: what its setpoints ask for, rad."""
         self._watch: HostWatch | None = None
-        self._gathers = config.logger.url == PTY_URL or not (
-            config.is_simulated or config.logger.driver == "epos4"
-        )
+        self._gathers = is_real_time(config)
         self._read_s = self._clock_due_s = -np.inf
         self.newest_tick_us = 0
         self.companions: list[Companion] = []
@@ -114,7 +112,7 @@ class Session:
     @property
     def spindle_angle_rad(self) -> float:
         """Where the spindle stood in the newest sample, rad."""
-        return self._spindle_angle_rad
+        return self.here[0]
 
     def safe(self) -> None:
         """Disarm: command 0, load 0, confirmed by the logger.
@@ -128,7 +126,7 @@ class Session:
     def rest(self, duration_s: float) -> Iterator[Reading]:
         """Read the disarmed rig for a while."""
         self.safe()
-        remaining = round(duration_s * TICKS_A_SECOND)
+        remaining = round(duration_s * self.machine.profile.rate_hz)
         while remaining > 0:
             reading = self._read()
             remaining -= len(reading.time_s)
@@ -150,44 +148,42 @@ class Session:
         while True:
             yield self._read()
 
-    def play(
-        self, target_angle_rad: NDArray[np.float64], load_command_a: NDArray[np.float64]
-    ) -> Iterator[Reading]:
+    def play(self, *setpoints: NDArray[np.float64]) -> Iterator[Reading]:
         """Arm the rig and play a trajectory; each sample says which setpoint it played.
 
         Args:
-            target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
-            load_command_a: Load motor current, shape (n,).
+            setpoints: What is asked for at the board's rate, closing-positive, each of shape (n,):
+                the spindle's angle, rad, and the load motor's current, A; of a grasper the angles
+                of yaw, jaw 1 and jaw 2, rad.
 
         Raises:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        check_setpoints(self.config.limits, target_angle_rad, load_command_a)
-        cuts = range(0, target_angle_rad.size, MAX_SETPOINTS)
-        blocks = [slice(cut, cut + MAX_SETPOINTS) for cut in cuts]
-        yield from self.follow((target_angle_rad[b], load_command_a[b]) for b in blocks)
+        self.machine.check_setpoints(self.config, setpoints)
+        most = self.machine.profile.max_setpoints
+        blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]
+        yield from self.follow(tuple(column[b] for column in setpoints) for b in blocks)
 
-    def follow(
-        self, setpoints: Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]
-    ) -> Iterator[Reading]:
+    def follow(self, setpoints: Iterator[tuple[NDArray[np.float64], ...]]) -> Iterator[Reading]:
         """Arm the rig and play setpoints that are decided while it goes, until there are no more.
 
         A piece is asked for `LEAD_S` before it is played, so what a reading tells can change what
         comes so much later.
 
         Args:
-            setpoints: Pieces of spindle angle (rad) and load current (A) at 1 kHz, each of shape
-                (n,), n from 1 to `MAX_SETPOINTS`.
+            setpoints: Pieces of what `play` takes, each of shape (n,), n from 1 to the profile's
+                `max_setpoints`.
 
         Raises:
             SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        lead = round(LEAD_S * TICKS_A_SECOND)
-        board = board_limits(self.config, self.calibrations)
-        self._watch = HostWatch(board)
-        self._logger.arm(self.config.controller.gains(), board)
+        lead = round(LEAD_S * self.machine.profile.rate_hz)
+        board = self.machine.board_limits(self.config, self.calibrations)
+        self._watch = HostWatch(board, self.machine)
+        self._watch.prepare()
+        self._logger.arm(self.machine.gains(self.config), board)
         queued = played = 0
         is_over = False
         newest_sequence: int | None = None
@@ -197,10 +193,10 @@ class Session:
                 if piece is None:
                     is_over = True
                     break
-                check_setpoints(self.config.limits, *piece)
-                targets = self._to_counts("target_angle_rad", piece[0])
-                self._queue(targets, self._to_counts("load_command_a", piece[1]))
-                queued += targets.size
+                self.machine.check_setpoints(self.config, piece)
+                names = self.machine.setpoint_channels
+                self._queue(*(self._to_counts(n, v) for n, v in zip(names, piece, strict=True)))
+                queued += piece[0].size
             reading = self._read()
             # until the end is known, a queue that ran dry is a setpoint that is missing
             planned = queued if is_over else UNENDING
@@ -211,8 +207,7 @@ class Session:
 
     def settle(self) -> None:
         """Move the unloaded rig a little, so that friction gives up the torque it holds."""
-        motion = settling(self.spindle_angle_rad)
-        for _ in self.play(motion.target_angle_rad, motion.load_command_a):
+        for _ in self.play(*self.machine.settling(self.here).setpoints):
             pass
 
     def _gather(self) -> None:
@@ -245,28 +240,31 @@ class Session:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
-        self._spindle_angle_rad = float(reading.columns["spindle_angle_rad"][-1])
+        self.here = self.machine.here(reading.columns)
         try:
             self._require_no_trip(reading)
             check_samples(self.config.limits, reading)
             crossing = self._watch.check(reading) if self._watch else None
             if crossing is not None:
-                raise trip_error(crossing, self.calibrations, "This computer is disarming the rig.")
+                raise self._tripped(crossing, "This computer is disarming the rig.")
         except SafetyTripError:
             self.safe()
             raise
         return reading
 
-    def _queue(self, targets: NDArray[np.int32], loads_ma: NDArray[np.int32]) -> None:
+    def _tripped(self, report: TripReport, state: str) -> SafetyTripError:
+        return trip_error(report, self.calibrations, state, self.machine)
+
+    def _queue(self, *columns: NDArray[np.int32]) -> None:
         """Queue setpoints; a board that has tripped since it was read says over what."""
         try:
-            self._logger.queue(targets, loads_ma)
+            self._logger.queue(*columns)
         except CommandRefusedError as error:
             report = self._logger.trip()
             if report.code is Trip.NONE:
                 raise
             state = "It is in its safe state, until armed again."
-            raise trip_error(report, self.calibrations, state) from error
+            raise self._tripped(report, state) from error
 
     def _require_no_trip(self, reading: Reading) -> None:
         """Look for what the board itself tripped over.
@@ -277,7 +275,7 @@ class Session:
         trip = tripped(reading)
         if self._watch is not None and trip is not None:
             state = "It holds the spindle with a low command" if trip[1] else "It is released"
-            raise trip_error(self._logger.trip(), self.calibrations, f"{state}, until armed again.")
+            raise self._tripped(self._logger.trip(), f"{state}, until armed again.")
 
     def _follow_clock(self) -> None:
         exchange = self._logger.last_exchange

@@ -1,4 +1,4 @@
-"""Trajectories of the spindle and of the load motor, sampled at the logger's rate.
+"""Trajectories of the spindle and of the load motor, sampled at the logger's rate, 1 kHz if unsaid.
 
 Angles are closing-positive. A trajectory starts and ends at rest where its kind allows it.
 """
@@ -18,9 +18,9 @@ DECAYS = 4.0
 FloatArray = NDArray[np.float64]
 
 
-def times(duration_s: float) -> FloatArray:
+def times(duration_s: float, rate_hz: float = SAMPLE_RATE_HZ) -> FloatArray:
     """Return the sample times of a duration, s."""
-    return np.arange(round(duration_s * SAMPLE_RATE_HZ)) / SAMPLE_RATE_HZ
+    return np.arange(round(duration_s * rate_hz)) / rate_hz
 
 
 def sine(
@@ -91,20 +91,26 @@ def dwells(
     return start_rad + np.concatenate(parts)
 
 
-def minimum_jerk(start: float, stop: float, duration_s: float) -> FloatArray:
+def minimum_jerk(
+    start: float, stop: float, duration_s: float, rate_hz: float = SAMPLE_RATE_HZ
+) -> FloatArray:
     """Return the minimum-jerk move between two rests (Flash and Hogan 1985, the quintic)."""
-    s = np.linspace(0.0, 1.0, max(round(duration_s * SAMPLE_RATE_HZ), 1))
+    s = np.linspace(0.0, 1.0, max(round(duration_s * rate_hz), 1))
     return start + (stop - start) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
 
 
 def relaxation(
-    centre_rad: float, amplitude_rad: float, frequency_hz: float, cycles: int
+    centre_rad: float,
+    amplitude_rad: float,
+    frequency_hz: float,
+    cycles: int,
+    rate_hz: float = SAMPLE_RATE_HZ,
 ) -> FloatArray:
     """Return an oscillation that dies out at its centre; friction gives up the torque it holds.
 
     The amplitude decays exponentially to nothing, as in demagnetising: each reversal is a little
     smaller than the one before, so that what friction still holds at the end is small too.
     """
-    t = times(cycles / frequency_hz)
+    t = times(cycles / frequency_hz, rate_hz)
     decay: FloatArray = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
     return centre_rad + amplitude_rad * decay * np.sin(2.0 * np.pi * frequency_hz * t)

@@ -17,7 +17,7 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
     """
     sentences = []
     for problem in error.errors():
-        path = ".".join(str(part) for part in problem["loc"]) or "the file"
+        path = ".".join(str(part) for part in _path(problem["loc"])) or "the file"
         message = problem["msg"]
         if problem["type"] == "extra_forbidden":
             near = difflib.get_close_matches(str(problem["loc"][-1]), list(known), n=1)
@@ -26,6 +26,15 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
             message += f", given {problem['input']}{_unit(str(problem['loc'][-1]))}"
         sentences.append(f"{path}: {message}.")
     return " ".join(sentences)
+
+
+def _path(location: tuple[int | str, ...]) -> Iterable[int | str]:
+    """Return where a key stands in the file, without the kind of limits pydantic chose there."""
+    return (
+        (part for k, part in enumerate(location) if k != 1 or location[0] != "limits")
+        if len(location) > 2
+        else location
+    )
 
 
 def _unit(key: str) -> str:

@@ -1,11 +1,13 @@
-"""The residual watch of a recording session: every finished run is held against a fitted model."""
+"""The residual watch of a recording session: every finished run is held against fitted models."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from estimation import model_file
 from estimation.model import NotFittedError
+from estimation.recording import Recording
 from estimation.watch import ResidualWatch, Sight
 from rig.importers.registry import open_campaign
 
@@ -15,12 +17,10 @@ class RunWatch:
     """Watches the runs of a campaign as they are finished.
 
     Attributes:
-        watch: The watch of the model.
-        sights: What each run said, in order.
+        watches: Each model's watch, and what each run said of it, in order.
     """
 
-    watch: ResidualWatch
-    sights: list[Sight] = field(default_factory=list)
+    watches: list[tuple[ResidualWatch, list[Sight]]]
 
     def after(self, path: Path) -> str:
         """Read a finished run's log; return what is new to a person, empty when nothing is.
@@ -29,30 +29,40 @@ class RunWatch:
             DataError: The log cannot be read.
             MissingChannelError: The run lacks a channel of the model.
         """
-        fitted = self.fits
-        for recording in open_campaign(path).evidence:
-            sight = self.watch.see(recording)
-            if sight is not None:
-                self.sights.append(sight)
-        if not fitted or self.fits:
-            return ""
-        last = self.sights[-1]
-        usual = "" if last.usual is None else f" ({last.rmse / last.usual:.2f} times its own error)"
-        return f"The model {self.watch.model.name!r} stops fitting, since run {last.since}{usual}."
+        recordings = list(open_campaign(path).evidence)
+        return " ".join(filter(None, (_after(*one, recordings) for one in self.watches)))
 
     @property
     def fits(self) -> bool:
-        """Whether the model fits so far."""
-        return not self.sights or self.sights[-1].fits
+        """Whether every model fits so far."""
+        return all(_fits(sights) for _, sights in self.watches)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the state in plain JSON types."""
-        return {
-            "name": self.watch.model.name,
-            "fits": self.fits,
-            "since": self.sights[-1].since if self.sights else None,
-            "runs": self.sights,
-        }
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the state of each model in plain JSON types."""
+        return [
+            {
+                "name": watch.model.name,
+                "fits": _fits(sights),
+                "since": sights[-1].since if sights else None,
+                "runs": sights,
+            }
+            for watch, sights in self.watches
+        ]
+
+
+def _fits(sights: Sequence[Sight]) -> bool:
+    return not sights or sights[-1].fits
+
+
+def _after(watch: ResidualWatch, sights: list[Sight], recordings: Sequence[Recording]) -> str:
+    """Hold finished runs against one model; return what is new to a person."""
+    fitted = _fits(sights)
+    sights += [sight for r in recordings if (sight := watch.see(r)) is not None]
+    if not fitted or _fits(sights):
+        return ""
+    last = sights[-1]
+    usual = "" if last.usual is None else f" ({last.rmse / last.usual:.2f} times its own error)"
+    return f"The model {watch.model.name!r} stops fitting, since run {last.since}{usual}."
 
 
 def watch_runs(path: Path) -> RunWatch:
@@ -62,11 +72,12 @@ def watch_runs(path: Path) -> RunWatch:
         ModelFileError: The file cannot be read.
         NotFittedError: A parameter has no value.
     """
-    model = model_file.read(path)
-    if not model.is_fitted:
-        raise NotFittedError(
-            f"The model {model.name!r} is not fitted.",
-            "Only a fitted model can stop fitting.",
-            f"Type `rig fit LOGS --model {path} --out FITTED.toml`.",
-        )
-    return RunWatch(ResidualWatch(model))
+    models = model_file.read_all(path)
+    for model in models:
+        if not model.is_fitted:
+            raise NotFittedError(
+                f"The model {model.name!r} is not fitted.",
+                "Only a fitted model can stop fitting.",
+                f"Type `rig fit LOGS --model {path} --out FITTED.toml`.",
+            )
+    return RunWatch([(ResidualWatch(model), []) for model in models])

@@ -29,6 +29,7 @@ from drivers.sliding import SlidingFrames
 from drivers.teensy import protocol as teensy
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.fake_device import HandMovedBench
+from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, Limits
 from drivers.usb520 import protocol as usb520
 from estimation.errors import EstimationError
 from rig.config import SHIPPED, load_config, shipped_configs
@@ -58,10 +59,10 @@ class Target:
 
 
 def _commands() -> list[bytes]:
-    gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), teensy.Limits.widest()
+    gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), Limits.widest()
     payloads = [teensy.encode_command(kind, 7) for kind in teensy.Kind if kind >= 16]
-    payloads += [teensy.encode_arm(8, gains, limits), teensy.encode_ping(9, 10)]
-    payloads.append(teensy.encode_setpoints(9, np.arange(5), np.arange(5)))
+    payloads += [REFERENCE.encode_arm(8, gains, limits), teensy.encode_ping(9, 10)]
+    payloads.append(REFERENCE.encode_setpoints(9, (np.arange(5), np.arange(5))))
     return [encode_frame(payload) for payload in payloads]
 
 
@@ -69,9 +70,9 @@ def _replies() -> list[bytes]:
     payloads = [
         teensy.encode_ack(teensy.Ack(1, 2, 0, 1, 99)),
         teensy.encode_pong(3, 4, 5),
-        teensy.encode_hello_reply(1, "TEENSY-1"),
+        teensy.encode_hello_reply(1, "TEENSY-1", REFERENCE.protocol_hash),
         teensy.encode_trip_report(1, 4, 3, 5, 6, 7, 8),
-        np.zeros(1, teensy.SAMPLE_DTYPE).tobytes(),
+        np.zeros(1, SAMPLE_DTYPE).tobytes(),
     ]
     return [encode_frame(payload) for payload in payloads]
 
@@ -79,7 +80,7 @@ def _replies() -> list[bytes]:
 def _frames(data: bytes) -> bool:
     """Frames and what is in them, against the cobs package and binascii's CRC."""
     data = data.rstrip(b"\x00") + b"\x00"
-    found = FrameStream(teensy.SAMPLE_DTYPE.itemsize).feed(data)
+    found = FrameStream(SAMPLE_DTYPE.itemsize).feed(data)
     ours = sorted([*(row.tobytes() for row in found.payloads), *found.others])
     theirs = []
     for part in data.split(b"\x00"):
@@ -93,8 +94,8 @@ def _frames(data: bytes) -> bool:
             theirs.append(body[:-2])
     assert ours == sorted(theirs), "frames differ from the oracle's"
     for payload in found.others:
-        kind, _, fields = teensy.decode(payload)
-        assert teensy.LAYOUTS[kind].itemsize <= len(payload)
+        kind, _, fields = REFERENCE.decode(payload)
+        assert REFERENCE.layouts[kind].itemsize <= len(payload)
         assert fields["version"] == teensy.VERSION
     return bool(ours)
 
@@ -109,7 +110,7 @@ def _board_takes(data: bytes) -> bool:
     board = _board()
     board.receive(data)
     board.advance(1)
-    answers = FrameStream(teensy.SAMPLE_DTYPE.itemsize).feed(board.transmit())
+    answers = FrameStream(SAMPLE_DTYPE.itemsize).feed(board.transmit())
     assert answers.bad == 0, "the board sent a bad frame"
     return bool(answers.others)
 

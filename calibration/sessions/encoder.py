@@ -34,6 +34,8 @@ PAIRS = {
     "spindle": Pair("spindle_angle_rad", "motor_angle_rad", "proximal_torque_n_m", 1 / 35.0),
     "jaw": Pair("jaw_angle_rad", "spindle_angle_rad", "distal_torque_n_m", 1.0),
 }
+SPEEDS_RAD_S = (0.3, 0.5)
+"""More than one: at one speed the time tells whatever the angle does."""
 MARKS = 5
 MARK_SPREAD_COUNT = 6.0
 LEAST_PERIODS, MOST_PERIODS = 6, 40
@@ -48,11 +50,13 @@ class EncoderSession:
         encoder: `spindle`, against the motor's encoder, or `jaw`, against the spindle's.
         loads_a: Loads of the moves.
         repeats: How often each is moved.
+        line_only: Model no wave.
     """
 
     encoder: str = "spindle"
     loads_a: tuple[float, ...] = (0.2, 0.6)
-    repeats: int = 3
+    repeats: int = 2
+    line_only: bool = False
 
     kind = "encoder"
     devices = ("logger",)
@@ -70,7 +74,7 @@ class EncoderSession:
             Step(f"mark-{k}", {"mark_ratio": 1.0, "encoder": self.encoder}, text, duration_s=0.5)
             for k in range(MARKS)
         ]
-        return [*marks, *moves((0.4,), self.loads_a, self.repeats)]
+        return [*marks, *moves(SPEEDS_RAD_S, self.loads_a, self.repeats)]
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the line with its zero at the mark, and the encoder's errors."""
@@ -87,9 +91,10 @@ class EncoderSession:
         amplitude = float(np.hypot(*waved.values[-2:]))
         # smaller than half a count it may be the quantum's own pattern
         has_wave = is_better(waved, plain) and amplitude > abs(line.slope) / 2
-        used = waved if has_wave else plain
+        is_waved = has_wave and not self.line_only
+        used = waved if is_waved else plain
         names = ["ratio", "offset_rad", "compliance_rad_n_m", "lost_motion_rad"]
-        names += ["wave_sine_rad", "wave_cosine_rad"] if has_wave else []
+        names += ["wave_sine_rad", "wave_cosine_rad"] if is_waved else []
         angles = np.concatenate([run[pair.channel] for run in runs])
         error_fit = Fit(
             "encoder",

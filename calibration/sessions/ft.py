@@ -31,11 +31,13 @@ class FtSession:
 
     Attributes:
         poses: Directions of gravity in the sensor's axes.
+        repeats: How often to go through them; three tell a wrong sensor from poses held badly.
         jaw_m: The jaw, from the sensor's origin.
         jaw_turn_rad: Turns of the jaw's frame about the sensor's x, y and z, in that order.
     """
 
     poses: tuple[tuple[float, float, float], ...] = POSES
+    repeats: int = 1
     jaw_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     jaw_turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -45,7 +47,7 @@ class FtSession:
     def steps(self) -> list[Step]:
         """One step a pose."""
         steps = []
-        for number, pose in enumerate(self.poses):
+        for number, pose in enumerate(self.poses * self.repeats):
             down = np.array(pose, dtype=np.float64) / np.linalg.norm(pose)
             shown = ", ".join(f"{value:+.2f}" for value in down)
             steps.append(

@@ -42,12 +42,14 @@ class GearboxSession:
         speeds_rad_s: Speeds of the spindle.
         repeats: How often each is moved.
         gear_ratio: Motor turns a turn of the spindle.
+        stiffness_only: Model no backlash.
     """
 
     loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)
-    speeds_rad_s: tuple[float, ...] = (0.6,)
-    repeats: int = 2
+    speeds_rad_s: tuple[float, ...] = (0.5, 0.7)
+    repeats: int = 1
     gear_ratio: float = 35.0
+    stiffness_only: bool = False
 
     kind = "gearbox"
     devices = ("logger",)
@@ -77,20 +79,8 @@ class GearboxSession:
         _refuse_no_slope(whole.values[0], whole.residual_rms, every)
         drift = refuse_drift(whole, float(np.ptp(every)) * abs(float(whole.values[0])))
         has_gap = is_better(whole, without) and abs(whole.values[1]) > whole.half_widths()[1]
-        compliance, half_gap, offset = whole.values
-        jacobian = np.diag([-1.0 / compliance**2, 2.0, 1.0])
-        covariance = jacobian @ whole.covariance @ jacobian.T
-        fit = Fit(
-            "gearbox",
-            {
-                "stiffness_n_m_rad": float(1.0 / compliance),
-                "backlash_rad": float(2.0 * half_gap),
-                "offset_rad": float(offset),
-            },
-            tuple(map(tuple, covariance.tolist())),
-            whole.residual_rms,
-            int(every.size),
-        )
+        used = without if self.stiffness_only else whole
+        fit = _as_fit(used, int(every.size))
         found: dict[str, float | str] = {
             "backlash": "told apart from none on runs left out"
             if has_gap
@@ -103,10 +93,29 @@ class GearboxSession:
         carried = [torque[_carries(torque, zero_n_m)] for torque, _ in twists]
         series = {
             m.recording.name: (torque, left * 1e3)
-            for m, torque, left in zip(measurements, carried, whole.residuals, strict=True)
+            for m, torque, left in zip(measurements, carried, used.residuals, strict=True)
         }
         result = Result("gear_twist_rad", TORQUE, fit, float(every.min()), float(every.max()))
         return Conclusion((result,), found, Residuals("torque, N m", "residual, mrad", series))
+
+
+def _as_fit(found: Regression, points: int) -> Fit:
+    """Return stiffness, backlash where it was fitted, and offset, with their covariance."""
+    values = {"stiffness_n_m_rad": 1.0 / found.values[0]}
+    slopes = [-1.0 / found.values[0] ** 2]
+    if len(found.values) > 2:
+        values["backlash_rad"] = 2.0 * found.values[1]
+        slopes.append(2.0)
+    values["offset_rad"] = found.values[-1]
+    jacobian = np.diag([*slopes, 1.0])
+    covariance = jacobian @ found.covariance @ jacobian.T
+    return Fit(
+        "gearbox",
+        {name: float(value) for name, value in values.items()},
+        tuple(map(tuple, covariance.tolist())),
+        found.residual_rms,
+        points,
+    )
 
 
 def _carries(torque_n_m: FloatArray, zero_n_m: float) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.procedure import Measurement, Step
 from calibration.quality import BadDataError
@@ -57,11 +58,8 @@ def steady(measurement: Measurement, names: Sequence[str]) -> dict[str, FloatArr
     columns = np.column_stack([recording[name] for name in (*names, "spindle_angle_rad")])
     smooth = zero_phase(columns, rate_hz)
     velocity = np.gradient(zero_phase(smooth[:, -1], rate_hz)) * rate_hz
-    around = round(0.1 * rate_hz)
-    kernel = np.ones(2 * around + 1)
-    still = np.convolve(np.abs(velocity) < MOVING_RAD_S, kernel, mode="same") > 0
     step = max(1, round(rate_hz / KEPT_HZ))
-    kept = (~still & recording.valid)[::step]
+    kept = (~stands(velocity, rate_hz) & recording.valid)[::step]
     if kept.sum() < 20:
         raise BadDataError(
             "no_change",
@@ -73,6 +71,13 @@ def steady(measurement: Measurement, names: Sequence[str]) -> dict[str, FloatArr
     found["spindle_velocity_rad_s"] = velocity[::step][kept]
     found["direction"] = np.sign(found["spindle_velocity_rad_s"])
     return found
+
+
+def stands(velocity_rad_s: FloatArray, rate_hz: float) -> NDArray[np.bool_]:
+    """Return which samples are slow or within 0.1 s of one that is, shape (n,)."""
+    kernel = np.ones(2 * round(0.1 * rate_hz) + 1)
+    slow = np.abs(velocity_rad_s) < MOVING_RAD_S
+    return np.asarray(np.convolve(slow, kernel, mode="same") > 0)
 
 
 def need_channel(values: FloatArray, name: str) -> FloatArray:

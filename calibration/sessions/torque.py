@@ -26,6 +26,7 @@ class TorqueSession:
         sensor: `proximal` or `distal`.
         arm_m: From the axis to where the weights hang, the arm level.
         masses_kg: Weights, rising.
+        repeats: How often to go up and down; four tell a bend from weights hung badly.
         shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
         counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
         temperature_k: Temperature of the sensor; None if it was not measured.
@@ -35,6 +36,7 @@ class TorqueSession:
     sensor: str = "proximal"
     arm_m: float = 0.1
     masses_kg: tuple[float, ...] = MASSES_KG
+    repeats: int = 1
     shunt_v_v: float | None = None
     counts_per_v_v: float | None = None
     temperature_k: float | None = None
@@ -62,7 +64,7 @@ class TorqueSession:
         """Zero, shunt if there is one, then up and down through the weights, ending at zero."""
         steps = [] if self.shunt_v_v is None else [self._shunt_step(0), self._shunt_step(1)]
         up = (0.0, *self.masses_kg)
-        for number, mass in enumerate((*up, *up[-2::-1])):
+        for number, mass in enumerate((0.0, *(up[1:] + up[-2::-1]) * self.repeats)):
             what = f"Hang {mass * 1e3:g} g on the arm" if mass else "Take every weight off the arm"
             steps.append(
                 Step(
@@ -96,7 +98,7 @@ class TorqueSession:
         torques = np.array([load.torque_n_m for load in loads])
         means = np.array([load.counts.mean() for load in loads])
         left = (means - fitted.zero_counts) * fitted.slope_n_m - torques
-        turn = int(torques.argmax()) + 1
+        rising = np.diff(torques, prepend=-1.0) > 0
         result = Result(
             SENSORS[self.sensor],
             field,
@@ -106,8 +108,8 @@ class TorqueSession:
             True,
         )
         series = {
-            "loading": (torques[:turn], left[:turn] * 1e3),
-            "unloading": (torques[turn:], left[turn:] * 1e3),
+            "loading": (torques[rising], left[rising] * 1e3),
+            "unloading": (torques[~rising], left[~rising] * 1e3),
         }
         return Conclusion((result,), found, Residuals("torque, N m", "residual, mN m", series))
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.device import Channel
-from drivers.teensy.protocol import SAMPLE_DTYPE, SAMPLE_RATE_HZ
+from drivers.teensy.profile import Profile
+from drivers.teensy.reference import REFERENCE
 
 ADC_BITS = 12
 ADC_REFERENCE_V = 3.3
@@ -28,7 +29,7 @@ class TeensyChannel:
     """One quantity made from one field of a sample: `slope * (count - zero_count)`.
 
     Attributes:
-        field: Field of a sample, see `drivers.teensy.protocol.SAMPLE_DTYPE`.
+        field: Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`.
         slope: Unit a count.
         zero_count: Count at 0.
         channel: Name, unit, rate and range of the result.
@@ -52,19 +53,20 @@ def linear(
     slope: float = 1.0,
     zero_count: float = 0.0,
     description: str = "",
+    profile: Profile = REFERENCE,
 ) -> TeensyChannel:
     """Return a channel by slope and zero; raw counts by default.
 
     Raises:
         ValueError: No such field, or a slope that is 0 or not finite.
     """
-    if field not in (SAMPLE_DTYPE.names or ()):
+    if field not in (profile.sample.names or ()):
         raise ValueError(f"a sample has no field {field!r}")
     if not (math.isfinite(slope) and slope and math.isfinite(zero_count)):
         raise ValueError(f"slope {slope} and zero {zero_count} of {name} make no line")
-    ends = [slope * (count - zero_count) for count in _count_range(field)]
+    ends = [slope * (count - zero_count) for count in _count_range(field, profile)]
     channel = Channel(
-        name, unit, float(SAMPLE_RATE_HZ), min(ends), max(ends), description or f"field {field}"
+        name, unit, profile.rate_hz, min(ends), max(ends), description or f"field {field}"
     )
     return TeensyChannel(field, slope, zero_count, channel)
 
@@ -144,15 +146,14 @@ def force_resistor(
     return linear(name, field, "N", slope, zero_count, "force-sensing resistor")
 
 
-def _count_range(field: str) -> tuple[int, int]:
-    if field == "fsr":
+def _count_range(field: str, profile: Profile) -> tuple[int, int]:
+    if field.startswith(("fsr", "force_")):
         return 0, 2**ADC_BITS - 1
-    bounds = np.iinfo(SAMPLE_DTYPE[field])
+    bounds = np.iinfo(profile.sample[field])
     return int(bounds.min), int(bounds.max)
 
 
-RAW = tuple(
-    linear(f"{field}_count", field)
-    for field in ("motor", "spindle", "jaw", "proximal", "distal", "current", "fsr")
-)
-"""Every input as it is, in counts."""
+def raw_channels(profile: Profile = REFERENCE) -> tuple[TeensyChannel, ...]:
+    """Return every input of a board as it is, in counts."""
+    inputs = [*profile.input_names, *(["fsr"] if profile is REFERENCE else [])]
+    return tuple(linear(f"{field}_count", field, profile=profile) for field in inputs)

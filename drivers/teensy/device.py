@@ -8,13 +8,11 @@ from numpy.typing import NDArray
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.registry import Driver
-from drivers.teensy.channels import RAW, TeensyChannel
+from drivers.teensy.channels import TeensyChannel, raw_channels
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import (
-    STATUS_LIMIT_TRIPPED,
-    STATUS_SATURATED,
-    STATUS_WATCHDOG_TRIPPED,
-)
+from drivers.teensy.profile import Profile
+from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, STATUS_SATURATED, STATUS_WATCHDOG_TRIPPED
+from drivers.teensy.reference import REFERENCE
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
@@ -27,15 +25,21 @@ class TeensyDevice:
 
     Args:
         transport: The way to the board; the device closes it.
-        wired: What the fields of a sample mean.
+        wired: What the fields of a sample mean; raw counts if not said.
+        profile: What the board samples.
     """
 
     name = "teensy"
 
-    def __init__(self, transport: Transport, wired: Sequence[TeensyChannel] = RAW) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        wired: Sequence[TeensyChannel] | None = None,
+        profile: Profile = REFERENCE,
+    ) -> None:
         self._transport = transport
-        self._wired = tuple(wired)
-        self.logger = TeensyLogger(transport)
+        self._wired = tuple(raw_channels(profile) if wired is None else wired)
+        self.logger = TeensyLogger(transport, profile)
         self._counters = DeviceCounters()
         self._arrivals = Arrivals(self._counters, LONGEST_SILENCE_S)
         self._closed = False

@@ -18,15 +18,10 @@ from drivers.errors import (
 from drivers.link import FramedLink, LinkCounters
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity
-from drivers.teensy.protocol import (
-    SAMPLE_DTYPE,
-    Ack,
-    Identity,
-    Kind,
-    Limits,
-    Result,
-    TripReport,
-)
+from drivers.teensy.grasper import GRASPER
+from drivers.teensy.profile import ArmLimits, Profile
+from drivers.teensy.protocol import Ack, Identity, Kind, Result, TripReport
+from drivers.teensy.reference import REFERENCE
 from drivers.transport.transport import Transport
 
 _REASONS: dict[int, tuple[str, str]] = {
@@ -86,10 +81,12 @@ class TeensyLogger:
 
     Args:
         transport: The way to the board; the logger closes it.
+        profile: What the board samples and moves.
     """
 
-    def __init__(self, transport: Transport) -> None:
-        self._link = FramedLink(transport, SAMPLE_DTYPE.itemsize)
+    def __init__(self, transport: Transport, profile: Profile = REFERENCE) -> None:
+        self._profile = profile
+        self._link = FramedLink(transport, profile.sample.itemsize)
         self._continuity = Continuity(self._link.counters)
         self._identity: Identity | None = None
         self._command_number = 0
@@ -127,9 +124,9 @@ class TeensyLogger:
             identity = protocol.decode_identity(self._request(Kind.HELLO_REPLY, hello))
         except FrameError as error:
             raise self._mismatch("a protocol of another layout", str(error)) from error
-        if identity.protocol_hash != protocol.PROTOCOL_HASH:
+        if identity.protocol_hash != self._profile.protocol_hash:
             raise self._mismatch(
-                f"protocol {identity.protocol_hash:08x}",
+                f"protocol {identity.protocol_hash:08x}{_profile_named(identity.protocol_hash)}",
                 f"The board {identity.serial} has firmware {identity.firmware_version},"
                 f" this program goes with"
                 f" {protocol.version_text(protocol.FIRMWARE_VERSION)}.",
@@ -137,25 +134,28 @@ class TeensyLogger:
         self._identity = identity
         return identity
 
-    def arm(self, gains: Sequence[float] | NDArray[np.float64], limits: Limits) -> None:
-        """Put the controller in force. The motor stays currentless until the first setpoint.
+    def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
+        """Put the controllers in force. The motors stay currentless until the first setpoint.
 
         Clears the queue, the watchdog's and the limits' latches.
 
         Args:
-            gains: `drivers.teensy.control`'s gains, shape (5,).
-            limits: What the board holds against every sample.
+            gains: `drivers.teensy.control`'s gains, shape (5,) or (motors, 5).
+            limits: What the board holds against every sample; of the profile's kind.
 
         Raises:
             CommandRefusedError: A gain or a limit is not finite or out of range, or the board
                 tripped at once.
         """
         self._require_identity()
-        values = np.asarray(gains, np.float64)
-        if values.shape != (len(protocol.GAIN_NAMES),):
-            raise DriverError(f"The controller has 5 gains, not {values.shape}.")
+        values = np.atleast_2d(np.asarray(gains, np.float64))
+        wanted = (self._profile.motors, len(protocol.GAIN_NAMES))
+        if values.shape != wanted:
+            raise DriverError(
+                f"The controllers have {wanted[0]} x {wanted[1]} gains, not {values.shape}."
+            )
         self._may_be_armed = True
-        ack = self._command(Kind.ARM, protocol.encode_arm(self._number(), values, limits))
+        ack = self._command(Kind.ARM, self._profile.encode_arm(self._number(), values, limits))
         if not ack.status & protocol.STATUS_ARMED:
             raise CommandRefusedError(
                 f"The board at {self._link.transport.url} was armed and is not any more.",
@@ -176,32 +176,34 @@ class TeensyLogger:
         """Stop the stream of samples; those already sent can still be read."""
         self._simple(Kind.STOP)
 
-    def queue(self, targets: NDArray[np.integer], loads_ma: NDArray[np.integer]) -> int:
+    def queue(self, *columns: NDArray[np.integer]) -> int:
         """Queue setpoints behind those the board has; it plays one a tick and holds the last.
 
         Args:
-            targets: Spindle targets, encoder counts, shape (n,), whole numbers.
-            loads_ma: Load motor current, mA, shape (n,), whole numbers.
+            columns: The fields of a setpoint, in the profile's order, whole numbers, each of shape
+                (n,): on the reference rig spindle targets in encoder counts, and the load motor's
+                current in mA; on the grasper each motor's target.
 
         Returns:
             How many more setpoints the board had room for.
 
         Raises:
             CommandRefusedError: Not armed, the queue is full, or a setpoint is beyond the limits.
-                Blocks of `protocol.MAX_SETPOINTS` before the refused one were taken.
+                Blocks of the profile's `max_setpoints` before the refused one were taken.
             DriverError: The arrays do not fit each other or the board's number range.
         """
         self._require_identity()
-        whole_targets = _whole(targets, np.int32, "target")
-        whole_loads = _whole(loads_ma, np.int16, "load")
-        if whole_targets.shape != whole_loads.shape:
-            raise DriverError(f"{whole_targets.size} targets have {whole_loads.size} loads.")
-        for first in range(0, whole_targets.size, protocol.MAX_SETPOINTS):
-            block = slice(first, first + protocol.MAX_SETPOINTS)
-            self._command(
-                Kind.SETPOINTS,
-                protocol.encode_setpoints(self._number(), whole_targets[block], whole_loads[block]),
-            )
+        names, layout = self._profile.setpoint_names, self._profile.setpoint
+        if len(columns) != len(names):
+            raise DriverError(f"A setpoint has {', '.join(names)}; {len(columns)} were given.")
+        whole = [_whole(values, layout[n], n) for n, values in zip(names, columns, strict=True)]
+        if len({values.shape for values in whole}) > 1:
+            sizes = ", ".join(f"{v.size} of {n}" for n, v in zip(names, whole, strict=True))
+            raise DriverError(f"The fields of the setpoints differ in number: {sizes}.")
+        for first in range(0, whole[0].size, self._profile.max_setpoints):
+            block = [values[first : first + self._profile.max_setpoints] for values in whole]
+            payload = self._profile.encode_setpoints(self._number(), block)
+            self._command(Kind.SETPOINTS, payload)
         return self.queue_free
 
     def read(self, timeout_s: float) -> SampleBatch:
@@ -217,7 +219,7 @@ class TeensyLogger:
                 remaining_s = 0.0
             came = self._link.poll(remaining_s)
             self._take_replies()
-            samples = self._known(self._link.take_stream().view(SAMPLE_DTYPE)[:, 0])
+            samples = self._known(self._link.take_stream().view(self._profile.sample)[:, 0])
             if len(samples) or not came or self._link.transport.now_s >= give_up_s:
                 return SampleBatch(*self._continuity.follow(samples), self._continuity.lost)
 
@@ -250,7 +252,7 @@ class TeensyLogger:
     def trip(self) -> TripReport:
         """Ask what the board tripped over first since it was armed."""
         question = protocol.encode_command(Kind.TRIP, self._number())
-        return protocol.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
+        return self._profile.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
 
     def close(self) -> None:
         """Disarm where the board may be armed, and let go of the link.
@@ -267,7 +269,7 @@ class TeensyLogger:
     def _mismatch(self, theirs: str, why: str) -> ProtocolMismatchError:
         return ProtocolMismatchError(
             f"The board at {self._link.transport.url} speaks {theirs}, this program"
-            f" protocol {protocol.PROTOCOL_HASH:08x}.",
+            f" protocol {self._profile.protocol_hash:08x} ({self._profile.name}).",
             why,
             "Run: rig firmware flash",
         )
@@ -315,7 +317,7 @@ class TeensyLogger:
         answer = self._link.request(
             payload, lambda reply: reply[1:2] in (bytes([expected]), _ACK) and reply[2:4] == number
         )
-        kind, _, fields = protocol.decode(answer)
+        kind, _, fields = self._profile.decode(answer)
         if kind is not expected:
             raise FrameError(f"The answer is {kind.name}, not {expected.name}.")
         return fields
@@ -325,7 +327,7 @@ class TeensyLogger:
         received_s = self._link.transport.now_s
         for payload in self._link.take_others():
             try:
-                kind, number, fields = protocol.decode(payload)
+                kind, number, fields = self._profile.decode(payload)
             except FrameError:
                 self.counters.unknown_frames += 1
                 continue
@@ -349,7 +351,15 @@ class TeensyLogger:
 _ACK = bytes([Kind.ACK])
 
 
-def _whole(values: NDArray[np.integer], kind: type[np.signedinteger], name: str) -> NDArray[Any]:
+def _profile_named(protocol_hash: int) -> str:
+    """Say which of this program's profiles has that hash, if one has."""
+    named = [
+        profile.name for profile in (REFERENCE, GRASPER) if protocol_hash == profile.protocol_hash
+    ]
+    return f" ({named[0]})" if named else ""
+
+
+def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArray[Any]:
     """Return setpoints in the board's number type.
 
     Raises:

@@ -8,6 +8,7 @@ test holds the two against each other byte for byte.
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -17,17 +18,24 @@ from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
 from drivers.teensy.control import LIMIT, VELOCITY_FILTER
-from drivers.teensy.guard import (
-    CURRENT,
+from drivers.teensy.guard import REFERENCE_LOGIC
+from drivers.teensy.logic import BoardLogic
+from drivers.teensy.protocol import (
+    GAIN_NAMES,
+    STATUS_ARMED,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_QUEUE_DRY,
+    STATUS_SATURATED,
+    STATUS_WATCHDOG_TRIPPED,
+    TRIP_SHIFT,
+    Ack,
+    Kind,
+    Result,
+)
+from drivers.teensy.watches import (
     ENGAGED,
-    FSR,
-    LOAD_MA,
-    NO_CHANNEL,
-    PROXIMAL,
     SILENT_US,
     STATE,
-    STATUS,
-    TARGET,
     TICKS,
     TRIP_CHANNEL,
     TRIP_CODE,
@@ -35,58 +43,37 @@ from drivers.teensy.guard import (
     TRIP_LIMIT,
     TRIP_TICK,
     TRIP_VALUE,
-    Drive,
-)
-from drivers.teensy.protocol import (
-    SAMPLE_DTYPE,
-    STATUS_ARMED,
-    STATUS_HOLDING,
-    STATUS_LIMIT_TRIPPED,
-    STATUS_QUEUE_DRY,
-    STATUS_SATURATED,
-    STATUS_WATCHDOG_TRIPPED,
-    TICK_US,
-    TRIP_SHIFT,
-    Ack,
-    Kind,
-    Limits,
-    Result,
+    WATCHDOG_US,
+    is_in_force,
 )
 
 MAX_GAIN = 1e6
 FULL_SCALE_E4 = 10_000
-INT16_MIN, INT16_MAX = -(2**15), 2**15 - 1
-FSR_MAX = 4095
 TRANSMIT_CAPACITY = 65536
 """Bytes the board holds for a host that does not read."""
-SAMPLE_WIRE = SAMPLE_DTYPE.itemsize + 4
-"""Bytes of a sample frame on the wire."""
+FRAME_OVERHEAD = 4
+"""Bytes of a sample frame on the wire beyond its payload."""
 _LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED | 0xFF << TRIP_SHIFT
 _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
 
 
 class Bench(Protocol):
-    """The physics behind a board, in ticks of 1 ms."""
+    """The physics behind a board, in ticks of its profile."""
 
-    def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
-    ) -> NDArray[np.int32]:
-        """Run closed-loop ticks and return the counts, shape (ticks, 11), int32.
+    @property
+    def advance(self) -> Callable[..., NDArray[np.int32]]:
+        """Run closed-loop ticks and return the counts, a row a tick, int32.
 
-        Within a tick: the inputs are sampled into a row, `drivers.teensy.guard.drive_tick` holds
-        the limits and writes what the motors get behind them, the physics moves 1 ms. The result
-        does not depend on how ticks are divided between calls.
+        Within a tick: the inputs are sampled into a row, the profile's tick
+        (`drivers.teensy.guard.drive_tick`, `drivers.teensy.grasper_guard.grasper_tick`) holds the
+        limits and writes what the motors get behind them, the physics moves a tick. The result does
+        not depend on how ticks are divided between calls.
 
         Args:
             ticks: Number of ticks.
-            target: Target of the spindle, counts, shape (ticks,).
-            load_ma: Current of the load motor, mA, shape (ticks,).
-            drive: The board's state, gains and limits, changed in place.
+            plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
+                state, gains and limits, changed in place.
         """
         ...
 
@@ -98,8 +85,9 @@ class TeensyFake:
         bench: The physics.
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
-        protocol_hash: Protocol the board claims to speak.
+        protocol_hash: Protocol the board claims to speak; its profile's if None.
         build_hash: Build the board claims to be.
+        logic: What its profile does a tick.
     """
 
     def __init__(
@@ -107,12 +95,17 @@ class TeensyFake:
         bench: Bench,
         serial: str = "SIM-0001",
         start_tick_us: int = 0,
-        protocol_hash: int = protocol.PROTOCOL_HASH,
+        protocol_hash: int | None = None,
         build_hash: int = 0,
+        logic: BoardLogic = REFERENCE_LOGIC,
     ) -> None:
         self._bench = bench
+        self._logic = logic
+        self._profile = logic.profile
         self._serial = serial
-        self._protocol_hash = protocol_hash
+        self._protocol_hash = (
+            self._profile.protocol_hash if protocol_hash is None else protocol_hash
+        )
         self._build_hash = build_hash
         self._next_tick_us = start_tick_us
         self._stream = FrameStream(0)  # no command is frequent
@@ -124,12 +117,10 @@ class TeensyFake:
         self._host_heard = False
         self._last_host_us = 0
         self._now_us = 0
-        self._drive = Drive()
-        self._drive.guard[TRIP_CHANNEL] = NO_CHANNEL
+        self._drive = logic.idle()
         self._trip_us = 0
-        self._targets = np.empty(0, np.int32)
-        self._loads = np.empty(0, np.int32)
-        self._held: tuple[int, int] | None = None
+        self._queued = np.empty((0, len(self._profile.setpoint_names)), np.int32)
+        self._held: NDArray[np.int32] | None = None
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host and carry out the commands they complete."""
@@ -143,7 +134,7 @@ class TeensyFake:
         return data
 
     def advance(self, ticks: int) -> None:
-        """Let `ticks` milliseconds of board time pass."""
+        """Let that many of the profile's ticks pass."""
         while ticks > 0:
             if self._host_heard:
                 self._last_host_us = self._next_tick_us
@@ -158,13 +149,17 @@ class TeensyFake:
     @property
     def in_force(self) -> bool:
         """Whether the motors are, or may any moment be, given current."""
-        return bool(self._state & (STATUS_ARMED | STATUS_HOLDING))
+        return is_in_force(self._state)
+
+    def set_clock(self, tick_us: int) -> None:
+        """Say what the board's clock will show at the next tick, where ticks are not regular."""
+        self._next_tick_us = tick_us % 2**32
 
     def skip(self, ticks: int) -> None:
         """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
-        self._targets, self._loads = self._targets[ticks:], self._loads[ticks:]
+        self._queued = self._queued[ticks:]
         self._sequence = (self._sequence + ticks) % 2**32
-        self._next_tick_us = (self._next_tick_us + ticks * TICK_US) % 2**32
+        self._next_tick_us = (self._next_tick_us + ticks * self._profile.tick_us) % 2**32
 
     # commands
 
@@ -175,7 +170,7 @@ class TeensyFake:
         self._host_heard = True
         number, sequence = payload[1], int.from_bytes(payload[2:4], "little")
         try:
-            kind, _, fields = protocol.decode(payload)
+            kind, _, fields = self._profile.decode(payload)
         except FrameError:
             self._acknowledge(number, sequence, _reason_of_refusal(payload))
             return
@@ -224,37 +219,38 @@ class TeensyFake:
         return Result.OK
 
     def _arm(self, fields: np.void) -> Result:
-        gains = np.array([fields[name] for name in protocol.GAIN_NAMES], np.float64)
-        limits = Limits(*(int(fields[name]) for name in protocol.LIMIT_NAMES))
+        names = self._profile.arm.names or ()
+        values = [fields[name] for name in names[len(protocol.HEADER_FIELDS) :]]
+        split = self._profile.motors * len(GAIN_NAMES)
+        gains = np.array(values[:split], np.float64).reshape(self._profile.motors, -1)
+        limits = [int(value) for value in values[split:]]
         if not (np.abs(gains) <= MAX_GAIN).all():  # NaN fails too
             return Result.BAD_VALUE
-        if not (0 <= gains[VELOCITY_FILTER] <= 1 and 0 <= gains[LIMIT] <= FULL_SCALE_E4):
+        weight, command = gains[:, VELOCITY_FILTER], gains[:, LIMIT]
+        if not ((weight >= 0) & (weight <= 1) & (command >= 0) & (command <= FULL_SCALE_E4)).all():
             return Result.BAD_VALUE
-        if not limits.valid:
+        if not self._logic.limits_are_valid(limits):
             return Result.BAD_VALUE
         self._release()
-        self._drive = Drive.armed(gains, limits, engaged=False)
-        self._drive.guard[TRIP_CHANNEL] = NO_CHANNEL
+        self._drive = self._logic.armed(gains, limits)
         self._trip_us = 0
         return Result.OK
 
     def _take_setpoints(self, payload: bytes) -> Result:
         if not self._armed:
             return Result.NOT_ARMED
-        block = protocol.decode_setpoints(payload)
-        targets = block["target"].astype(np.int32)
-        loads = block["load_ma"].astype(np.int32)
-        _, max_load_ma, _, _, low, high = self._drive.limits[:6].tolist()
-        if (np.abs(loads) > max_load_ma).any() or (targets < low).any() or (targets > high).any():
+        block = self._profile.decode_setpoints(payload)
+        columns = [block[name].astype(np.int64) for name in self._profile.setpoint_names]
+        setpoints = np.stack(columns, axis=1)
+        if not self._logic.allows(setpoints, self._drive.limits):
             return Result.BAD_VALUE
         if len(block) > self._queue_free():
             return Result.QUEUE_FULL
-        self._targets = np.concatenate((self._targets, targets))
-        self._loads = np.concatenate((self._loads, loads))
+        self._queued = np.concatenate((self._queued, setpoints.astype(np.int32)))
         return Result.OK
 
     def _queue_free(self) -> int:
-        return protocol.QUEUE_CAPACITY - len(self._targets)
+        return protocol.QUEUE_CAPACITY - len(self._queued)
 
     def _acknowledge(self, command: int, sequence: int, result: Result) -> None:
         ack = Ack(sequence, command, result, self._state, self._queue_free())
@@ -285,8 +281,8 @@ class TeensyFake:
         """Return how many ticks may run before the one on which the watchdog trips."""
         if not self._armed:
             return 2**31
-        patience_us = Limits(*self._drive.limits.tolist()).watchdog_us
-        return max(0, (patience_us - self._silent_us) // TICK_US + 1)
+        patience_us = int(self._drive.limits[WATCHDOG_US])
+        return max(0, (patience_us - self._silent_us) // self._profile.tick_us + 1)
 
     def _release(self) -> None:
         """Take the motors out of force and forget what was to be done; the latches stay."""
@@ -294,90 +290,64 @@ class TeensyFake:
         self._forget()
 
     def _forget(self) -> None:
-        self._targets = self._targets[:0]
-        self._loads = self._loads[:0]
+        self._queued = self._queued[:0]
         self._held = None
 
     def _run_block(self, ticks: int) -> None:
         """Run ticks in which no command comes and the watchdog trips on the first if at all."""
         guard = self._drive.guard
-        engaged = self._armed and (self._held is not None or len(self._targets) > 0)
+        engaged = self._armed and (self._held is not None or len(self._queued) > 0)
         guard[ENGAGED] = engaged
         tripped, first_tick = int(guard[TRIP_CODE]), int(guard[TICKS])
-        targets, loads, fed = self._play(ticks) if engaged else (*np.zeros((2, ticks), np.int32), 0)
-        counts = self._bench.advance(ticks, targets, loads, self._drive)
+        setpoints, fed = self._play(ticks, engaged)
+        counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), self._drive)
         if guard[TRIP_CODE] != tripped:
-            since_us = TICK_US * (int(guard[TRIP_TICK]) - first_tick)
+            since_us = self._profile.tick_us * (int(guard[TRIP_TICK]) - first_tick)
             self._trip_us = (self._next_tick_us + since_us) % 2**32
         if not self._armed:
             self._forget()
-        status = counts[:, STATUS].astype(np.uint16)
+        status = counts[:, self._logic.status_column].astype(np.uint16)
         dry = (status[fed:] & STATUS_ARMED) != 0
         status[fed:][dry] |= STATUS_QUEUE_DRY
         self._log(counts, status)
 
-    def _play(self, ticks: int) -> tuple[NDArray[np.int32], NDArray[np.int32], int]:
+    def _play(self, ticks: int, engaged: bool) -> tuple[NDArray[np.int32], int]:
         """Take the next setpoints from the queue, the last one held where it runs dry."""
-        fed = min(ticks, len(self._targets))
+        fed = min(ticks, len(self._queued)) if engaged else 0
         if fed:
-            self._held = (int(self._targets[fed - 1]), int(self._loads[fed - 1]))
-        assert self._held is not None  # noqa: S101
-        targets = np.full(ticks, self._held[0], np.int32)
-        loads = np.full(ticks, self._held[1], np.int32)
-        targets[:fed], self._targets = self._targets[:fed], self._targets[fed:]
-        loads[:fed], self._loads = self._loads[:fed], self._loads[fed:]
-        return targets, loads, fed
+            self._held = self._queued[fed - 1]
+        setpoints = np.zeros((ticks, self._queued.shape[1]), np.int32)
+        if engaged and self._held is not None:
+            setpoints[fed:] = self._held
+        setpoints[:fed], self._queued = self._queued[:fed], self._queued[fed:]
+        return setpoints, fed
 
     # samples
 
     def _log(self, counts: NDArray[np.int32], status: NDArray[np.uint16]) -> None:
         """Let the clock go on and queue the samples of a block."""
         ticks = len(counts)
-        ticks_us = (self._next_tick_us + TICK_US * np.arange(ticks, dtype=np.int64)) % 2**32
+        tick_us = self._profile.tick_us
+        ticks_us = (self._next_tick_us + tick_us * np.arange(ticks, dtype=np.int64)) % 2**32
         self._now_us = int(ticks_us[-1])
-        self._next_tick_us = (self._now_us + TICK_US) % 2**32
+        self._next_tick_us = (self._now_us + tick_us) % 2**32
         if not self._streaming:
             return
-        fitting = min(ticks, (TRANSMIT_CAPACITY - len(self._out)) // SAMPLE_WIRE)
-        samples = np.empty(fitting, SAMPLE_DTYPE)
+        on_wire = self._profile.sample.itemsize + FRAME_OVERHEAD
+        fitting = min(ticks, (TRANSMIT_CAPACITY - len(self._out)) // on_wire)
+        samples = self._logic.samples(counts[:fitting])
+        saturated = self._logic.saturated(counts[:fitting])
         samples["version"] = protocol.VERSION
         samples["kind"] = Kind.SAMPLE
-        samples["status"] = status[:fitting] | _saturation(counts[:fitting])
+        samples["status"] = status[:fitting]
+        samples["status"][saturated] |= np.uint16(STATUS_SATURATED)
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]
-        samples["target"] = counts[:fitting, TARGET]
-        within = np.clip(counts[:fitting, : LOAD_MA + 1], _LOWEST, _HIGHEST)
-        for column, name in enumerate(_COLUMNS):
-            samples[name] = within[:, column]
         samples["dropped"] = self._dropped
         self._sequence = (self._sequence + ticks) % 2**32
         self._dropped = (self._dropped + ticks - fitting) % 2**16
         if fitting:
             self._out += encode_frames(samples.view(np.uint8).reshape(fitting, -1))
-
-
-_COLUMNS = (
-    "motor",
-    "spindle",
-    "jaw",
-    "proximal",
-    "distal",
-    "current",
-    "fsr",
-    "command_e4",
-    "load_ma",
-)
-_RANGES = [np.iinfo(SAMPLE_DTYPE[name]) for name in _COLUMNS]
-_LOWEST = np.array([bounds.min for bounds in _RANGES])
-_HIGHEST = np.array([bounds.max for bounds in _RANGES])
-
-
-def _saturation(counts: NDArray[np.int32]) -> NDArray[np.uint16]:
-    """Return the saturated bit of each row: any converter at its limit."""
-    signed = counts[:, PROXIMAL : CURRENT + 1]
-    saturated = ((signed <= INT16_MIN) | (signed >= INT16_MAX)).any(axis=1)
-    saturated |= counts[:, FSR] >= FSR_MAX
-    return np.where(saturated, STATUS_SATURATED, 0).astype(np.uint16)
 
 
 def _reason_of_refusal(payload: bytes) -> Result:

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from drivers.errors import DriverError
-from drivers.teensy.protocol import TICK_US
+from drivers.teensy.profile import Profile
+from drivers.teensy.reference import REFERENCE
 
 _LIBRARY = Path(__file__).parents[2] / "firmware" / "build" / "librig_firmware.so"
 _TRANSMIT_SIZE = 65536
@@ -18,17 +19,19 @@ class FirmwareBench(Protocol):
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
-        """Run ticks of 1 ms with a board in the loop.
+        """Run ticks with a board in the loop.
 
-        Each tick: sample the inputs, call the board, move the physics 1 ms with what it gave.
+        Each tick: sample the inputs, call the board, move the physics a tick with what it gave.
 
         Args:
             ticks: Number of ticks.
             tick_address: Address of `void tick(void *board, uint32_t tick_us,
-                const int32_t *inputs, int32_t *outputs)`; inputs are motor, spindle, jaw, proximal,
-                distal, current and fsr counts, outputs are command_e4 and load_ma.
+                const int32_t *inputs, int32_t *outputs)`. On the reference rig inputs are motor,
+                spindle, jaw, proximal, distal, current and fsr counts, outputs command_e4 and
+                load_ma; on the grasper three motor, three current and three force counts, and
+                three command_e4.
             board_address: First argument of that function.
-            tick_us: Device clock at the first tick; 1000 more each tick, modulo 2^32.
+            tick_us: Device clock at the first tick; a period more each tick, modulo 2^32.
         """
         ...
 
@@ -50,6 +53,7 @@ class FirmwareBoard:
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         library: The shared library; the built one when None.
+        profile: What the board samples and moves.
 
     Raises:
         FirmwareMissingError: There is no library.
@@ -61,6 +65,7 @@ class FirmwareBoard:
         serial: str = "SIM-0001",
         start_tick_us: int = 0,
         library: Path | None = None,
+        profile: Profile = REFERENCE,
     ) -> None:
         path = library or firmware_library()
         if path is None or not path.is_file():
@@ -71,8 +76,9 @@ class FirmwareBoard:
             )
         self._bench = bench
         self._next_tick_us = start_tick_us
+        self._tick_us = profile.tick_us
         self._functions = _load(path)
-        self._handle = self._functions.rig_board_create(serial.encode())
+        self._handle = self._functions.rig_board_create(profile.name.encode(), serial.encode())
         if not self._handle:
             raise MemoryError("no memory for a firmware board")
         self._release = weakref.finalize(self, self._functions.rig_board_destroy, self._handle)
@@ -89,9 +95,9 @@ class FirmwareBoard:
         self._functions.rig_board_receive(self._handle, data, len(data))
 
     def advance(self, ticks: int) -> None:
-        """Let `ticks` milliseconds of board time pass."""
+        """Let that many of the profile's ticks pass."""
         self._bench.advance_with_board(ticks, self._tick_address, self._handle, self._next_tick_us)
-        self._next_tick_us = (self._next_tick_us + ticks * TICK_US) % 2**32
+        self._next_tick_us = (self._next_tick_us + ticks * self._tick_us) % 2**32
 
     def transmit(self) -> bytes:
         """Give the bytes that wait for the host."""
@@ -102,7 +108,7 @@ class FirmwareBoard:
 def _load(path: Path) -> ctypes.CDLL:
     """Load the library and declare its functions."""
     functions = ctypes.CDLL(str(path))
-    functions.rig_board_create.argtypes = [ctypes.c_char_p]
+    functions.rig_board_create.argtypes = [ctypes.c_char_p, ctypes.c_char_p]
     functions.rig_board_create.restype = ctypes.c_void_p
     functions.rig_board_destroy.argtypes = [ctypes.c_void_p]
     functions.rig_board_destroy.restype = None

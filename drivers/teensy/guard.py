@@ -1,8 +1,8 @@
 """What an armed board holds against every sample, and what a tick then gives the motors.
 
-The twin of `firmware/core/guard.hpp` and of the middle of `Board::tick`: the same whole-number
+The twin of `check` and `drive` of `firmware/core/profile_reference.hpp`: the same whole-number
 operations in the same order, so that fake and firmware answer with the same bytes. Counts and
-ticks throughout; what a limit means is said in `drivers.teensy.protocol.Limits`.
+ticks throughout; what a limit means is said in `drivers.teensy.reference.Limits`.
 """
 
 from dataclasses import dataclass, field
@@ -13,19 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.teensy.control import LIMIT, control_tick, new_state
-from drivers.teensy.protocol import (
-    LIMIT_NAMES,
-    MISSING,
-    STATUS_ARMED,
-    STATUS_HOLDING,
-    STATUS_LIMIT_TRIPPED,
-    STATUS_WATCHDOG_TRIPPED,
-    TICK_US,
-    TRIP_SHIFT,
-    Limits,
-    SafeState,
-    Trip,
+from drivers.teensy.logic import BoardLogic
+from drivers.teensy.protocol import GAIN_NAMES, MISSING, STATUS_ARMED, STATUS_HOLDING, Trip
+from drivers.teensy.reference import LIMIT_NAMES, REFERENCE, TICK_US, Limits
+from drivers.teensy.watches import (
+    BOARD_PLACES,
+    ENGAGED,
+    HOLD_COMMAND,
+    LAST_COUNT,
+    MAX_STALL,
+    MOTOR_PLACES,
+    NO_CHANNEL,
+    NONE,
+    PRIMED,
+    SATURATED_TICKS,
+    STALL_ANCHOR,
+    STALL_TICKS,
+    STATE,
+    TICKS,
+    TRIP_CHANNEL,
+    judge_by_time,
+    motor_crossing,
+    note_trip,
+    sensor_crossing,
+    silence,
 )
+from drivers.teensy.watches import LAST_MOTOR as LAST_MOTOR_OF_WATCH
 
 (
     MOTOR,
@@ -43,29 +56,12 @@ from drivers.teensy.protocol import (
 """Columns of a tick's row: seven inputs, what the motors got, the target and the board's state."""
 COLUMNS = 11
 
-(
-    STATE,
-    ENGAGED,
-    SILENT_US,
-    PRIMED,
-    LAST_MOTOR,
-    FAST_TICKS,
-    HEAT,
-    HOT_TICKS,
-    STALL_ANCHOR,
-    STALL_TICKS,
-    SATURATED_TICKS,
-    HOLD_TARGET,
-    TICKS,
-    TRIP_CODE,
-    TRIP_CHANNEL,
-    TRIP_VALUE,
-    TRIP_LIMIT,
-    TRIP_LATE_US,
-    TRIP_TICK,
-) = range(19)
-LAST_COUNT, SAME_TICKS = 19, 22
-"""Places in the guard's state, shape (25,), int64."""
+HOLD_TARGET = BOARD_PLACES
+MOTOR_WATCH = BOARD_PLACES + 1
+SENSOR_WATCH = MOTOR_WATCH + MOTOR_PLACES
+GUARD_PLACES = SENSOR_WATCH + 1 + 2 * 3
+"""Places in the guard's state, int64, behind those of every profile."""
+LAST_MOTOR = MOTOR_WATCH + LAST_MOTOR_OF_WATCH
 
 _AT = {name: place for place, name in enumerate(LIMIT_NAMES)}
 MAX_CURRENT, MAX_PROXIMAL, MAX_DISTAL = (
@@ -75,38 +71,21 @@ MAX_CURRENT, MAX_PROXIMAL, MAX_DISTAL = (
 )
 MIN_SPINDLE, MAX_SPINDLE = _AT["min_spindle"], _AT["max_spindle"]
 MIN_JAW, MAX_JAW = _AT["min_jaw"], _AT["max_jaw"]
-MAX_MOTOR_STEP, CONTINUOUS, I2T = _AT["max_motor_step"], _AT["continuous_current"], _AT["i2t"]
-STALL_CURRENT, STALL_MOTION = _AT["stall_current"], _AT["stall_motion"]
-MAX_STALL, MAX_SATURATED, MAX_STALE = (
-    _AT["stall_ticks"],
-    _AT["saturated_ticks"],
-    _AT["stale_ticks"],
-)
-WATCHDOG_US, SAFE_STATE, HOLD_COMMAND = (
-    _AT["watchdog_us"],
-    _AT["safe_state"],
-    _AT["hold_command_e4"],
-)
-OVER_SPEED_TICKS = 3
-NO_CHANNEL = 255
-_NONE = int(Trip.NONE)
-_HOST_SILENT = int(Trip.HOST_SILENT)
+MOTOR_LIMITS, CHOICE = _AT["max_motor_step"], _AT["stall_ticks"]
 _OVER_CURRENT = int(Trip.OVER_CURRENT)
 _PROXIMAL_TORQUE = int(Trip.PROXIMAL_TORQUE)
 _DISTAL_TORQUE = int(Trip.DISTAL_TORQUE)
 _SPINDLE_TRAVEL = int(Trip.SPINDLE_TRAVEL)
 _JAW_TRAVEL = int(Trip.JAW_TRAVEL)
-_OVER_SPEED = int(Trip.OVER_SPEED)
-_OVERHEATED = int(Trip.OVERHEATED)
-_STALLED = int(Trip.STALLED)
-_SENSOR_SATURATED = int(Trip.SENSOR_SATURATED)
-_SENSOR_STALE = int(Trip.SENSOR_STALE)
 _SENSOR_MISSING = int(Trip.SENSOR_MISSING)
-_HOLD = int(SafeState.HOLD)
+INT16 = (-(2**15), 2**15 - 1)
+FSR_MAX = 4095
 
 
-def _whole_zeros() -> NDArray[np.int64]:
-    return np.zeros(SAME_TICKS + 3, np.int64)
+def _untripped() -> NDArray[np.int64]:
+    guard = np.zeros(GUARD_PLACES, np.int64)
+    guard[TRIP_CHANNEL] = NO_CHANNEL
+    return guard
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,10 +99,10 @@ class Drive:
         gains: Gains of the controller, shape (5,); holding lowers its limit.
     """
 
-    guard: NDArray[np.int64] = field(default_factory=_whole_zeros)
+    guard: NDArray[np.int64] = field(default_factory=_untripped)
     limits: NDArray[np.int64] = field(default_factory=lambda: Limits.widest().as_array())
     control_state: NDArray[np.float64] = field(default_factory=new_state)
-    gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros(5))
+    gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(GAIN_NAMES)))
 
     @classmethod
     def armed(cls, gains: Any, limits: Limits | None = None, engaged: bool = True) -> "Drive":
@@ -161,24 +140,13 @@ def drive_tick(
         control_state: State of the controller.
         gains: Gains of the controller.
     """
-    if guard[STATE] & STATUS_ARMED and guard[SILENT_US] > 0:
-        silent_us = guard[SILENT_US]
-        _trip(
-            guard,
-            limits,
-            gains,
-            row,
-            _HOST_SILENT,
-            NO_CHANNEL,
-            silent_us,
-            limits[WATCHDOG_US],
-            silent_us,
-        )
-    guard[SILENT_US] = 0
+    crossing = silence(guard, limits)
+    if crossing[0] != NONE:
+        _trip(guard, limits, gains, row, crossing)
     if guard[STATE] & (STATUS_ARMED | STATUS_HOLDING):
-        code, channel, value, limit, late_us = _check(guard, limits, row)
-        if code != _NONE:
-            _trip(guard, limits, gains, row, code, channel, value, limit, late_us)
+        crossing = _check(guard, limits, row)
+        if crossing[0] != NONE:
+            _trip(guard, limits, gains, row, crossing)
     row[COMMAND_E4] = 0
     row[LOAD_MA] = 0
     row[TARGET] = row[SPINDLE]
@@ -195,30 +163,15 @@ def drive_tick(
 
 
 @numba.njit(cache=True)
-def _trip(guard, limits, gains, row, code, channel, value, limit, late_us):  # type: ignore[no-untyped-def]
-    """Go to the safe state; the first cause stays."""
-    holdable = code in (_HOST_SILENT, _STALLED, _SENSOR_SATURATED, _SENSOR_STALE)
-    in_force = guard[STATE] & STATUS_ARMED and guard[ENGAGED]
-    state = guard[STATE] & ~(STATUS_ARMED | STATUS_HOLDING)
-    if guard[TRIP_CODE] == _NONE:
-        guard[TRIP_CODE] = code
-        guard[TRIP_CHANNEL] = channel
-        guard[TRIP_VALUE] = value
-        guard[TRIP_LIMIT] = limit
-        guard[TRIP_LATE_US] = late_us
-        guard[TRIP_TICK] = guard[TICKS]
-        state |= code << TRIP_SHIFT
-        state |= STATUS_WATCHDOG_TRIPPED if code == _HOST_SILENT else STATUS_LIMIT_TRIPPED
-    if holdable and in_force and limits[SAFE_STATE] == _HOLD:
-        state |= STATUS_HOLDING
+def _trip(guard, limits, gains, row, crossing):  # type: ignore[no-untyped-def]
+    """Go to the safe state."""
+    if note_trip(guard, limits, crossing):
         guard[HOLD_TARGET] = row[SPINDLE]
         gains[LIMIT] = min(gains[LIMIT], float(limits[HOLD_COMMAND]))
-        guard[STALL_TICKS] = 0
-        guard[SATURATED_TICKS] = 0
+        guard[MOTOR_WATCH + STALL_TICKS] = 0
+        guard[SENSOR_WATCH + SATURATED_TICKS] = 0
         for k in range(3):
-            guard[SAME_TICKS + k] = 0
-    guard[STATE] = state
-    guard[ENGAGED] = 0
+            guard[SENSOR_WATCH + LAST_COUNT + 3 + k] = 0
 
 
 @numba.njit(cache=True)
@@ -231,9 +184,9 @@ def _check(guard, limits, row):  # type: ignore[no-untyped-def]
     if not guard[PRIMED]:
         guard[PRIMED] = 1
         guard[LAST_MOTOR] = motor
-        guard[STALL_ANCHOR] = motor
+        guard[MOTOR_WATCH + STALL_ANCHOR] = motor
         for k in range(3):
-            guard[LAST_COUNT + k] = row[PROXIMAL + k]
+            guard[SENSOR_WATCH + LAST_COUNT + k] = row[PROXIMAL + k]
     if abs(current) > limits[MAX_CURRENT]:
         return _OVER_CURRENT, CURRENT, current, limits[MAX_CURRENT], 0
     proximal, distal = np.int64(row[PROXIMAL]), np.int64(row[DISTAL])
@@ -250,54 +203,34 @@ def _check(guard, limits, row):  # type: ignore[no-untyped-def]
         return _JAW_TRAVEL, JAW, jaw, limits[MIN_JAW], 0
     if jaw > limits[MAX_JAW]:
         return _JAW_TRAVEL, JAW, jaw, limits[MAX_JAW], 0
-    # motion
-    step = motor - guard[LAST_MOTOR]
-    guard[LAST_MOTOR] = motor
-    guard[FAST_TICKS] = guard[FAST_TICKS] + 1 if abs(step) > limits[MAX_MOTOR_STEP] else 0
-    if guard[FAST_TICKS] >= OVER_SPEED_TICKS:
-        late_us = (guard[FAST_TICKS] - 1) * TICK_US
-        return _OVER_SPEED, MOTOR, step, limits[MAX_MOTOR_STEP], late_us
-    heat = guard[HEAT] + current * current - limits[CONTINUOUS] * limits[CONTINUOUS]
-    guard[HEAT] = max(heat, 0)
-    guard[HOT_TICKS] = guard[HOT_TICKS] + 1 if guard[HEAT] > 0 else 0
-    if guard[HEAT] > limits[I2T] * 1000:
-        return _OVERHEATED, CURRENT, guard[HEAT] // 1000, limits[I2T], guard[HOT_TICKS] * TICK_US
-    still = abs(motor - guard[STALL_ANCHOR]) <= limits[STALL_MOTION]
-    if still and abs(current) >= limits[STALL_CURRENT]:
-        guard[STALL_TICKS] += 1
-    else:
-        guard[STALL_ANCHOR] = motor
-        guard[STALL_TICKS] = 0
-    if guard[STALL_TICKS] >= limits[MAX_STALL]:
-        return _STALLED, MOTOR, current, limits[STALL_CURRENT], guard[STALL_TICKS] * TICK_US
-    # sensors
-    saturated = NO_CHANNEL
-    for channel in range(CURRENT, JAW, -1):
-        if row[channel] <= -32768 or row[channel] >= 32767:
-            saturated = channel
-    guard[SATURATED_TICKS] = guard[SATURATED_TICKS] + 1 if saturated != NO_CHANNEL else 0
-    if guard[SATURATED_TICKS] >= limits[MAX_SATURATED]:
-        late_us = guard[SATURATED_TICKS] * TICK_US
-        count = np.int64(row[saturated])
-        return _SENSOR_SATURATED, saturated, count, limits[MAX_SATURATED], late_us
-    for k in range(3):
-        count = np.int64(row[PROXIMAL + k])
-        same = guard[SAME_TICKS + k] + 1 if count == guard[LAST_COUNT + k] else 0
-        guard[SAME_TICKS + k] = same
-        guard[LAST_COUNT + k] = count
-        if same >= limits[MAX_STALE]:
-            return _SENSOR_STALE, PROXIMAL + k, count, limits[MAX_STALE], same * TICK_US
-    return _NONE, NO_CHANNEL, 0, 0, 0
+    crossing = motor_crossing(
+        guard[MOTOR_WATCH:SENSOR_WATCH],
+        limits[MOTOR_LIMITS:CHOICE],
+        limits[MAX_STALL],
+        TICK_US,
+        motor,
+        current,
+        MOTOR,
+        CURRENT,
+    )
+    if crossing[0] != NONE:
+        return crossing
+    converted = row[PROXIMAL : CURRENT + 1]
+    return sensor_crossing(guard[SENSOR_WATCH:], limits, TICK_US, converted, PROXIMAL, *INT16)
 
 
 @numba.njit(cache=True)
 def first_crossing(
-    rows: NDArray[np.int32], guard: NDArray[np.int64], limits: NDArray[np.int64]
+    rows: NDArray[np.int32],
+    ticks: NDArray[np.float64],
+    guard: NDArray[np.int64],
+    limits: NDArray[np.int64],
 ) -> tuple[int, int, int, int, int, int]:
     """Hold the limits against rows of inputs, for a host that repeats what the board does.
 
     Args:
         rows: Inputs as counts, shape (n, at least 6).
+        ticks: Ticks between each and the one before it, more where samples were lost or late.
         guard: State of the guard, carried from call to call.
         limits: `Limits.as_array`.
 
@@ -306,10 +239,12 @@ def first_crossing(
         when there is none.
     """
     for k in range(len(rows)):
+        if guard[PRIMED]:
+            judge_by_time(guard[MOTOR_WATCH:SENSOR_WATCH], np.int64(rows[k, MOTOR]), ticks[k])
         code, channel, value, limit, late_us = _check(guard, limits, rows[k])
-        if code != _NONE:
+        if code != NONE:
             return k, code, channel, value, limit, late_us
-    return len(rows), _NONE, NO_CHANNEL, 0, 0, 0
+    return len(rows), NONE, NO_CHANNEL, 0, 0, 0
 
 
 @numba.njit(cache=True)
@@ -325,3 +260,31 @@ def run_ticks(
     """Do a tick behind every row, for benches whose inputs do not follow the motors."""
     for k in range(len(rows)):
         drive_tick(rows[k], targets[k], loads_ma[k], guard, limits, control_state, gains)
+
+
+def _allows(setpoints: NDArray[np.int64], limits: NDArray[np.int64]) -> bool:
+    target, load = setpoints.T
+    return bool(
+        (np.abs(load) <= limits[_AT["max_load_ma"]]).all()
+        and (target >= limits[MIN_SPINDLE]).all()
+        and (target <= limits[MAX_SPINDLE]).all()
+    )
+
+
+REFERENCE_LOGIC = BoardLogic(
+    profile=REFERENCE,
+    idle=Drive,
+    armed=lambda gains, limits: Drive.armed(gains[0], Limits(*limits), engaged=False),
+    limits_are_valid=lambda limits: Limits(*limits).valid,
+    allows=_allows,
+    columns={
+        name: column
+        for column, name in enumerate(
+            ("motor", "spindle", "jaw", "proximal", "distal", "current", "fsr")
+        )
+    }
+    | {"command_e4": COMMAND_E4, "load_ma": LOAD_MA, "target": TARGET},
+    status_column=STATUS,
+    converted={PROXIMAL: INT16, DISTAL: INT16, CURRENT: INT16, FSR: (-(2**32), FSR_MAX)},
+)
+"""What `drivers.teensy.fake.TeensyFake` does a tick on the reference rig."""

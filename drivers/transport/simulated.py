@@ -14,17 +14,18 @@ from typing import Protocol
 from drivers.errors import LinkLostError
 
 TICK_S = 1e-3
+"""A tick of a board, where no other is said."""
 
 
 class Board(Protocol):
-    """What speaks bytes and lives by ticks of 1 ms: a fake or the firmware itself."""
+    """What speaks bytes and lives by ticks: a fake or the firmware itself."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""
         ...
 
     def advance(self, ticks: int) -> None:
-        """Let `ticks` milliseconds of board time pass."""
+        """Let that many of its ticks pass."""
         ...
 
     def transmit(self) -> bytes:
@@ -42,6 +43,7 @@ class SimulatedTransport:
         pace: Virtual seconds a real second, None for as fast as possible.
         wait: Waits real seconds; for tests of the pace.
         clock: Real clock, seconds; for tests of the pace.
+        tick_s: A tick of the board, s.
     """
 
     def __init__(
@@ -52,10 +54,12 @@ class SimulatedTransport:
         pace: float | None = None,
         wait: Callable[[float], None] = sleep,
         clock: Callable[[], float] = monotonic,
+        tick_s: float = TICK_S,
     ) -> None:
         self.board = board
+        self._tick_s = tick_s
         self._url = url
-        self._step_ticks = max(1, round(step_s / TICK_S))
+        self._step_ticks = max(1, round(step_s / tick_s))
         self._pace = pace
         self._wait = wait
         self._clock = clock
@@ -71,13 +75,13 @@ class SimulatedTransport:
     @property
     def now_s(self) -> float:
         """Virtual seconds since the board was made."""
-        return self._ticks * TICK_S
+        return self._ticks * self._tick_s
 
     def read(self, timeout_s: float) -> bytes:
         """Return the board's bytes, advancing it until there are some or `timeout_s` has passed."""
         self._require_link()
         # a wait, however short, lets time pass: a caller that waits for a moment must get there
-        remaining = max(1, round(timeout_s / TICK_S)) if timeout_s > 0 else 0
+        remaining = max(1, round(timeout_s / self._tick_s)) if timeout_s > 0 else 0
         data = self.board.transmit()
         while not data and remaining > 0:
             ticks = min(self._step_ticks, remaining)
@@ -107,6 +111,6 @@ class SimulatedTransport:
         if self._paced_from is None:
             self._paced_from = (self._clock(), self._ticks)
         began_s, ticks = self._paced_from
-        late_s = self._clock() - began_s - (self._ticks - ticks) * TICK_S / self._pace
+        late_s = self._clock() - began_s - (self._ticks - ticks) * self._tick_s / self._pace
         if late_s < 0:
             self._wait(-late_s)

@@ -16,6 +16,7 @@ from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
 SAMPLES = 500
+BESIDE = 100
 DEPENDENT = 1e-9
 """Share of its own norm below which what is left of a column is rounding."""
 
@@ -66,7 +67,8 @@ def base_of(arm: Arm, seed: int = 0) -> Base:
 def _base(stacked: FloatArray, all_names: tuple[str, ...]) -> Base:
     norms = np.linalg.norm(stacked, axis=0)
     order = np.array(sorted(range(len(all_names)), key=lambda k: _rank(all_names[k])))
-    scaled = stacked[:, order] / np.where(norms[order] > 0, norms[order], 1.0)
+    norms = np.where(norms > DEPENDENT * norms.max(), norms, np.inf)  # others act on no joint
+    scaled = stacked[:, order] / norms[order]
     independent = _independent(scaled)
     kept, rest = np.sort(order[independent]), np.sort(order[~independent])
     relations = np.linalg.lstsq(stacked[:, kept], stacked[:, rest], rcond=None)[0]
@@ -77,7 +79,7 @@ def _base(stacked: FloatArray, all_names: tuple[str, ...]) -> Base:
 
 
 def _rank(name: str) -> tuple[int, int]:
-    link = int(name[-1])
+    link = int(name[-1]) if name[-1].isdigit() else BESIDE  # bodies of a loop come last
     kind = 0 if name.startswith(("F", "Ke", "tau0")) else 1 if name.startswith("Ia") else 2
     return kind, link
 

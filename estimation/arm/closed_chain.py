@@ -13,28 +13,11 @@ import numpy as np
 
 from estimation.arm.kinematics import ArmError, pinocchio
 from estimation.arm.motion import Motion
-from estimation.arm.regressor import LINK
-from estimation.arm.tables import DhRow
+from estimation.arm.recursion import LINK, Tree, fill_links
+from estimation.arm.tables import Body, DhRow
 from estimation.recording import FloatArray
 
 FRICTION = ("fc", "fv")
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """One body of the spanning tree, on a revolute joint about its z axis.
-
-    Attributes:
-        name: What it is called.
-        parent: Number of the body it hangs on, from 1; 0 is the base.
-        row: Where its joint sits on that body.
-        closure: How far its joint turns for a turn of each actuated joint: its row of G.
-    """
-
-    name: str
-    parent: int
-    row: DhRow
-    closure: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,14 +97,18 @@ def closed_regressor(chain: ClosedChain, motion: Motion, sign_rad_s: float) -> F
             f"It has {closure.shape[1]} actuated joints; every value must be finite.",
         )
     position, velocity, acceleration = (x @ closure.T for x in state)
-    model, compute = tree(chain), pinocchio().computeJointTorqueRegressor
-    data = model.createData()
-    rows = zip(position, velocity, acceleration, strict=True)
-    links = np.stack([closure.T @ compute(model, data, q, v, a) for q, v, a in rows])
+    links = np.zeros((len(position), len(closure), len(LINK) * len(closure)))
+    to = np.arange(links.shape[2], dtype=np.int64).reshape(len(closure), len(LINK))
+    fill_links(_tree(chain), (position, velocity, acceleration), to, links)
     frictions = [
         values[:, None, :] * closure.T for values in (np.tanh(velocity / sign_rad_s), velocity)
     ]
-    return np.concatenate([links, *frictions], axis=2)
+    return np.concatenate([closure.T @ links, *frictions], axis=2)
+
+
+@lru_cache(maxsize=8)
+def _tree(chain: ClosedChain) -> Tree:
+    return Tree.of(chain.bodies, chain.gravity_m_s2)
 
 
 def closed_jacobians(chain: ClosedChain, position: FloatArray) -> FloatArray:

@@ -1,14 +1,13 @@
-"""Excitation: finite Fourier series that tell an arm's parameters, within limits at every instant.
+"""Finite Fourier series that tell an arm's parameters, with bounds that hold at every instant.
 
 Equation 2.14 of G. A. Piqué's thesis, five harmonics of 0.1 Hz; the condition number of the
-regressor with columns of unit length (equation 2.15) is made small. Every candidate is scaled into
-the limits before it is judged, so the search needs no constraints.
+regressor with columns of unit length (equation 2.15) is what tells a good one; the searches are in
+`estimation.arm.design`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from estimation.arm.base import base_of
 from estimation.arm.motion import Motion
@@ -76,6 +75,28 @@ def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
     return np.stack(rows)
 
 
+def limits_of(arm: Arm) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the joints' lower and upper ends and their speeds, shape (joints,) each."""
+    lower, upper, speed = (
+        np.array([getattr(joint, name) for joint in arm.joints])
+        for name in ("lower", "upper", "speed")
+    )
+    return lower, upper, speed
+
+
+def reached(arm: Arm, excitation: Excitation) -> float:
+    """Return a bound that holds at every instant of the largest share of any limit used.
+
+    Up to 1 no limit of position, velocity or acceleration is passed, whatever the instant.
+    """
+    lower, upper, speed = limits_of(arm)
+    off_centre = np.abs(excitation.middle - (lower + upper) / 2)
+    moved = bounds(excitation.sine, excitation.cosine)
+    moved[0] += off_centre
+    limits = np.stack([(upper - lower) / 2, speed, ACCELERATION_PER_SPEED * speed])
+    return float((moved / limits).max())
+
+
 def fitted(arm: Arm, raw: FloatArray) -> Excitation:
     """Scale numbers without limits into an excitation within the arm's limits.
 
@@ -87,15 +108,24 @@ def fitted(arm: Arm, raw: FloatArray) -> Excitation:
     joints = len(arm.joints)
     table = raw.reshape(2 * HARMONICS + 1, joints)
     sine, cosine = table[:HARMONICS], table[HARMONICS:-1]
-    lower, upper, speed = (
-        np.array([getattr(joint, name) for joint in arm.joints])
-        for name in ("lower", "upper", "speed")
-    )
+    lower, upper, speed = limits_of(arm)
     half = (upper - lower) / 2
     off_centre = 0.5 * np.tanh(table[-1]) * half
     limits = np.stack([half - np.abs(off_centre), speed, ACCELERATION_PER_SPEED * speed])
     factor = (limits / np.maximum(bounds(sine, cosine), 1e-12)).min(axis=0)
     return Excitation((lower + upper) / 2 + off_centre, factor * sine, factor * cosine)
+
+
+def numbers_of(arm: Arm, excitation: Excitation) -> FloatArray:
+    """Return the numbers that `fitted` makes an excitation of the same form from.
+
+    A middle more than a quarter of the range off the centre comes nearer to it.
+    """
+    lower, upper, _ = limits_of(arm)
+    off_centre = (excitation.middle - (lower + upper) / 2) / (0.25 * (upper - lower))
+    share = np.arctanh(np.clip(off_centre, -0.99, 0.99))
+    raw: FloatArray = np.concatenate([excitation.sine, excitation.cosine, share[None]]).ravel()
+    return raw
 
 
 def condition(arm: Arm, excitation: Excitation) -> float:
@@ -115,31 +145,3 @@ def start(arm: Arm, seed: int) -> FloatArray:
     shape = (HARMONICS, len(arm.joints))
     parts = [weight * rng.normal(size=shape), weight * rng.normal(size=shape)]
     return np.concatenate([*parts, 0.3 * rng.normal(size=(1, shape[1]))]).ravel()
-
-
-def by_active_set(arm: Arm, first: FloatArray, evaluations: int) -> tuple[FloatArray, float]:
-    """Improve a start by sequential quadratic programming, the thesis' kind of search.
-
-    Args:
-        arm: The arm.
-        first: The start.
-        evaluations: Condition numbers it may take, gradients by differences included.
-
-    Returns:
-        The numbers for `fitted`, and their condition number.
-    """
-    rounds = max(1, evaluations // (len(first) + 2))
-
-    def logarithm(raw: FloatArray) -> float:
-        return float(np.log(condition(arm, fitted(arm, raw))))
-
-    found = minimize(
-        logarithm, first.ravel(), method="SLSQP", tol=1e-6, options={"maxiter": rounds}
-    )
-    return found.x, float(np.exp(found.fun))
-
-
-def designed(arm: Arm, seeds: int, evaluations: int) -> Excitation:
-    """Return the excitation of the lowest condition number of several starts."""
-    found = [by_active_set(arm, start(arm, seed), evaluations) for seed in range(seeds)]
-    return fitted(arm, min(found, key=lambda each: each[1])[0])

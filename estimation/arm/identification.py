@@ -20,13 +20,20 @@ class Fit:
 
     Attributes:
         values: Shape (parameters,), in the units of torque over column.
-        errors: Standard errors, same shape. They know noise only, not what the model lacks.
+        covariance: Of the values, shape (parameters, parameters).
         condition: Condition number of the weighted columns, each scaled to unit length.
     """
 
     values: FloatArray
-    errors: FloatArray
+    covariance: FloatArray
     condition: float
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard errors, shape (parameters,). They know noise only, not what the model lacks."""
+        # rounding may leave a damped parameter's variance just below zero
+        spread: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return spread
 
 
 def smoothed(
@@ -99,8 +106,8 @@ def fit(
     noise = left.sum(axis=0) / max(1.0, len(left) - len(values) / joints) / independent_share
     by_joint = table.reshape(-1, joints, len(values))
     spread = np.einsum("njp,j,njr->pr", by_joint, noise, by_joint, optimize=True)
-    variance = np.diag(inverse @ spread @ inverse)
-    return Fit(values / length, np.sqrt(variance) / length, float(singular[0] / singular[-1]))
+    covariance = inverse @ spread @ inverse / np.outer(length, length)
+    return Fit(values / length, covariance, float(singular[0] / singular[-1]))
 
 
 def damped_around(

@@ -11,8 +11,62 @@ from estimation.recording import FloatArray, Recording
 LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
 """The thesis' filter at its data's rate: order 3, 0.1 of half of 100 Hz."""
 
-_REVOLUTE = ("angle_rad", "velocity_rad_s", "torque_n_m")
-_PRISMATIC = ("position_m", "velocity_m_s", "force_n")
+FINE = LowPass(cutoff_hz=20.0, order=3)
+"""Filter of the motion that columns are made from before they are filtered as the torque is."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointNames:
+    """The channels of one joint.
+
+    Attributes:
+        number: Its number, from 1.
+        prismatic: Whether it slides.
+    """
+
+    number: int
+    prismatic: bool
+
+    def _named(self, angular: str, linear: str) -> str:
+        return f"joint_{self.number}_{linear if self.prismatic else angular}"
+
+    @property
+    def position(self) -> str:
+        """Its angle or position."""
+        return self._named("angle_rad", "position_m")
+
+    @property
+    def velocity(self) -> str:
+        """Its velocity."""
+        return self._named("velocity_rad_s", "velocity_m_s")
+
+    @property
+    def acceleration(self) -> str:
+        """Its acceleration, derived."""
+        return self._named("acceleration_rad_s2", "acceleration_m_s2")
+
+    @property
+    def torque(self) -> str:
+        """Its torque or force."""
+        return self._named("torque_n_m", "force_n")
+
+    @property
+    def links(self) -> str:
+        """What the arm's links need of it, computed."""
+        return self._named("links_torque_n_m", "links_force_n")
+
+    def links_correction(self, number: int) -> str:
+        """Return the torque of a change of the links' parameters, computed."""
+        return self._named(f"links_{number}_torque_n_m", f"links_{number}_force_n")
+
+    @property
+    def direction(self) -> str:
+        """Its smooth sign of velocity, computed before the torque's filter."""
+        return f"joint_{self.number}_direction_ratio"
+
+    def drive(self, number: int) -> str:
+        """Return the angle of a motor behind a coupling that this joint feels, computed."""
+        return f"joint_{self.number}_drive_{number}_angle_rad"
 
 
 @dataclass(frozen=True)
@@ -35,6 +89,17 @@ class Motion:
         return len(self.position)
 
 
+def joint_names(recording: Recording) -> list[JointNames]:
+    """Return the channels of a recording's joints, numbered from 1; none where it holds no arm."""
+    found: list[JointNames] = []
+    while True:
+        both = [JointNames(len(found) + 1, prismatic) for prismatic in (False, True)]
+        there = [names for names in both if names.position in recording.columns]
+        if not there:
+            return found
+        found.append(there[0])
+
+
 def joint_channels(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return positions, velocities and torques of a recording's joints, shape (n, joints) each.
 
@@ -45,14 +110,10 @@ def joint_channels(recording: Recording) -> tuple[FloatArray, FloatArray, FloatA
         ArmError: There is no joint 1.
         MissingChannelError: A joint lacks one of its three channels.
     """
-    blocks = []
-    for joint in range(1, len(recording.columns) + 1):
-        for units in (_REVOLUTE, _PRISMATIC):
-            if f"joint_{joint}_{units[0]}" in recording.columns:
-                blocks.append([recording[f"joint_{joint}_{unit}"] for unit in units])
-                break
-        else:
-            break
+    blocks = [
+        [recording[name] for name in (names.position, names.velocity, names.torque)]
+        for names in joint_names(recording)
+    ]
     if not blocks:
         raise ArmError(
             f"Run {recording.name!r} holds no arm joints.",

@@ -10,7 +10,8 @@ import numpy as np
 
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import Motion
-from estimation.arm.regressor import LINK, names, regressor
+from estimation.arm.recursion import LINK
+from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 

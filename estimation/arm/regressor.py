@@ -1,19 +1,19 @@
 """Regressor of an arm: its joint torques as columns times parameters, tau = Y delta.
 
-Links by Pinocchio's torque regressor (parameters about the joint's origin: mass, first moments,
-inertia); then springs, viscous and Coulomb friction, drive inertia and offsets (equation 2.5 of
-G. A. Piqué's thesis, 2018).
+Links (parameters about the joint's origin: mass, first moments, inertia); then springs, viscous and
+Coulomb friction, drive inertia and offsets (equation 2.5 of G. A. Piqué's thesis, 2018).
 """
 
-import numpy as np
+from functools import lru_cache
 
-from estimation.arm.kinematics import ArmError, built, pinocchio
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import Motion
+from estimation.arm.recursion import COUNTING, LINK, Tree, fill_links
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
-
-LINK = ("m", "lx", "ly", "lz", "Lxx", "Lxy", "Lyy", "Lxz", "Lyz", "Lzz")
-"""A link's parameters in Pinocchio's order: kg, kg m, kg m^2; about the joint's origin."""
 
 SIGN_WIDTH = 0.005
 """Share of a joint's top speed over which Coulomb friction changes sign: tanh(velocity / width)."""
@@ -22,9 +22,7 @@ SIGN_WIDTH = 0.005
 def names(arm: Arm) -> tuple[str, ...]:
     """Return the names of the columns of `regressor`; numbers count joints from 1."""
     own = [
-        f"{parameter}{k + 1}"
-        for k, joint in enumerate(arm.joints)
-        for parameter in (LINK if joint.link == "full" else LINK[1:4])
+        f"{parameter}{body.label}" for body in arm.bodies for parameter in LINK[COUNTING[body.link]]
     ]
     own += [f"Ke{k + 1}" for k, joint in enumerate(arm.joints) if joint.spring]
     every = range(1, len(arm.joints) + 1)
@@ -55,41 +53,43 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
             f"A motion of shape {motion.position.shape} does not fit {arm.name}.",
             f"It needs {joints} joints and finite values.",
         )
+    table = np.zeros((len(q), joints, len(names(arm))))
+    to = _link_columns(arm)
+    at = int(to.max()) + 1
+    if arm.loops:
+        closure = np.array([body.closure for body in arm.bodies])
+        links = np.zeros((len(q), len(closure), at))
+        fill_links(_tree(arm), (q @ closure.T, v @ closure.T, a @ closure.T), to, links)
+        table[:, :, :at] = closure.T @ links
+    else:
+        fill_links(_tree(arm), (q, v, a), to, table)
     width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
+    own = (np.tanh(v / width), a, np.ones_like(q))
     springs = [k for k, joint in enumerate(arm.joints) if joint.spring]
-    coupled = np.zeros((len(q), joints, len(arm.viscous_pairs)))
-    for column, (row, other) in enumerate(arm.viscous_pairs):
-        coupled[:, row, column] = v[:, other]
-    return np.concatenate(
-        [
-            _links(arm, q, v, a),
-            on_own_joint(q)[:, :, springs],
-            on_own_joint(v),
-            coupled,
-            on_own_joint(np.tanh(v / width)),
-            on_own_joint(a),
-            on_own_joint(np.ones_like(q)),
-        ],
-        axis=2,
-    )
+    damped = [(k, k) for k in range(joints)]
+    for values, places in (
+        (q, [(k, k) for k in springs]),
+        (v, [*damped, *arm.viscous_pairs]),
+        *((each, damped) for each in own),
+    ):
+        for row, other in places:
+            table[:, row, at] = values[:, other]
+            at += 1
+    return table
 
 
-def on_own_joint(values: FloatArray) -> FloatArray:
-    """Return columns that act on their own joint only: (n, joints) to (n, joints, joints)."""
-    columns: FloatArray = values[:, :, None] * np.eye(values.shape[1])
-    return columns
+@lru_cache(maxsize=8)
+def _tree(arm: Arm) -> Tree:
+    return Tree.of(arm.bodies, arm.gravity_m_s2)
 
 
-def _links(arm: Arm, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
-    """Return the columns of the links' parameters that count."""
-    model, compute = built(arm), pinocchio().computeJointTorqueRegressor
-    data = model.createData()
-    full = np.empty((len(q), len(arm.joints), len(LINK) * len(arm.joints)))
-    for k in range(len(q)):
-        full[k] = compute(model, data, q[k], v[k], a[k])
-    kept = [
-        len(LINK) * k + j
-        for k, joint in enumerate(arm.joints)
-        for j in (range(len(LINK)) if joint.link == "full" else range(1, 4))
-    ]
-    return full[:, :, kept]
+@lru_cache(maxsize=8)
+def _link_columns(arm: Arm) -> NDArray[np.int64]:
+    """Return the column of each body's parameters, -1 for those that do not count."""
+    to, at = np.full((len(arm.bodies), len(LINK)), -1, np.int64), 0
+    for k, body in enumerate(arm.bodies):
+        counts = COUNTING[body.link]
+        size = len(LINK[counts])
+        to[k, counts] = np.arange(at, at + size)
+        at += size
+    return to

@@ -4,9 +4,13 @@ A row places joint i on link i - 1 (Craig's convention):
 T = RotX(alpha) TransX(a) RotZ(theta) TransZ(d), with q added to theta or, prismatic, to d.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, radians
 from typing import Literal
+
+Link = Literal["full", "first moments", "thin"]
+"""All ten parameters; the first moments only, of a link whose mass is negligible; mass and first
+moment along the own x axis only, of a thin bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +41,7 @@ class Joint:
         lower: Lower end of its range.
         upper: Upper end of its range.
         speed: Largest speed.
-        link: What of its link's ten parameters counts: all of them, or only the first moments of
-            a link whose mass is negligible.
+        link: What of its link's ten parameters counts, see `Link`.
         spring: Whether an elastic torque proportional to its position acts on it.
     """
 
@@ -48,7 +51,7 @@ class Joint:
     lower: float
     upper: float
     speed: float
-    link: Literal["full", "first moments"] = "full"
+    link: Link = "full"
     spring: bool = False
 
     @property
@@ -58,8 +61,31 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class Body:
+    """One body of an arm's spanning tree, on a joint along or about its z axis.
+
+    Attributes:
+        name: What it is called.
+        parent: Number of the body it hangs on, from 1; 0 is the base.
+        row: Where its joint sits on that body.
+        closure: How far its joint moves with each actuated joint: its row of G.
+        prismatic: Whether its joint slides.
+        link: As `Joint.link`.
+        label: What the names of its parameters end in; its number if empty.
+    """
+
+    name: str
+    parent: int
+    row: DhRow
+    closure: tuple[float, ...]
+    prismatic: bool = False
+    link: Link = "full"
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Arm:
-    """A serial arm.
+    """An arm: its joints in a row, and the bodies of its loops where it has any.
 
     Attributes:
         name: What it is called.
@@ -71,6 +97,8 @@ class Arm:
         source: Where the numbers come from.
         wrist: First joint (from 0) that cables drive from coupled motors, or None.
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
+        loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
+            see `bodies`.
     """
 
     name: str
@@ -81,6 +109,26 @@ class Arm:
     source: str
     wrist: int | None = None
     wrist_coupling: tuple[tuple[float, ...], ...] = ()
+    loops: tuple[Body, ...] = ()
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The spanning tree: that of the loops, else one body a joint."""
+        if self.loops:
+            return self.loops
+        count = len(self.joints)
+        return tuple(
+            Body(
+                joint.name,
+                k,
+                joint.row,
+                tuple(float(k == j) for j in range(count)),
+                joint.kind == "prismatic",
+                joint.link,
+                str(k + 1),
+            )
+            for k, joint in enumerate(self.joints)
+        )
 
 
 PSM = Arm(
@@ -149,3 +197,35 @@ PSM = Arm(
     wrist_coupling=((1.0186, 0.0, 0.0), (-0.8306, 0.6089, 0.6089), (0.0, -1.2177, 1.2177)),
 )
 """The thesis' model: 68 parameters of links, springs, frictions, drives and offsets."""
+
+_SERIAL = PSM.bodies
+
+PSM_CLOSED = replace(
+    PSM,
+    name="da Vinci patient-side manipulator, closed chain",
+    loops=(
+        *_SERIAL,
+        Body(
+            name="parallelogram bar",
+            parent=2,
+            row=DhRow(-0.15, 0.0, 0.0, 0.0),
+            closure=(0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
+            link="thin",
+            label="b",
+        ),
+        Body(
+            name="counterweight",
+            parent=2,
+            row=DhRow(-0.3, pi / 2, 0.0, 0.0),
+            closure=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
+            prismatic=True,
+            label="c",
+        ),
+    ),
+    source=(
+        "as the serial model; the parallelogram's bar, thin and along the yaw axis, keeps its"
+        " direction as joint 2 turns; the counterweight slides against the insertion; where both"
+        " sit on link 2 is assumed"
+    ),
+)
+"""The real arm's loops on top of the thesis' model."""

@@ -11,7 +11,8 @@ from scipy import signal
 from scipy.linalg import lapack
 
 from estimation.arm.kinematics import TIP, ArmError, built, pinocchio
-from estimation.arm.regressor import LINK, SIGN_WIDTH, names
+from estimation.arm.recursion import LINK
+from estimation.arm.regressor import SIGN_WIDTH, names
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 

@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
+from estimation.diagnosis.clock import skips
 from estimation.recording import Recording
-
-JUMP = 1.5
-"""A step of the clock longer than so many periods is a jump."""
 
 PAIRS = (
     ("motor_angle_rad", "spindle_angle_rad"),
@@ -30,7 +28,7 @@ STEADY = 1e-3
 
 def audit(recordings: Sequence[Recording]) -> list[str]:
     """Return what stands out, one sentence each."""
-    return [*_clocks(recordings), *_delays(recordings), *_excitation(recordings)]
+    return [*skips(recordings), *_delays(recordings), *_excitation(recordings)]
 
 
 def delay_s(recording: Recording, first: str, second: str) -> float | None:
@@ -57,23 +55,6 @@ def delay_s(recording: Recording, first: str, second: str) -> float | None:
     w, phase = 2 * np.pi * f[told], np.angle(cross[told])
     sure = common[told] / (1.0 - common[told])
     return float(-np.sum(sure * w * phase) / np.sum(sure * w * w))
-
-
-def _clocks(recordings: Sequence[Recording]) -> list[str]:
-    said = []
-    for recording in recordings:
-        steps = np.diff(recording.time_s)
-        period = float(np.median(steps))
-        jumps = np.flatnonzero(steps > JUMP * period)
-        if jumps.size:
-            longest = int(jumps[np.argmax(steps[jumps])])
-            at = recording.time_s[longest] - recording.time_s[0]
-            said.append(
-                f"The clock of run {recording.name} jumps {jumps.size} times, the longest by"
-                f" {steps[longest]:.3g} s at {at:.3g} s: what depends on time or history is not"
-                " decided across it."
-            )
-    return said
 
 
 def _delays(recordings: Sequence[Recording]) -> list[str]:

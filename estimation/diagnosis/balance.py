@@ -9,6 +9,7 @@ from scipy import linalg, optimize
 from estimation.diagnosis.candidate import Candidate, step
 from estimation.diagnosis.design import Mapper, Run, tables, targets
 from estimation.diagnosis.evidence import resampled
+from estimation.diagnosis.paths import path_of
 from estimation.fitting import OFFSET
 from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray
@@ -41,6 +42,11 @@ class Balance:
     def demean(self) -> bool:
         """Whether each run's mean is a nuisance."""
         return self.model.run_offsets
+
+    @property
+    def one_path(self) -> bool:
+        """Whether the runs are periods of one path."""
+        return len(self.runs) > 1 and len({path_of(run.name) for run in self.runs}) == 1
 
     def columns(self, terms: Sequence[Candidate]) -> list[FloatArray]:
         """Return the columns of effects side by side, one array a run; kept for the next time."""

@@ -6,12 +6,10 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.frozen import (
     Part,
 )
-from estimation.diagnosis.maps import CHANNELS, LOAD, Map
-from estimation.diagnosis.search import Discovery, Gates, Named
+from estimation.diagnosis.gates import Gates
+from estimation.diagnosis.maps import Map, variables_of, within
+from estimation.diagnosis.naming import Discovery
 from estimation.diagnosis.story import Claim
-
-ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
-"""Angles of one rig move together."""
 
 
 def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
@@ -23,7 +21,8 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
         if may_name:
             sure = not named.rivals and named.confidence >= gates.sure
             verdict = "identified" if sure else "one_of"
-            claims.append(Claim(Part(named.candidate), verdict, named, _variables(named)))
+            of = variables_of(named.candidate, balance)
+            claims.append(Claim(Part(named.candidate), verdict, named, of))
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
@@ -53,9 +52,7 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
 def _told_already(found: Map, claims: Sequence[Claim]) -> bool:
     """Say whether a map has no variable but those of a named effect: what its form leaves."""
     said = {variable for claim in claims for variable in claim.depends_on}
-    if said & ANGLES:
-        said |= ANGLES
-    return bool(claims) and set(found.variables) <= said
+    return bool(claims) and within(found.variables, said)
 
 
 def _map_claim(found: Map, may_name: bool) -> Claim:
@@ -68,20 +65,3 @@ def _share_left(claims: Sequence[Claim], balance: Balance) -> float:
     """Return the share of the declared model's squared error that the claims leave."""
     found = [c.part.candidate for c in claims if c.part.candidate is not None]
     return balance.loss([*balance.terms, *found]) / max(balance.loss(balance.terms), 1e-300)
-
-
-def _variables(named: Named) -> tuple[str, ...]:
-    """Return the variables of an effect, from the channels it reads."""
-    by_channel: dict[str, str] = {}
-    for variable, channel in CHANNELS.items():
-        by_channel[channel] = variable  # of two on one channel the last but history
-    by_channel["spindle_angle_rad"] = "spindle_angle"
-    by_channel[LOAD] = "load"
-    by_channel["distal_torque_n_m"] = "load"
-    family = named.candidate.family
-    found = [by_channel[c] for _, c in named.candidate.channels if c in by_channel]
-    signs = family.startswith("friction.") and family.split(".")[1] not in ("viscous", "drag")
-    found = ["velocity_sign" if signs and v == "velocity" else v for v in found]
-    if family.startswith("hysteresis."):
-        found.append("history")
-    return tuple(dict.fromkeys(found))

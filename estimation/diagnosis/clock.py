@@ -1,43 +1,79 @@
-"""The audit of the clocks: a run whose clock jumps is no evidence.
+"""The audit of the clocks: a run whose clock jumps is no evidence, and one that skips is told of.
 
 Filters take samples as evenly spaced. Across a gap that nobody flagged they join what was apart,
 and the joint looks like a fast motion without a torque.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.recording import Recording
 
+SKIP = 1.5
+"""A step of the clock longer than so many periods is a gap."""
+
 LONGEST_S = 0.05
 """A gap of this length may hide a reversal; a lost sample or two may not."""
 
 
-def jump(recording: Recording) -> str:
-    """Return where a run's clock jumps, in words; empty when it is steady or the gap is flagged."""
+@dataclass(frozen=True)
+class Gap:
+    """One step of a clock that is longer than a period.
+
+    Attributes:
+        at_s: Where it begins, as the run's clock has it.
+        length_s: How long it is.
+        jump: Whether it is long, and no sample at its ends is flagged.
+    """
+
+    at_s: float
+    length_s: float
+    jump: bool
+
+
+def gaps(recording: Recording) -> list[Gap]:
+    """Return the gaps of a run's clock, in order."""
     steps = np.diff(recording.time_s)
     if steps.size == 0:
-        return ""
-    flagged = recording.flags != 0
-    open_ = ~(flagged[:-1] | flagged[1:])
+        return []
     usual = float(np.median(steps))
-    far = np.flatnonzero(open_ & (steps > usual + LONGEST_S))
-    if far.size == 0:
-        return ""
-    first = int(far[0])
-    more = "" if far.size == 1 else f", and at {far.size - 1} more places"
-    return f"jumps by {steps[first]:.3g} s at {recording.time_s[first]:.3f} s{more}"
+    flagged = recording.flags != 0
+    jumps = ~(flagged[:-1] | flagged[1:]) & (steps > usual + LONGEST_S)
+    return [
+        Gap(float(recording.time_s[k]), float(steps[k]), bool(jumps[k]))
+        for k in np.flatnonzero(steps > SKIP * usual)
+    ]
 
 
 def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Return the runs whose clock is steady, and what was left out and why, in words."""
-    jumps = [(recording, jump(recording)) for recording in recordings]
-    kept = [recording for recording, found in jumps if not found]
-    lost = [
-        f"Run {recording.name} is left out: its clock {found}, and what happened meanwhile is not"
-        " known."
-        for recording, found in jumps
-        if found
-    ]
+    """Return the runs whose clock does not jump, and what was left out and why, in words."""
+    kept, lost = [], []
+    for recording in recordings:
+        jumps = [gap for gap in gaps(recording) if gap.jump]
+        if not jumps:
+            kept.append(recording)
+            continue
+        first = jumps[0]
+        more = "" if len(jumps) == 1 else f", and at {len(jumps) - 1} more places"
+        lost.append(
+            f"Run {recording.name} is left out: its clock jumps by {first.length_s:.3g} s at"
+            f" {first.at_s:.3f} s{more}, and what happened meanwhile is not known."
+        )
     return kept, lost
+
+
+def skips(recordings: Sequence[Recording]) -> list[str]:
+    """Return what the gaps of runs that are used leave undecided, one sentence a run."""
+    said = []
+    for recording in recordings:
+        found = gaps(recording)
+        if found:
+            longest = max(found, key=lambda gap: gap.length_s)
+            said.append(
+                f"The clock of run {recording.name} skips {len(found)} times, the longest by"
+                f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s: what"
+                " depends on time or history is not decided across it."
+            )
+    return said

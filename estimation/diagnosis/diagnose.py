@@ -1,7 +1,7 @@
 """The whole way: declared models, discovery, naming, freezing, and the confirm runs opened once."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -11,10 +11,10 @@ import numpy as np
 from estimation.campaign import Campaign, with_campaign_time
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import intervals, lay_out
-from estimation.diagnosis.candidate import UNKNOWN, pool
+from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.claims import claims_of
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
-from estimation.diagnosis.findings import moved, one_cause_one_finding
+from estimation.diagnosis.findings import echoes, moved, one_cause_one_finding
 from estimation.diagnosis.formula import formulas
 from estimation.diagnosis.frozen import (
     Frozen,
@@ -23,11 +23,13 @@ from estimation.diagnosis.frozen import (
     settled,
     squares,
 )
+from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import needed_channels, projection
+from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
-from estimation.diagnosis.search import Gates, Search
+from estimation.diagnosis.search import Search
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Claim, Story
 from estimation.diagnosis.twin import Bootstrap, Twin
@@ -94,6 +96,8 @@ def diagnose(
     on_stage("opening the confirm runs")
     on_open()
     stories = {name: _confirmed(story, gates) for name, story in stories.items()}
+    for name, places in echoes(stories).items():
+        stories[name] = _confirmed(_without(stories[name], places), gates)
     findings = one_cause_one_finding(stories)
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
@@ -135,7 +139,7 @@ def _balance(
     measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
-    wanted = [model.target, *model.channels, *needed_channels(measured)]
+    wanted = [model.target, *model.channels, *needed_channels(model.balance, measured)]
     wanted += [*instruments(measured), *(channel for c in tried for _, channel in c.channels)]
     wanted = list(dict.fromkeys(wanted))
     mapper = map if executor is None else executor.map
@@ -151,7 +155,7 @@ def _balance(
     if maker is not None:
         source = maker(fitted, discover)
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
-    discovery = Search(balance, tried, gates, sealed.seed, twin).run()
+    discovery = searched(Search(balance, tried, gates, sealed.seed, twin))
     claims = claims_of(discovery, balance, gates, len(runs) >= LEAST_TO_NAME)
     beside = [c.part.candidate for c in claims if c.part.candidate is not None]
     claims = [
@@ -201,7 +205,7 @@ def _usable(
 def _confirmed(story: Story, gates: Gates) -> Story:
     """Freeze, open the confirm runs, and keep the claims they bear out."""
     kept: list[Claim] = []
-    refused: list[str] = []
+    refused = list(story.refused)
     last = story.before
     for claim in story.claims:
         trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
@@ -210,11 +214,18 @@ def _confirmed(story: Story, gates: Gates) -> Story:
             kept.append(claim)
             last = trial
         else:
-            what = claim.named.candidate.family if claim.named else UNKNOWN
-            refused.append(f"{what}: {reason}")
+            refused.append(f"{claim.family}: {reason}")
     values = tuple(intervals(story.balance, last.terms, seed=0))
     story = replace(story, claims=tuple(kept), refused=tuple(refused), after=last, values=values)
     return _written(story, gates)
+
+
+def _without(story: Story, places: Collection[int]) -> Story:
+    """Return a story without some of its claims, and why."""
+    claims = tuple(c for k, c in enumerate(story.claims) if k not in places)
+    why = "it removes too little to be told from what a larger cause in another balance does here"
+    lost = tuple(f"{story.claims[k].family}: {why}" for k in sorted(places))
+    return replace(story, claims=claims, refused=(*story.refused, *lost))
 
 
 def _written(story: Story, gates: Gates) -> Story:
@@ -288,8 +299,6 @@ def _notes(
                 " uses them."
             )
     notes += [
-        f"{name}: not borne out by the confirm runs: {what}."
-        for name, story in stories.items()
-        for what in story.refused
+        f"{name}: not claimed: {what}." for name, story in stories.items() for what in story.refused
     ]
     return notes

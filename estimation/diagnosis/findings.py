@@ -1,12 +1,13 @@
 """From claims to findings: one cause is told once, whatever balances show it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.derived import GEAR_RATIO
 from estimation.diagnosis.candidate import UNKNOWN, Candidate
+from estimation.diagnosis.consequences import follows
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import (
     Frozen,
@@ -22,10 +23,14 @@ Added = Mapping[str, FloatArray]
 """Run to what a finding changes in the estimate at its valid samples, shape (n,)."""
 
 SAME_CAUSE = 0.9
-"""Two balances show one cause when what it adds to them correlates at least this well."""
+"""Two balances of one unit show one cause when what it adds correlates at least this well."""
 
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
+
+ECHO, LARGER = 0.15, 3.0
+"""A claim that removes less than this share of its balance's squared error is not told from the
+echo of a cause in another balance that removes so many times its share there."""
 
 SAME_RATE = 0.03
 """Two waves are one when their periods a turn differ by less than this share."""
@@ -46,8 +51,33 @@ LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
 """Faults that two balances may name differently."""
 
 
-def _findings(story: Story) -> list[tuple[Finding, Added]]:
-    """Return the findings of one balance, each with what it changes in the estimate."""
+@dataclass(frozen=True)
+class Told:
+    """A finding of one balance.
+
+    Attributes:
+        finding: What is reported.
+        added: What it changes in the estimate.
+        story: The story of its balance.
+        place: Place of its claim there.
+    """
+
+    finding: Finding
+    added: Added
+    story: Story
+    place: int
+
+    def is_cause_of(self, other: "Told") -> bool:
+        """Say whether a finding of another balance is told by this one already."""
+        if same_fault(self.finding, other.finding):
+            return True
+        if self.story.balance.model.unit == other.story.balance.model.unit:
+            return _same_torque(self.added, other.added)
+        return follows(self.story, self.place, other.story, other.place)
+
+
+def _findings(story: Story) -> list[Told]:
+    """Return the findings of one balance."""
     found = []
     last = story.before
     for k, claim in enumerate(story.claims):
@@ -58,7 +88,7 @@ def _findings(story: Story) -> list[tuple[Finding, Added]]:
         samples = samples_of(story.confirm).sum()
         named = claim.named if claim.verdict in ("identified", "one_of") else None
         found.append(
-            (
+            Told(
                 Finding(
                     balance=story.balance.model.balance,
                     family=named.candidate.family if named else UNKNOWN,
@@ -77,6 +107,8 @@ def _findings(story: Story) -> list[tuple[Finding, Added]]:
                     formulas=_stated(story, claim, samples),
                 ),
                 _added(last, now, story.balance.runs),
+                story,
+                k,
             )
         )
         last = now
@@ -107,28 +139,54 @@ def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
 
 def one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     """Report a cause seen in several balances once, where it explains the largest share."""
-    found = [pair for story in stories.values() for pair in _findings(story)]
+    order = list(stories)
+    causes = _causes(stories)
+    ranked = sorted(causes, key=lambda told: (order.index(told.finding.balance), told.place))
+    return [told.finding for told in ranked]
+
+
+def echoes(stories: Mapping[str, Story]) -> dict[str, set[int]]:
+    """Return the places of claims too small to be told from what a larger cause does elsewhere.
+
+    What shakes the axis shows whatever the other balances lack: an inertia that nothing but a
+    ripple makes visible is there, and is not what is wrong.
+    """
+    causes = _causes(stories)
+    small: dict[str, set[int]] = {}
+    for told in causes:
+        larger = (c for c in causes if c.finding.balance != told.finding.balance)
+        share = _share(told.finding)
+        if share < ECHO and any(_share(c.finding) > LARGER * share for c in larger):
+            small.setdefault(told.finding.balance, set()).add(told.place)
+    return small
+
+
+def _share(finding: Finding) -> float:
+    """Return the share of the squared error on the confirm runs that a finding removes."""
+    return 1.0 - (finding.rmse_after / max(finding.rmse_before, 1e-300)) ** 2
+
+
+def _causes(stories: Mapping[str, Story]) -> list[Told]:
+    """Return the findings of all balances, each cause once."""
+    found = [told for story in stories.values() for told in _findings(story)]
     # a named fault of a sensor speaks for what other balances only show
     found.sort(
-        key=lambda pair: (
-            not pair[0].family.startswith("sensor."),
-            pair[0].rmse_after / max(pair[0].rmse_before, 1e-300),
+        key=lambda told: (
+            not told.finding.family.startswith("sensor."),
+            told.finding.rmse_after / max(told.finding.rmse_before, 1e-300),
         )
     )
-    kept: list[tuple[Finding, Added]] = []
-    for finding, added in found:
-        for k, (first, other) in enumerate(kept):
-            if finding.balance in (first.balance, *first.also_in):
-                continue
-            units = [stories[name].balance.model.unit for name in (first.balance, finding.balance)]
-            if _same_cause(other, added, units[0] == units[1]) or same_fault(first, finding):
-                kept[k] = (replace(first, also_in=(*first.also_in, finding.balance)), other)
+    kept: list[Told] = []
+    for told in found:
+        for k, first in enumerate(kept):
+            shown = (first.finding.balance, *first.finding.also_in)
+            if told.finding.balance not in shown and first.is_cause_of(told):
+                also = (*first.finding.also_in, told.finding.balance)
+                kept[k] = replace(first, finding=replace(first.finding, also_in=also))
                 break
         else:
-            kept.append((finding, added))
-    order = list(stories)
-    ranked = sorted(kept, key=lambda pair: order.index(pair[0].balance))
-    return [finding for finding, _ in ranked]
+            kept.append(told)
+    return kept
 
 
 def same_fault(first: Finding, second: Finding) -> bool:
@@ -169,11 +227,8 @@ def _added(last: Frozen, now: Frozen, runs: Sequence[Run]) -> Added:
     return {name: change - change.mean() for name, change in changes.items()}
 
 
-def _same_cause(first: Added, second: Added, same_unit: bool) -> bool:
-    """Say whether two contributions are the same torque: alike in course, sign and size.
-
-    Balances of different units are compared by their course alone.
-    """
+def _same_torque(first: Added, second: Added) -> bool:
+    """Say whether two contributions are the same torque: alike in course, sign and size."""
     shared = [n for n in first if n in second and first[n].shape == second[n].shape]
     if not shared:
         return False
@@ -182,8 +237,6 @@ def _same_cause(first: Added, second: Added, same_unit: bool) -> bool:
     if min(size) == 0:
         return False
     alike = float(one @ other) / (size[0] * size[1])
-    if not same_unit:
-        return abs(alike) >= SAME_CAUSE
     return alike >= SAME_CAUSE and 1 / TWICE <= size[0] / size[1] <= TWICE
 
 

@@ -1,6 +1,7 @@
 """The functions of one variable that a formula is made of, at the shapes a search tries."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.maps import LOAD, ORDERS, PLAYS, PROJECTED_LOAD, Basis
+from estimation.diagnosis.maps import ORDERS, PLAYS, PROJECTED, Basis
 from estimation.effects.roles import CHANNELS as PLAYED_BY
 from estimation.effects.unknown_product import product, product_id
 from estimation.recording import FloatArray
@@ -25,20 +26,20 @@ class Unary:
 
 def live_channel(balance: Balance, basis: Basis) -> str | None:
     """Return the channel that a model reads for a variable, or None where it has none."""
-    channel = basis.channel
-    if channel == PROJECTED_LOAD:
-        channel = LOAD
-        if balance.model.target == LOAD:
-            # the balance's own sensor is what is estimated: another tells the load
-            (channel, *_) = PLAYED_BY.get(balance.model.balance, {}).get("load", ("",))
+    measured = {made: own for own, made in PROJECTED.items()}
+    channel = measured.get(basis.channel, basis.channel)
+    if channel == balance.model.target:
+        # the balance's own sensor is what is estimated: another tells it
+        role = "load" if basis.variable == "load" else "position"
+        (channel, *_) = PLAYED_BY.get(balance.model.balance, {}).get(role, ("",))
     return channel if all(channel in run.channels for run in balance.runs) else None
 
 
 def word(basis: Basis) -> str:
     """Return what a formula calls a variable."""
-    return {"velocity_sign": "velocity", "history": "spindle_angle"}.get(
-        basis.variable, basis.variable
-    )
+    if basis.variable == "history":
+        return re.sub(r"_rad$|_m$|(?<=joint_\d)_.*", "", basis.channel)
+    return "velocity" if basis.variable == "velocity_sign" else basis.variable
 
 
 def library(basis: Basis, channel: str) -> list[Unary]:

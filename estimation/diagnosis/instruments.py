@@ -23,6 +23,9 @@ SPEED, ACCELERATION, ANGLE = (
 )
 FORCES = ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m")
 
+Fit = tuple[tuple[str, ...], FloatArray]
+"""The torques and the current a projection uses, and the weights of all its columns."""
+
 WIDTHS_RAD_S = (1.0, 5.0)
 """Widths of the smooth signs that stand for friction at a reversal."""
 
@@ -43,19 +46,29 @@ def projection(runs: Sequence[Run], pool: Sequence[Candidate], target: str) -> C
         target: The balance's target, which is no instrument.
     """
     wanted = {name for c in pool for role, name in c.channels if role in c.effect.projected_roles}
-    fits = {name: fit for name in sorted(wanted) if (fit := _fitted(runs, name, target))}
+    fits = {name: fit for name in sorted(wanted) if (fit := fitted(runs, name, target))}
 
     def added(run: Run) -> Run:
-        new = {projected(name): _columns(run.channels, f) @ w for name, (f, w) in fits.items()}
+        new = {projected(name): as_told(run, fit) for name, fit in fits.items()}
         return replace(run, channels={**run.channels, **new})
 
     return added
 
 
-def _fitted(
-    runs: Sequence[Run], name: str, target: str
-) -> tuple[tuple[str, ...], FloatArray] | None:
-    """Return the forces among the instruments of a channel and the weights of all columns."""
+def as_told(run: Run, fit: Fit) -> FloatArray:
+    """Return a channel of a run as the other sensors tell it, shape (n,)."""
+    forces, weights = fit
+    return instrument_columns(run.channels, forces) @ weights
+
+
+def fitted(runs: Sequence[Run], name: str, target: str) -> Fit | None:
+    """Fit a channel's projection; None where there is nothing to project it on.
+
+    Args:
+        runs: Runs with the channels of `instruments`.
+        name: The channel.
+        target: The balance's target, which is no instrument.
+    """
     there = set.intersection(*(set(run.channels) for run in runs))
     own = {name, *measured_channels([name]), target}
     forces = tuple(f for f in FORCES if f in there and f not in own)
@@ -63,7 +76,9 @@ def _fitted(
         return None
     columns, aims = [], []
     for run in runs:
-        table = np.column_stack([_columns(run.channels, forces), run.channels[name]])[run.kept]
+        table = np.column_stack([instrument_columns(run.channels, forces), run.channels[name]])[
+            run.kept
+        ]
         table -= table.mean(axis=0)
         columns.append(table[:, :-1])
         aims.append(table[:, -1])
@@ -73,7 +88,7 @@ def _fitted(
     return forces, weights / scale
 
 
-def _columns(channels: Mapping[str, FloatArray], forces: Sequence[str]) -> FloatArray:
+def instrument_columns(channels: Mapping[str, FloatArray], forces: Sequence[str]) -> FloatArray:
     """Return motion, friction and the forces, shape (n, columns)."""
     speed, angle = channels[SPEED], channels[ANGLE]
     signs = [np.tanh(speed / width) for width in WIDTHS_RAD_S]

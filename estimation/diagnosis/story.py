@@ -4,13 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.diagnosis.balance import Balance, as_model
+from estimation.diagnosis.candidate import UNKNOWN
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.formula import Formula
 from estimation.diagnosis.frozen import (
     Frozen,
     Part,
 )
-from estimation.diagnosis.search import Discovery, Named
+from estimation.diagnosis.naming import Discovery, Named
 from estimation.model import Estimate, Model
 
 
@@ -33,6 +34,11 @@ class Claim:
     formulas: tuple[Formula, ...] = ()
 
     @property
+    def family(self) -> str:
+        """What it is called before anything is known of its name's certainty."""
+        return self.named.candidate.family if self.named else UNKNOWN
+
+    @property
     def written(self) -> Part:
         """What a model file holds of it: a formula in place of a map; nothing without one."""
         if self.part.map is None:
@@ -48,7 +54,7 @@ class Story:
         balance: The balance on the runs that discover.
         discovery: What the search did.
         claims: Claims that the confirm runs bore out.
-        refused: Claims they did not, in words.
+        refused: Claims that were not kept, and why, in words.
         before: Declared model, frozen.
         after: Model with the claims, frozen.
         values: Parameters of `after`'s effects, in their order.

@@ -14,7 +14,7 @@ class TorqueCoupling(Proportional):
     """
 
     id = "coupling.torque"
-    balances: ClassVar = {"joint": 1, "pitch": 1, "yaw": 1}
+    balances: ClassVar = {"joint": 1, "grasp": 1, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"other_torque": "joint_1_torque_n_m"}
     amplitudes = (Parameter("ratio", "target / other_torque", "share of the other's torque"),)
     confused_with = ("sensor.crosstalk", "coupling.kinematic")

@@ -69,6 +69,7 @@ class Effect(ABC):
             whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        other_below: Shape parameters at whose lower bound it turns into another effect.
         any_function_of: Variables of which any function, whatever its form, is this effect: a map
             of them is no other name.
         at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
@@ -84,6 +85,7 @@ class Effect(ABC):
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     at_rest: ClassVar[bool] = False
+    other_below: ClassVar[tuple[str, ...]] = ()
     any_function_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:

@@ -7,7 +7,7 @@ encoder makes a delay that is not there. A load is never the balance's own targe
 both sides of a balance looks like an effect.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -102,26 +102,44 @@ class Entry(NamedTuple):
     channels: Mapping[str, str]
 
 
-def _of_joint(joint: int) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles in the torque balance of one joint of an arm."""
+def _of_joint(joint: int) -> list[Mapping[str, tuple[str, ...]]]:
+    """Return the roles in the torque balance of one joint of an arm.
+
+    Once for a joint that turns, once for one that slides, and once for each motor of a cable-driven
+    wrist that the joint feels: an effect sits in one of these and takes all its motion from there.
+    """
     own = f"joint_{joint}"
     others = [f"joint_{other}" for other in JOINTS if other != joint]
-    return {
-        "speed": (f"{own}_velocity_rad_s",),
-        "acceleration": (f"{own}_acceleration_rad_s2",),
-        "position": (f"{own}_angle_rad",),
-        "travel": (f"{own}_angle_rad",),
-        "output_angle": (f"{own}_angle_rad",),
-        "encoder": (f"{own}_angle_rad",),
-        "stop": (f"{own}_angle_rad",),
-        "tilt": (f"{own}_angle_rad",),
-        "reading": (f"{own}_velocity_rad_s", f"{own}_acceleration_rad_s2"),
-        "other_reading": tuple(f"{other}_torque_n_m" for other in others),
-        "other_torque": tuple(f"{other}_torque_n_m" for other in others),
-        "other_angle": tuple(f"{other}_angle_rad" for other in others),
+    shared = {
+        "other_reading": _either(others, "torque_n_m", "force_n"),
+        "other_torque": _either(others, "torque_n_m", "force_n"),
+        "other_angle": _either(others, "angle_rad", "position_m"),
         "clock": ("time_s",),
         "elapsed": ("time_s", "campaign_time_s"),
         "campaign_clock": ("campaign_time_s",),
+    }
+    turning = ("angle_rad", "velocity_rad_s", "acceleration_rad_s2")
+    sliding = ("position_m", "velocity_m_s", "acceleration_m_s2")
+    drives = [(f"{own}_drive_{motor}", turning) for motor in JOINTS]
+    return [
+        {**_moving(*(f"{name}_{unit}" for unit in units)), **shared}
+        for name, units in [(own, turning), (own, sliding), *drives]
+    ]
+
+
+def _either(names: Sequence[str], *units: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{unit}" for name in names for unit in units)
+
+
+def _moving(position: str, velocity: str, acceleration: str) -> Mapping[str, tuple[str, ...]]:
+    """Return the roles that one motion plays."""
+    return {
+        "speed": (velocity,),
+        "acceleration": (acceleration,),
+        **dict.fromkeys(
+            ("position", "travel", "output_angle", "encoder", "stop", "tilt"), (position,)
+        ),
+        "reading": (velocity, acceleration),
     }
 
 
@@ -142,33 +160,77 @@ def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
     }
 
 
-def _known(kind: str, number: str) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles of a balance."""
+def _known(kind: str, number: str) -> list[Mapping[str, tuple[str, ...]]]:
+    """Return the roles of a balance, once for each motion that may be in it."""
     if kind == "joint":
         return _of_joint(int(number))
     if kind == "calibration":
-        return _IN_CALIBRATION
-    return CHANNELS[kind] if kind in CHANNELS else _of_axis(kind)
+        if number in PARTS:
+            return [CHANNELS[PARTS[number]]]
+        return [_ENCODER if number == "encoder" else _SENSOR]
+    if kind not in AXES:
+        return [CHANNELS[kind]]
+    own = _of_axis(kind)
+    if kind not in CHANNELS:
+        return [own]
+    # the grasp of a single-axis rig, or the one of three axes of a wrist
+    rig = CHANNELS[kind]
+    both = {**rig, **own}
+    return [{role: tuple(dict.fromkeys((*rig.get(role, ()), *own.get(role, ())))) for role in both}]
 
 
-OF_CALIBRATION: Mapping[str, int] = {
+OF_SENSOR: Mapping[str, int] = {
     "hysteresis.presliding": 1,
     "hysteresis.presliding.maxwell": 1,
     "sensor.creep": 1,
     "sensor.drift": 1,
     "sensor.gain_nonlinear": 1,
+    "sensor.crosstalk": 1,
 }
-"""Effects that may enter the balance of a calibration, `reference = calibrated`, and their side.
-What makes a sensor lag behind its load adds to the reference while the load rises."""
+"""Effects that may enter the balance of a sensor's calibration, `reference = calibrated`, and their
+side. What makes a sensor lag behind its load adds to the reference while the load rises. Where the
+load is known exactly the balance is `read = applied`."""
 
-_CALIBRATED = ("calibrated_n", "calibrated_n_m")
-_IN_CALIBRATION = {
+_CALIBRATED = ("calibrated_n", "applied_n", "applied_n_m")
+_SENSOR = {
     "travel": _CALIBRATED,
     "reading": _CALIBRATED,
     "creeping": _CALIBRATED,
+    "other_reading": ("second_axis_n", "third_axis_n"),
     "clock": ("time_s",),
     "elapsed": ("time_s",),
 }
+
+OF_ENCODER: Mapping[str, int] = {
+    "sensor.encoder_inl": 1,
+    "sensor.encoder_inl.harmonics": 1,
+    "hysteresis.presliding": -1,
+    "sensor.delay": 1,
+    "sensor.drift": 1,
+}
+"""Effects that may enter the balance of an encoder's calibration against another one."""
+
+_ENCODER = {
+    "encoder": ("reference_angle_rad",),
+    "travel": ("reference_angle_rad",),
+    "reading": ("reference_angle_rad",),
+    "clock": ("time_s",),
+    "elapsed": ("time_s",),
+}
+
+PARTS = {"current": "motor", "gearbox": "gearbox"}
+"""Calibrations of a part of the rig, and the balance of the rig that each is."""
+
+
+def _side(effect: Effect, kind: str, number: str) -> int | None:
+    """Return the side of a balance that an effect stands on; None where it has no business."""
+    if kind == "calibration" and number in PARTS:
+        return effect.balances.get(PARTS[number])
+    if kind == "calibration":
+        return (OF_ENCODER if number == "encoder" else OF_SENSOR).get(effect.id)
+    if kind in AXES:  # an axis of the wrist is like the grasp unless stated
+        return effect.balances.get(kind, effect.balances.get("grasp"))
+    return effect.balances.get(kind)
 
 
 def entries(effect: Effect, balance: str) -> list[Entry]:
@@ -179,11 +241,12 @@ def entries(effect: Effect, balance: str) -> list[Entry]:
         balance: Balance id, such as `motor` or `joint.3`.
     """
     kind, _, number = balance.partition(".")
-    sign = OF_CALIBRATION.get(effect.id) if kind == "calibration" else effect.balances.get(kind)
-    if sign is None and kind in AXES:  # an axis of the wrist is like the grasp unless stated
-        sign = effect.balances.get("grasp")
+    sign = _side(effect, kind, number)
     if sign is None:
         return []
-    known = _known(kind, number)
-    ways = product(*(known[role] for role in effect.roles))
-    return [Entry(sign, dict(zip(effect.roles, way, strict=True))) for way in ways]
+    ways = [
+        tuple(zip(effect.roles, way, strict=True))
+        for known in _known(kind, number)
+        for way in product(*(known[role] for role in effect.roles))
+    ]
+    return [Entry(sign, dict(way)) for way in dict.fromkeys(ways)]

@@ -21,6 +21,7 @@ class Stiffening(Pointwise):
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("compliance", "target / load", "compliance that is lost", lower=0.0),)
     shape = (Parameter("knee", "load", "load at the knee", 0.02, 1.0, points=9),)
+    other_below = ("knee",)  # a knee at no load is play
     confused_with = ("transmission.backlash", "sensor.gain_nonlinear", "spring.end_stop")
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 

@@ -12,7 +12,7 @@ after D. Nguyen and B. Widrow, IJCNN 1990.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -83,6 +83,8 @@ def train(
     names: tuple[Sequence[str], Sequence[str]],
     settings: Settings | None = None,
     on_step: Callable[[int, float], None] = lambda step, rmse: None,
+    validation: tuple[FloatArray, FloatArray] | None = None,
+    start: Network | None = None,
 ) -> Training:
     """Train a network on all rows at once.
 
@@ -92,10 +94,14 @@ def train(
         names: Names of the inputs and of the outputs.
         settings: How to train; `Settings()` if None.
         on_step: Called with the step's number and the error after each accepted step.
+        validation: Further inputs and targets, which are not trained on: the weights of the step
+            with the least error on them are kept.
+        start: A network to train on, all its weights, as in transfer learning; it keeps its ranges
+            and its number of nodes.
 
     Raises:
-        NetworkError: torch is missing, a column is constant or not finite, or there are too few
-            rows.
+        NetworkError: torch is missing, a column is constant or not finite, there are too few
+            rows, or the network to start from has other inputs or outputs.
     """
     if not has_torch():
         raise NetworkError(
@@ -104,8 +110,21 @@ def train(
             "Install it: pip install 'rig[learn]'.",
         )
     settings = settings or Settings()
-    ranges = [_range(inputs, names[0]), _range(targets, names[1])]
+    if start is None:
+        ranges = [_range(inputs, names[0]), _range(targets, names[1])]
+    else:
+        if (start.inputs, start.outputs) != (tuple(names[0]), tuple(names[1])):
+            raise NetworkError(
+                "The network to start from has other inputs or outputs.",
+                f"It has {', '.join(start.inputs)} and {', '.join(start.outputs)}.",
+            )
+        ranges = [start.input_range, start.output_range]
+        settings = replace(settings, nodes=len(start.hidden))
     fit = _Fit(to_unit(inputs, ranges[0]), to_unit(targets, ranges[1]), settings)
+    if start is not None:
+        fit.start_from(start)
+    if validation is not None:
+        fit.hold_out(to_unit(validation[0], ranges[0]), to_unit(validation[1], ranges[1]))
     reason, converged = fit.run(on_step)
     hidden, output = fit.weights()
     return Training(
@@ -221,12 +240,32 @@ class _Fit:
         self.count = len(self._w)
         self.steps = 0
         self.gamma = float(self.count)
+        self._held_out: tuple[Tensor, Tensor] | None = None
+        self._best: tuple[float, Tensor] | None = None
+        self._begin()
+
+    def start_from(self, network: Network) -> None:
+        """Take a network's weights for the first ones."""
+        import torch
+
+        weights = np.concatenate([network.hidden.ravel(), network.output.ravel()])
+        self._w = torch.from_numpy(weights)
+        self._begin()
+
+    def hold_out(self, inputs: FloatArray, targets: FloatArray) -> None:
+        """Choose among the steps by mapped rows that are not trained on."""
+        import torch
+
+        rows = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
+        self._held_out = rows, torch.from_numpy(np.ascontiguousarray(targets))
+
+    def _begin(self) -> None:
         self.alpha = 0.0
         self._squares = self._error(self._w)
         self.beta = (self._y.numel() - self.count) / (2 * self._squares)
         if self.beta <= 0:
             raise NetworkError(
-                f"{len(inputs)} rows are too few for {self.count} weights.",
+                f"{len(self._x)} rows are too few for {self.count} weights.",
                 fix="Train on more rows, or with fewer nodes.",
             )
 
@@ -235,11 +274,12 @@ class _Fit:
         return float(np.sqrt(self._squares / self._y.numel()))
 
     def weights(self) -> tuple[FloatArray, FloatArray]:
-        hidden, output = self._parts(self._w)
+        hidden, output = self._parts(self._w if self._best is None else self._best[1])
         return hidden.numpy().copy(), output.numpy().copy()
 
     def run(self, on_step: Callable[[int, float], None]) -> tuple[str, bool]:
         """Train; return why it stopped and whether that is convergence."""
+        self._compare()
         damping = self.FIRST_DAMPING
         history = [self.rmse]
         curvature, slope = self._normal()
@@ -250,6 +290,7 @@ class _Fit:
             self.steps += 1
             curvature, slope = self._normal()
             self._update_evidence(curvature)
+            self._compare()
             history.append(self.rmse)
             on_step(self.steps, self.rmse)
             if self.steps >= self.settings.patience:
@@ -259,6 +300,13 @@ class _Fit:
                     return f"the error fell by less than {tolerance:g} in {patience} steps", True
         return f"stopped after {self.steps} steps", False
 
+    def _compare(self) -> None:
+        """Keep the weights if none before did better on the rows held out."""
+        if self._held_out is not None:
+            error = self._error(self._w, [self._held_out])
+            if self._best is None or error < self._best[0]:
+                self._best = error, self._w
+
     def _parts(self, w: "Tensor") -> tuple["Tensor", "Tensor"]:
         cut = self._shapes[0][0] * self._shapes[0][1]
         return w[:cut].reshape(self._shapes[0]), w[cut:].reshape(self._shapes[1])
@@ -266,12 +314,14 @@ class _Fit:
     def _normal(self) -> tuple["Tensor", "Tensor"]:
         return _normal(_blocks(self._x, self._y), *self._parts(self._w))
 
-    def _error(self, w: "Tensor") -> float:
+    def _error(
+        self, w: "Tensor", blocks: Iterable[tuple["Tensor", "Tensor"]] | None = None
+    ) -> float:
         import torch
 
         hidden, output = self._parts(w)
         total = 0.0
-        for x, y in _blocks(self._x, self._y):
+        for x, y in _blocks(self._x, self._y) if blocks is None else blocks:
             estimate = torch.sigmoid(x @ hidden.T) @ output[:, :-1].T + output[:, -1]
             total += float(((estimate - y) ** 2).sum())
         return total

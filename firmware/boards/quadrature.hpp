@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "../core/guard.hpp"
+#include "../core/crossing.hpp"
 
 namespace rig {
 

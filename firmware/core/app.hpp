@@ -2,8 +2,8 @@
 //
 // Hardware offers
 //   std::uint32_t now_us();                                a free-running timer; it may wrap
-//   rig::Inputs sample();                                  counts; rig::kMissing where there is none
-//   void drive(const rig::Outputs&);                       set values of both motors
+//   Profile::Inputs sample();                              counts; rig::kMissing where there is none
+//   void drive(const Profile::Outputs&);                   set values of the motors
 //   std::size_t read(std::uint8_t* out, std::size_t room);  bytes from the host, without waiting
 //   std::size_t write(const std::uint8_t*, std::size_t);    takes what it can without waiting
 //   class Lock;                                            keeps the tick out while it lives
@@ -16,12 +16,12 @@
 
 namespace rig {
 
-template <class Hardware, std::size_t TransmitCapacity>
+template <class Profile, class Hardware, std::size_t TransmitCapacity>
 class App {
   public:
     App(Hardware& hardware, const char* serial) : hardware_(hardware), board_(serial) {}
 
-    // Once a millisecond, from the sampling timer.
+    // Once every Profile::kTickUs, from the sampling timer.
     void tick(std::uint32_t tick_us) {
         hardware_.drive(board_.tick(tick_us, hardware_.sample()));
     }
@@ -49,7 +49,7 @@ class App {
     }
 
     Hardware& hardware_;
-    Board<TransmitCapacity> board_;
+    Board<Profile, TransmitCapacity> board_;
     std::uint8_t waiting_[kChunk] = {};
     std::size_t first_ = 0;
     std::size_t last_ = 0;

@@ -1,30 +1,31 @@
 // The logger board without its hardware: bytes and sampled inputs in, commands and bytes out. A board
-// layer calls `receive` with what came from the host, `tick` once a millisecond, and `transmit` when
-// the host can take bytes. The Python twin is drivers/teensy/fake.py.
+// layer calls `receive` with what came from the host, `tick` once every Profile::kTickUs, and `transmit`
+// when the host can take bytes. The Python twin is drivers/teensy/fake.py.
+//
+// Profile says what is sampled and moved (profile_reference.hpp, profile_grasper.hpp): its Inputs,
+// Setpoint and Outputs, the frames that carry them, its limits and its controllers. Everything else, from
+// framing to watchdog, latches and safe state, is here and the same for all.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 
-#include "control.hpp"
+#include "crossing.hpp"
 #include "framing.hpp"
-#include "guard.hpp"
 #include "protocol.hpp"
+#include "safety_choice.hpp"
 #include "setpoint_queue.hpp"
 #include "watchdog.hpp"
 
 namespace rig {
 
-struct Outputs {
-    std::int32_t command_e4 = 0;
-    std::int32_t load_ma = 0;
-    bool in_force = false;  // whether the current controllers are to be enabled
-};
-
-template <std::size_t TransmitCapacity>
+template <class Profile, std::size_t TransmitCapacity>
 class Board {
   public:
+    using Inputs = typename Profile::Inputs;
+    using Setpoint = typename Profile::Setpoint;
+    using Outputs = typename Profile::Outputs;
+
     explicit Board(const char* serial) {
         for (std::size_t i = 0; i < kSerialSize && serial[i] != '\0'; ++i) {
             serial_[i] = static_cast<std::uint8_t>(serial[i]);
@@ -47,12 +48,12 @@ class Board {
     Outputs tick(std::uint32_t tick_us, const Inputs& inputs) {
         now_us_ = tick_us;
         const std::uint32_t silent_us = watchdog_.silent_us(tick_us);
-        const std::int64_t patience_us = guard_.limits().watchdog_us;
+        const std::int64_t patience_us = profile_.choice().watchdog_us;
         if (armed() && silent_us > patience_us) {
             trip({kHostSilent, kNoChannel, silent_us, patience_us, silent_us}, inputs);
         }
         if (armed() || holding()) {
-            const Crossing crossing = guard_.check(inputs);
+            const Crossing crossing = profile_.check(inputs);
             if (crossing.code != kNoTrip) trip(crossing, inputs);
         }
         const bool dry = armed() && queue_.empty();
@@ -60,12 +61,7 @@ class Board {
             held_ = queue_.pop();
             engaged_ = true;
         }
-        Outputs outputs;
-        outputs.in_force = engaged_ || holding();
-        if (outputs.in_force) {
-            outputs.command_e4 = controller_.tick(held_.target, inputs.spindle, inputs.motor);
-            outputs.load_ma = held_.load_ma;
-        }
+        const Outputs outputs = engaged_ || holding() ? profile_.drive(held_, inputs) : Outputs();
         if (streaming_) log(tick_us, inputs, outputs, dry);
         return outputs;
     }
@@ -76,7 +72,7 @@ class Board {
 
     // Goes to the safe state; the first cause stays.
     void trip(const Crossing& crossing, const Inputs& inputs) {
-        const bool hold = guard_.limits().safe_state == kHold && armed() &&
+        const bool hold = profile_.choice().safe_state == kHold && armed() &&
                           (engaged_ || !queue_.empty()) &&
                           (crossing.code == kHostSilent || crossing.code == kStalled ||
                            crossing.code == kSensorSaturated || crossing.code == kSensorStale);
@@ -90,10 +86,7 @@ class Board {
         }
         if (hold) {
             status |= kHolding;
-            held_.target = inputs.spindle;
-            held_.load_ma = 0;
-            controller_.limit_to(guard_.limits().hold_command_e4);
-            guard_.begin_to_hold();
+            held_ = profile_.begin_to_hold(inputs);
         }
         status_ = static_cast<std::uint16_t>(status);
     }
@@ -116,7 +109,7 @@ class Board {
         } else if (kind == kHello) {
             has_last_ = false;
             Writer reply = begin(kHelloReply, sequence);
-            reply.u32(kProtocolHash).u32(kFirmwareVersion).u32(kBuildHash);
+            reply.u32(Profile::kProtocolHash).u32(kFirmwareVersion).u32(kBuildHash);
             for (std::uint8_t character : serial_) reply.u8(character);
             send(reply);
         } else if (kind == kPing) {
@@ -149,11 +142,12 @@ class Board {
             case kTrip:
                 return body == 0 ? kOk : kWrongSize;
             case kArm:
-                return size == kArmSize ? kOk : kWrongSize;
+                return body == Profile::kArmSize ? kOk : kWrongSize;
             case kPing:
                 return size == kPingSize ? kOk : kWrongSize;
             case kSetpoints:
-                return body > 0 && body % kSetpointSize == 0 && body / kSetpointSize <= kMaxSetpoints
+                return body > 0 && body % Profile::kSetpointSize == 0 &&
+                               body / Profile::kSetpointSize <= Profile::kMaxSetpoints
                            ? kOk
                            : kWrongSize;
             default:
@@ -166,7 +160,7 @@ class Board {
             case kArm:
                 return arm(body);
             case kSetpoints:
-                return take_setpoints(body, size / kSetpointSize);
+                return take_setpoints(body, size / Profile::kSetpointSize);
             case kStart:
                 sequence_ = 0;
                 streaming_ = true;
@@ -182,17 +176,10 @@ class Board {
 
     Result arm(const std::uint8_t* body) {
         Reader reader(body);
-        Gains gains;
-        for (double* gain : {&gains.kp, &gains.ki, &gains.kd, &gains.velocity_filter, &gains.limit}) {
-            *gain = reader.f64();
-        }
-        const Limits limits = Limits::read(reader);
-        if (!gains.valid() || !limits.valid()) return kBadValue;
+        if (!profile_.arm(reader)) return kBadValue;
         release();
-        guard_.arm(limits);
         first_ = Crossing();
         first_us_ = 0;
-        controller_.reset(gains);
         status_ = kArmed;
         return kOk;
     }
@@ -201,17 +188,11 @@ class Board {
         if (!armed()) return kNotArmed;
         Reader check(body);
         for (std::size_t i = 0; i < count; ++i) {
-            const std::int32_t target = check.i32();
-            if (!guard_.limits().allow(target, check.i16())) return kBadValue;
+            if (!profile_.allow(Setpoint::read(check))) return kBadValue;
         }
         if (count > queue_.free()) return kQueueFull;
         Reader reader(body);
-        for (std::size_t i = 0; i < count; ++i) {
-            Setpoint setpoint;
-            setpoint.target = reader.i32();
-            setpoint.load_ma = reader.i16();
-            queue_.push(setpoint);
-        }
+        for (std::size_t i = 0; i < count; ++i) queue_.push(Setpoint::read(reader));
         return kOk;
     }
 
@@ -237,37 +218,15 @@ class Board {
 
     void log(std::uint32_t tick_us, const Inputs& inputs, const Outputs& outputs, bool dry) {
         unsigned status = status_;
-        if (saturated(inputs)) status |= kSaturated;
+        if (profile_.saturated(inputs)) status |= kSaturated;
         if (dry) status |= kQueueDry;
         Writer sample;
         sample.u8(kVersion).u8(kSample).u16(static_cast<std::uint16_t>(status));
         sample.u32(sequence_++).u32(tick_us);
-        sample.i32(inputs.motor).i32(inputs.spindle).i32(inputs.jaw);
-        sample.i32(engaged_ || holding() ? held_.target : inputs.spindle);
-        sample.i16(clip16(inputs.proximal)).i16(clip16(inputs.distal)).i16(clip16(inputs.current));
-        sample.u16(static_cast<std::uint16_t>(clip(inputs.fsr, 0, 65535)));
-        sample.i16(clip16(outputs.command_e4)).i16(clip16(outputs.load_ma));
+        const bool asked = engaged_ || holding();
+        Profile::write(sample, inputs, asked ? held_ : Profile::resting(inputs), outputs);
         sample.u16(transmitter_.dropped());
         send(sample);
-    }
-
-    static bool saturated(const Inputs& inputs) {
-        for (std::int32_t count : {inputs.proximal, inputs.distal, inputs.current}) {
-            if (count <= INT16_MIN || count >= INT16_MAX) return true;
-        }
-        return inputs.fsr >= kFsrMax;
-    }
-
-    static std::int32_t clip(std::int32_t value, std::int32_t low, std::int32_t high) {
-        if (value < low) return low;
-        return value > high ? high : value;
-    }
-    static std::int32_t clip32(std::int64_t value) {
-        if (value < INT32_MIN) return INT32_MIN;
-        return value > INT32_MAX ? INT32_MAX : static_cast<std::int32_t>(value);
-    }
-    static std::int16_t clip16(std::int32_t value) {
-        return static_cast<std::int16_t>(clip(value, INT16_MIN, INT16_MAX));
     }
 
     static Writer begin(Kind kind, std::uint16_t sequence) {
@@ -278,14 +237,11 @@ class Board {
 
     void send(const Writer& writer) { transmitter_.send(writer.bytes(), writer.size()); }
 
-    static constexpr std::int32_t kFsrMax = 4095;
-
     std::uint8_t serial_[kSerialSize] = {};
     FrameReceiver receiver_;
     FrameTransmitter<TransmitCapacity> transmitter_;
-    SetpointQueue<kQueueCapacity> queue_;
-    Controller controller_;
-    Guard guard_;
+    SetpointQueue<Setpoint, kQueueCapacity> queue_;
+    Profile profile_;
     Crossing first_;  // since the board was armed
     std::uint32_t first_us_ = 0;
     Watchdog watchdog_;

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <initializer_list>
 
+#include "protocol.hpp"
+
 namespace rig {
 
 constexpr double kMaxGain = 1e6;
@@ -19,6 +21,10 @@ struct Gains {
     double kd = 0;
     double velocity_filter = 0;
     double limit = 0;
+
+    void read(Reader& reader) {
+        for (double* gain : {&kp, &ki, &kd, &velocity_filter, &limit}) *gain = reader.f64();
+    }
 
     // False for NaN too: no such number ever reaches a set-point.
     bool valid() const {

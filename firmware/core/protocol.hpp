@@ -1,22 +1,20 @@
-// What the board and the host say to each other. The text below is the contract: both sides compare
-// its CRC-32 before anything moves. Its twin is drivers/teensy/protocol.py, which spells the same
-// text out of its layouts.
+// What the board and the host say to each other. The contract is a text, the lines below and those of
+// the board's profile: both sides compare its CRC-32 before anything moves. The twin is
+// drivers/teensy/protocol.py, which spells the same text out of its layouts.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 
 namespace rig {
 
 constexpr std::uint8_t kVersion = 1;
-constexpr std::uint32_t kFirmwareVersion = 0x000200;
-constexpr std::size_t kMaxSetpoints = 100;
+constexpr std::uint32_t kFirmwareVersion = 0x000300;
 constexpr std::size_t kQueueCapacity = 2000;
-constexpr std::uint32_t kWatchdogUs = 250000;
 constexpr std::int32_t kMinWatchdogUs = 5000;
 constexpr std::int32_t kMaxWatchdogUs = 1000000;
-constexpr std::int64_t kTickUs = 1000;
 
 // CRC-32 of the sources, set by the build
 #ifndef RIG_BUILD_HASH
@@ -24,26 +22,18 @@ constexpr std::int64_t kTickUs = 1000;
 #endif
 constexpr std::uint32_t kBuildHash = RIG_BUILD_HASH;
 
-constexpr char kLayout[] =
-    "rig teensy protocol 1\n"
-    "COBS(payload, CRC-16/CCITT-FALSE u2) 00\n"
-    "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor i4, spindle i4, "
-    "jaw i4, target i4, proximal i2, distal i2, current i2, fsr u2, command_e4 i2, load_ma i2, "
-    "dropped u2\n"
+// The lines of the contract that every profile has; its own are in its header.
+constexpr char kFramingLines[] = "COBS(payload, CRC-16/CCITT-FALSE u2) 00\n";
+constexpr char kAnswerLines[] =
     "2 HELLO_REPLY: version u1, kind u1, sequence u2, protocol_hash u4, firmware_version u4, "
     "build_hash u4, serial S24\n"
     "3 ACK: version u1, kind u1, sequence u2, command u1, result u1, status u2, queue_free u2\n"
     "4 PONG: version u1, kind u1, sequence u2, token u8, tick_us u4\n"
     "5 TRIP_REPORT: version u1, kind u1, sequence u2, code u1, channel u1, value i4, limit i4, "
     "tick_us u4, late_us u4\n"
-    "16 HELLO: version u1, kind u1, sequence u2\n"
-    "17 ARM: version u1, kind u1, sequence u2, kp f8, ki f8, kd f8, velocity_filter f8, limit "
-    "f8, max_current i4, max_load_ma i4, max_proximal i4, max_distal i4, min_spindle i4, "
-    "max_spindle i4, min_jaw i4, max_jaw i4, max_motor_step i4, continuous_current i4, i2t i4, "
-    "stall_current i4, stall_motion i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, "
-    "watchdog_us i4, safe_state i4, hold_command_e4 i4\n"
-    "18 START: version u1, kind u1, sequence u2\n"
-    "19 SETPOINTS: version u1, kind u1, sequence u2, 100 x (target i4, load_ma i2)\n"
+    "16 HELLO: version u1, kind u1, sequence u2\n";
+constexpr char kStartLine[] = "18 START: version u1, kind u1, sequence u2\n";
+constexpr char kOtherLines[] =
     "20 STOP: version u1, kind u1, sequence u2\n"
     "21 DISARM: version u1, kind u1, sequence u2\n"
     "22 PING: version u1, kind u1, sequence u2, token u8\n"
@@ -52,7 +42,7 @@ constexpr char kLayout[] =
     "HOLDING, trip << 8\n"
     "trip: 0 NONE, 1 HOST_SILENT, 2 OVER_CURRENT, 3 PROXIMAL_TORQUE, 4 DISTAL_TORQUE, 5 "
     "SPINDLE_TRAVEL, 6 JAW_TRAVEL, 7 OVER_SPEED, 8 OVERHEATED, 9 STALLED, 10 SENSOR_SATURATED, "
-    "11 SENSOR_STALE, 12 SENSOR_MISSING\n"
+    "11 SENSOR_STALE, 12 SENSOR_MISSING, 13 MOTOR_TRAVEL, 14 OVER_FORCE\n"
     "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, 6 "
     "WRONG_VERSION\n";
 
@@ -96,6 +86,8 @@ enum Trip : std::uint8_t {
     kSensorSaturated = 10,
     kSensorStale = 11,
     kSensorMissing = 12,
+    kMotorTravel = 13,
+    kOverForce = 14,
 };
 
 enum Result : std::uint8_t {
@@ -109,23 +101,44 @@ enum Result : std::uint8_t {
 };
 
 constexpr std::size_t kHeaderSize = 4;
-constexpr std::size_t kSetpointSize = 6;
 constexpr std::size_t kSerialSize = 24;
-constexpr std::size_t kGains = 5;
-constexpr std::size_t kLimits = 19;
-constexpr std::size_t kArmSize = kHeaderSize + 8 * kGains + 4 * kLimits;
 constexpr std::size_t kPingSize = kHeaderSize + 8;
 
-constexpr std::uint32_t crc32(const char* text, std::size_t size) {
-    std::uint32_t crc = 0xFFFFFFFFU;
-    for (std::size_t i = 0; i < size; ++i) {
-        crc ^= static_cast<std::uint8_t>(text[i]);
+constexpr std::uint32_t crc32_next(std::uint32_t crc, const char* text) {
+    for (; *text != '\0'; ++text) {
+        crc ^= static_cast<std::uint8_t>(*text);
         for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
+    }
+    return crc;
+}
+
+constexpr std::uint32_t crc32(const char* text) { return ~crc32_next(0xFFFFFFFFU, text); }
+
+// CRC-32 of the whole contract of a profile, in the order of the twin.
+constexpr std::uint32_t protocol_hash(const char* title, const char* sample, const char* arm,
+                                      const char* setpoints) {
+    std::uint32_t crc = 0xFFFFFFFFU;
+    for (const char* lines : {title, kFramingLines, sample, kAnswerLines, arm, kStartLine, setpoints,
+                              kOtherLines}) {
+        crc = crc32_next(crc, lines);
     }
     return ~crc;
 }
 
-constexpr std::uint32_t kProtocolHash = crc32(kLayout, sizeof(kLayout) - 1);
+constexpr std::int32_t clip(std::int32_t value, std::int32_t low, std::int32_t high) {
+    if (value < low) return low;
+    return value > high ? high : value;
+}
+constexpr std::int16_t clip16(std::int32_t value) {
+    return static_cast<std::int16_t>(clip(value, INT16_MIN, INT16_MAX));
+}
+constexpr std::uint16_t clip_u16(std::int32_t value) {
+    return static_cast<std::uint16_t>(clip(value, 0, UINT16_MAX));
+}
+constexpr std::int32_t clip32(std::int64_t value) {
+    if (value < INT32_MIN) return INT32_MIN;
+    return value > INT32_MAX ? INT32_MAX : static_cast<std::int32_t>(value);
+}
 
 // Writes little-endian fields one after another.
 class Writer {

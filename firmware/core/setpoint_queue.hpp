@@ -3,16 +3,10 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
 namespace rig {
 
-struct Setpoint {
-    std::int32_t target = 0;
-    std::int16_t load_ma = 0;
-};
-
-template <std::size_t Capacity>
+template <class Setpoint, std::size_t Capacity>
 class SetpointQueue {
   public:
     std::size_t free() const { return Capacity - used_; }

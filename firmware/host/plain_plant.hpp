@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "../core/board.hpp"
+#include "../core/profile_reference.hpp"
 
 namespace rig {
 
 class PlainPlant {
   public:
-    Inputs sample() {
-        Inputs counts;
+    ReferenceProfile::Inputs sample() {
+        ReferenceProfile::Inputs counts;
         counts.motor = whole(angle_ * kMotorCounts);
         counts.spindle = whole(-angle_ * kSpindleCounts);
         counts.jaw = whole(angle_ * kJawCounts);
@@ -25,7 +25,7 @@ class PlainPlant {
     }
 
     // Moves 1 ms.
-    void step(const Outputs& outputs) {
+    void step(const ReferenceProfile::Outputs& outputs) {
         current_ = -kFullScaleA * 1e-4 * outputs.command_e4;
         const double load = kLoadTorque * 1e-3 * outputs.load_ma;
         for (int part = 0; part < kParts; ++part) {

@@ -1,11 +1,11 @@
 // The firmware as a process of its own, in real time, on a pseudo-terminal: what a board on USB is to
 // a host, with a small plant in place of the rig. Prints the terminal's path and runs until it is
 // told to end or its parent is gone.
-//   build/rig_firmware [SERIAL]
+//   build/rig_firmware [reference | grasper]
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
+#include <cstring>
 #include <ctime>
 
 #include <fcntl.h>
@@ -14,12 +14,12 @@
 #include <unistd.h>
 
 #include "../core/app.hpp"
+#include "plain_grasper.hpp"
 #include "plain_plant.hpp"
 
 namespace {
 
 constexpr std::size_t kTransmitCapacity = 65536;
-constexpr std::uint64_t kTickNs = 1000000;
 
 volatile std::sig_atomic_t ended = 0;
 void end(int) { ended = 1; }
@@ -39,6 +39,7 @@ void sleep_until(std::uint64_t when_ns) {
     }
 }
 
+template <class Profile, class Plant>
 class PtyHardware {
   public:
     struct Lock {  // one thread: nothing to keep out
@@ -48,8 +49,8 @@ class PtyHardware {
     explicit PtyHardware(int master) : master_(master) {}
 
     std::uint32_t now_us() { return static_cast<std::uint32_t>(now_ns() / 1000U); }
-    rig::Inputs sample() { return plant_.sample(); }
-    void drive(const rig::Outputs& outputs) { plant_.step(outputs); }
+    typename Profile::Inputs sample() { return plant_.sample(); }
+    void drive(const typename Profile::Outputs& outputs) { plant_.step(outputs); }
 
     std::size_t read(std::uint8_t* out, std::size_t room) { return some(::read(master_, out, room)); }
     std::size_t write(const std::uint8_t* data, std::size_t size) {
@@ -61,7 +62,7 @@ class PtyHardware {
     static std::size_t some(ssize_t count) { return count > 0 ? static_cast<std::size_t>(count) : 0; }
 
     int master_;
-    rig::PlainPlant plant_;
+    Plant plant_;
 };
 
 int open_master() {
@@ -73,9 +74,32 @@ int open_master() {
     return tcsetattr(master, TCSANOW, &raw) == 0 ? master : -1;
 }
 
+template <class Profile, class Plant>
+void run(int master, const char* serial) {
+    using Hardware = PtyHardware<Profile, Plant>;
+    constexpr std::uint64_t kTickNs = 1000U * static_cast<std::uint64_t>(Profile::kTickUs);
+    Hardware hardware(master);
+    static rig::App<Profile, Hardware, kTransmitCapacity> app(hardware, serial);
+    const std::uint64_t began_ns = now_ns();
+    for (std::uint64_t tick = 1; !ended; ++tick) {
+        // the clock says when a tick is due, so a process that slept too long catches up
+        const std::uint64_t due_ns = began_ns + tick * kTickNs;
+        if (now_ns() < due_ns) sleep_until(due_ns);
+        app.exchange();
+        app.tick(static_cast<std::uint32_t>(due_ns / 1000U));
+        app.exchange();
+    }
+}
+
 }  // namespace
 
 int main(int count, char** words) {
+    const char* profile = count > 1 ? words[1] : "reference";
+    const bool grasper = std::strcmp(profile, "grasper") == 0;
+    if (!grasper && std::strcmp(profile, "reference") != 0) {
+        std::fprintf(stderr, "no profile %s: reference or grasper\n", profile);
+        return 2;
+    }
     std::signal(SIGTERM, end);
     std::signal(SIGINT, SIG_IGN);  // Ctrl-C is the host's; the board makes itself safe
     prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -86,16 +110,10 @@ int main(int count, char** words) {
     }
     std::printf("%s\n", ptsname(master));
     std::fflush(stdout);
-    PtyHardware hardware(master);
-    static rig::App<PtyHardware, kTransmitCapacity> app(hardware, count > 1 ? words[1] : "PTY-0001");
-    const std::uint64_t began_ns = now_ns();
-    for (std::uint64_t tick = 1; !ended; ++tick) {
-        // the clock says when a tick is due, so a process that slept too long catches up
-        const std::uint64_t due_ns = began_ns + tick * kTickNs;
-        if (now_ns() < due_ns) sleep_until(due_ns);
-        app.exchange();
-        app.tick(static_cast<std::uint32_t>(due_ns / 1000U));
-        app.exchange();
+    if (grasper) {
+        run<rig::GrasperProfile, rig::PlainGrasper>(master, "PTY-GRASPER-0001");
+    } else {
+        run<rig::ReferenceProfile, rig::PlainPlant>(master, "PTY-0001");
     }
     return 0;
 }

@@ -3,14 +3,64 @@
 #include "../boards/escon.hpp"
 #include "../core/board.hpp"
 #include "../core/can_segments.hpp"
+#include "../core/profile_grasper.hpp"
+#include "../core/profile_reference.hpp"
 
+#include <cstring>
 #include <new>
 
 namespace {
 
 constexpr std::size_t kTransmitCapacity = 65536;
 
-using HostBoard = rig::Board<kTransmitCapacity>;
+// A board of any profile, its inputs and outputs as rows of whole numbers.
+class HostBoard {
+  public:
+    virtual ~HostBoard() = default;
+    virtual void receive(const std::uint8_t* data, std::size_t size) = 0;
+    virtual void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) = 0;
+    virtual std::size_t transmit(std::uint8_t* out, std::size_t room) = 0;
+};
+
+rig::ReferenceProfile::Inputs inputs_of(const std::int32_t* row, rig::ReferenceProfile) {
+    return {row[0], row[1], row[2], row[3], row[4], row[5], row[6]};
+}
+
+rig::GrasperProfile::Inputs inputs_of(const std::int32_t* row, rig::GrasperProfile) {
+    rig::GrasperProfile::Inputs inputs;
+    for (std::size_t k = 0; k < rig::GrasperProfile::kMotors; ++k) {
+        inputs.motor[k] = row[k];
+        inputs.current[k] = row[rig::GrasperProfile::kMotors + k];
+        inputs.force[k] = row[2 * rig::GrasperProfile::kMotors + k];
+    }
+    return inputs;
+}
+
+void put(const rig::ReferenceProfile::Outputs& outputs, std::int32_t* row) {
+    row[0] = outputs.command_e4;
+    row[1] = outputs.load_ma;
+}
+
+void put(const rig::GrasperProfile::Outputs& outputs, std::int32_t* row) {
+    for (std::int32_t command_e4 : outputs.command_e4) *row++ = command_e4;
+}
+
+template <class Profile>
+class ProfileBoard final : public HostBoard {
+  public:
+    explicit ProfileBoard(const char* serial) : board_(serial) {}
+
+    void receive(const std::uint8_t* data, std::size_t size) override { board_.receive(data, size); }
+    void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) override {
+        put(board_.tick(tick_us, inputs_of(inputs, Profile())), outputs);
+    }
+    std::size_t transmit(std::uint8_t* out, std::size_t room) override {
+        return board_.transmit(out, room);
+    }
+
+  private:
+    rig::Board<Profile, kTransmitCapacity> board_;
+};
 
 // the module of the tests: 10 to 90 % duty is -2 to 2 A, 0 to 3.3 V is -2 to 2 A
 constexpr rig::EsconWiring kEscon{{0.1, -2.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
@@ -21,8 +71,16 @@ HostBoard* board_of(void* handle) { return static_cast<HostBoard*>(handle); }
 
 extern "C" {
 
-// Returns null when there is no memory.
-void* rig_board_create(const char* serial) { return new (std::nothrow) HostBoard(serial); }
+// Returns null when there is no such profile, `reference` or `grasper`, or no memory.
+void* rig_board_create(const char* profile, const char* serial) {
+    HostBoard* board = nullptr;
+    if (std::strcmp(profile, "reference") == 0) {
+        board = new (std::nothrow) ProfileBoard<rig::ReferenceProfile>(serial);
+    } else if (std::strcmp(profile, "grasper") == 0) {
+        board = new (std::nothrow) ProfileBoard<rig::GrasperProfile>(serial);
+    }
+    return board;
+}
 
 void rig_board_destroy(void* board) { delete board_of(board); }
 
@@ -31,19 +89,10 @@ void rig_board_receive(void* board, const std::uint8_t* data, std::size_t size) 
 }
 
 // inputs: motor, spindle, jaw, proximal, distal, current, fsr counts; outputs: command_e4, load_ma.
+// A grasper: three motor, three current, three force counts; outputs: three command_e4.
 void rig_board_tick(void* board, std::uint32_t tick_us, const std::int32_t* inputs,
                     std::int32_t* outputs) {
-    rig::Inputs sampled;
-    sampled.motor = inputs[0];
-    sampled.spindle = inputs[1];
-    sampled.jaw = inputs[2];
-    sampled.proximal = inputs[3];
-    sampled.distal = inputs[4];
-    sampled.current = inputs[5];
-    sampled.fsr = inputs[6];
-    const rig::Outputs given = board_of(board)->tick(tick_us, sampled);
-    outputs[0] = given.command_e4;
-    outputs[1] = given.load_ma;
+    board_of(board)->tick(tick_us, inputs, outputs);
 }
 
 // Cuts the frames in `wire` into CAN frames: a length byte and 8 bytes each; returns how many.

@@ -49,7 +49,7 @@ TEST_CASE("a 16-bit counter is followed over its ends, however often") {
         expected += step;
         CHECK(counter.follow(raw) == expected);
     }
-    rig::TeensyHardware teensy;
+    rig::ReferenceHardware teensy;
     teensy.begin();
     FTM1_CNT = 0xFFFF;
     FTM2_CNT = 3;
@@ -58,7 +58,7 @@ TEST_CASE("a 16-bit counter is followed over its ends, however often") {
 }
 
 TEST_CASE("the spindle counts its edges both ways, and is missing for good once one was skipped") {
-    rig::TeensyHardware teensy;
+    rig::ReferenceHardware teensy;
     teensy.begin();
     const std::int32_t began = teensy.sample().spindle;
     turn(8192 + 3);

@@ -13,8 +13,8 @@ from drivers.teensy.fake import TeensyFake
 from drivers.teensy.guard import COLUMNS, Drive
 from drivers.transport.simulated import SimulatedTransport
 from rig.config import Config
-from rig.simulation import hidden, parameters
 from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench
+from rig.simulation.logger import plant_and_sensors
 from rig.simulation.press import PressedFsr, press_force_n
 from rig.simulation.sensors import DISTAL, FSR, PROXIMAL
 
@@ -27,14 +27,7 @@ class HandledBench:
 
     def __init__(self, config: Config) -> None:
         simulation = config.simulation
-        effects = [hidden.HiddenEffect(name, value) for name, value in simulation.hidden.items()]
-        if simulation.draw_hidden is not None:
-            effects.append(hidden.draw(simulation.draw_hidden))
-        plant, sensors = parameters.PlantParameters(), parameters.SensorParameters()
-        if simulation.spread:
-            plant = parameters.vary(plant, simulation.seed, simulation.spread)
-            sensors = parameters.vary(sensors, simulation.seed, simulation.spread)
-        self._plant, self._sensors, self._effects = plant, sensors, effects
+        self._plant, self._sensors, self._effects = plant_and_sensors(simulation)
         self._inner = self._made(REFERENCE_START_COUNT, simulation.seed)
         self._seed = simulation.seed
         self._added = np.zeros(COLUMNS)

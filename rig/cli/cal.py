@@ -216,20 +216,32 @@ def diagnose(
     record: Hash,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     store: StoreOption = None,
+    ledger: Annotated[
+        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Ask the diagnosis what a calibration of a force-sensing resistor lacks, on its raw logs."""
-    from rig.calibrate.diagnose import diagnose_record
+    """Ask the diagnosis what a calibration lacks, on the raw logs it was made from."""
+    from rig.calibrate.diagnose import declared_by_record
+    from rig.diagnosis.ledger import Ledger, default_ledger
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
     screen = console()
-    found = diagnose_record(
-        _store(store).get(record), seed, on_stage=lambda what: screen.print(f"{what} ...")
+    asked = of_calibration(declared_by_record(_store(store).get(record)))
+    looks = Ledger(ledger or default_ledger())
+    done = run_diagnosis(
+        asked.campaign,
+        asked.models,
+        looks,
+        seed=seed,
+        on_stage=lambda what: screen.print(f"{what} ..."),
     )
-    for line in [*sentences(found), *found.notes]:
+    for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
         screen.print(line, markup=False)
     if json:
-        emit_json(found.to_json())
+        emit_json(done.diagnosis.to_json())
 
 
 def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:

@@ -86,6 +86,7 @@ def torque(
     sensor: Annotated[str, typer.Option(help="proximal or distal.")] = "proximal",
     arm_mm: Annotated[float, typer.Option(help="From the axis to the weights, mm.")] = 100.0,
     masses_g: Annotated[str, typer.Option(help="Weights, g, rising.")] = "50,100,150,200,250",
+    repeats: Annotated[int, typer.Option(min=1, help="How often to go up and down.")] = 1,
     shunt_v_v: Annotated[
         float | None, typer.Option(help="Change by the shunt on the certificate, V/V.")
     ] = None,
@@ -103,6 +104,7 @@ def torque(
         sensor=sensor,
         arm_m=arm_mm / 1e3,
         masses_kg=tuple(mass / 1e3 for mass in _numbers(masses_g, "--masses-g")),
+        repeats=repeats,
         shunt_v_v=shunt_v_v,
         counts_per_v_v=counts_per_v_v,
         temperature_k=None if temperature_c is None else temperature_c + 273.15,
@@ -134,25 +136,31 @@ def current(
 @session
 def gearbox(
     loads_a: Annotated[str, typer.Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 2,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 1,
     ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
+    stiffness_only: Annotated[
+        bool, typer.Option("--stiffness-only", help="Model no backlash.")
+    ] = False,
 ) -> "Procedure":
     """Gear: stiffness of its twist, and backlash."""
     from calibration.sessions.gearbox import GearboxSession
 
     loads = tuple(_numbers(loads_a, "--loads-a"))
-    return GearboxSession(loads_a=loads, repeats=repeats, gear_ratio=ratio)
+    return GearboxSession(
+        loads_a=loads, repeats=repeats, gear_ratio=ratio, stiffness_only=stiffness_only
+    )
 
 
 @session
 def encoder(
     which: Annotated[str, typer.Option(help="spindle or jaw.")] = "spindle",
-    repeats: Annotated[int, typer.Option(min=2, help="How often each load is moved.")] = 3,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 2,
+    line_only: Annotated[bool, typer.Option("--line-only", help="Model no wave.")] = False,
 ) -> "Procedure":
     """Encoder: zero at its mark, and against the next one ratio, offset and wave."""
     from calibration.sessions.encoder import EncoderSession
 
-    return EncoderSession(encoder=which, repeats=repeats)
+    return EncoderSession(encoder=which, repeats=repeats, line_only=line_only)
 
 
 @session
@@ -161,6 +169,7 @@ def ft(
     jaw_turn_deg: Annotated[
         str, typer.Option(help="Turns of the jaw's frame about x, y, z of the sensor.")
     ] = "0,0,0",
+    repeats: Annotated[int, typer.Option(min=1, help="How often to go through the poses.")] = 1,
 ) -> "Procedure":
     """Force sensor: bias, weight and centre of mass of its tool, and the way to the jaw."""
     from math import radians
@@ -169,6 +178,7 @@ def ft(
 
     jaw, turn = _three(jaw_mm, "--jaw-mm"), _three(jaw_turn_deg, "--jaw-turn-deg")
     return FtSession(
+        repeats=repeats,
         jaw_m=(jaw[0] / 1e3, jaw[1] / 1e3, jaw[2] / 1e3),
         jaw_turn_rad=(radians(turn[0]), radians(turn[1]), radians(turn[2])),
     )

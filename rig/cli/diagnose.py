@@ -22,7 +22,7 @@ def diagnose(
         Path | None, typer.Option(help="Folder for the page that a person reads.")
     ] = None,
     model_out: Annotated[
-        Path | None, typer.Option(help="Where the model with the named effects goes.")
+        Path | None, typer.Option(help="Where the models with what was found go, one file.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
@@ -55,28 +55,23 @@ def diagnose(
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import declared_models, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters
-    from rig.errors import UsageError
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
 
     screen = console()
-    models = declared_models(model, balance)
-    if model_out is not None and len(models) > 1:
-        raise UsageError(
-            f"--model-out names one file, and there are {len(models)} balances.",
-            fix=f"Choose one with --balance: {', '.join(m.balance for m in models)}.",
-        )
+    asked = subject(path, model, balance, format_)
+    models = asked.models
     with engine(workers, scheduler) as executor:
         done = run_diagnosis(
-            path,
+            asked.campaign,
             models,
             Ledger(ledger or default_ledger()),
             seed=seed,
-            format_name=format_,
             executor=executor,
             quick=quick,
             on_stage=lambda what: screen.print(f"{what} ..."),
@@ -88,8 +83,7 @@ def diagnose(
     for note in done.diagnosis.notes:
         screen.print(note, markup=False)
     if model_out is not None:
-        (story,) = done.stories.values()
-        model_file.write(story.model, model_out)
+        model_file.write_all([story.model for story in done.stories.values()], model_out)
         screen.print(f"Model: {model_out}", markup=False)
     if report is not None:
         where = write_report(report / "diagnosis.html", page(done, Provenance.now(seed)))

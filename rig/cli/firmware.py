@@ -14,7 +14,9 @@ firmware_app = typer.Typer(
     rich_markup_mode=None,
 )
 
-BoardOption = Annotated[str, typer.Option("--board", "-b", help="teensy35 or teensy41.")]
+BoardOption = Annotated[
+    str, typer.Option("--board", "-b", help="teensy35, teensy41 or teensy41-grasper.")
+]
 
 
 @firmware_app.command()

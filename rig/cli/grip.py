@@ -36,6 +36,7 @@ def grip(
     from rig.trajectory import SAMPLE_RATE_HZ
 
     settings = load_config(config)
+    most_a = SHARE * settings.reference_limits.load_command_a
     path = model or settings.model_path
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
@@ -54,7 +55,6 @@ def grip(
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
     allowed = estimator.half_width
-    most_a = SHARE * settings.limits.load_command_a
     is_reached = late[-1].load_a < most_a
     if not is_reached:
         screen.print(f"The load is at its most, {most_a:g} A: the torque was not reached.")

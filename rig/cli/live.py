@@ -44,7 +44,7 @@ def live(
 ) -> int:
     """Show grip torque, estimate against sensor, as the rig measures it.
 
-    A simulated rig plays the quick protocol unless told otherwise; a real rig is never moved
+    A simulated rig plays a first look unless told otherwise; a real rig is never moved
     without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
     terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
     """
@@ -58,18 +58,19 @@ def live(
     from rig.live.until import until
     from rig.live.watching import watched
     from rig.logger import open_logger
+    from rig.machines.choose import machine_of
     from rig.protocol import load_protocol
-    from rig.trajectory import SAMPLE_RATE_HZ
 
     if grasper:
         return _show_grasper(duration, pace, plain, json_)
     settings = load_config(config)
     refuse_problems(settings)
+    machine = machine_of(settings)
     if protocol is None and settings.is_simulated:
-        protocol = "quick" if settings.limits.load_command_a else "unloaded"
-    plans = load_protocol(protocol).plans() if protocol else []
+        protocol = machine.first_look(settings)
+    plans = load_protocol(protocol).any_plans() if protocol else []
     model_path = model or settings.model_path
-    estimator = ModelEstimator(model_path, SAMPLE_RATE_HZ) if model_path else None
+    estimator = ModelEstimator(model_path, machine.profile.rate_hz) if model_path else None
     with pressed_keys() as keys:
         blocks = session_blocks(
             settings,
@@ -87,7 +88,7 @@ def live(
             blocks = published(blocks, foxglove_port)
         options = ShowOptions(
             title=f"rig live: {settings.name}",
-            channels=(estimator.target_channel if estimator else "distal_torque_n_m",),
+            channels=(estimator.target_channel,) if estimator else machine.shown,
             lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
             plain=plain,
             json=json_,

@@ -39,7 +39,7 @@ def loop(
     from rig.config import load_config
     from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
-    from rig.diagnosis.run import declared_models
+    from rig.diagnosis.subject import declared_models
     from rig.errors import UsageError
     from rig.protocol import load_protocol
     from rig.reports.diagnosis import page

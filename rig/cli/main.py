@@ -17,6 +17,7 @@ from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
+from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
 from rig.cli.live import live
 from rig.cli.log import log_app
@@ -51,6 +52,7 @@ app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.command()(loop)
 app.add_typer(log_app, name="log")
+app.add_typer(grasper_app, name="grasper")
 app.add_typer(study_app, name="study")
 app.add_typer(config_app, name="config")
 app.command()(doctor)

@@ -12,7 +12,7 @@ from rig.cli.output import JsonFlag, console, emit_json, progress
 def record(
     protocol: Annotated[
         str | None,
-        typer.Option("--protocol", "-p", help="Protocol file or shipped name; quick if none."),
+        typer.Option("--protocol", "-p", help="Protocol file or shipped name."),
     ] = None,
     config: Annotated[
         Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
@@ -37,6 +37,7 @@ def record(
     from rig.config_check import refuse_problems
     from rig.errors import UsageError
     from rig.logger import open_logger
+    from rig.machines.choose import machine_of
     from rig.protocol import load_protocol
     from rig.record import RunResult, open_campaign_folder, read_manifest, record_campaign
     from rig.session import Session
@@ -53,9 +54,10 @@ def record(
         plan, settings = read_manifest(resume)
         folder = resume
     else:
-        plan, settings = load_protocol(protocol or "quick"), load_config(config)
+        settings = load_config(config)
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
+        plan = load_protocol(protocol or machine_of(settings).first_look(settings))
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
@@ -66,7 +68,7 @@ def record(
     results: list[RunResult] = []
     try:
         with Session(settings, open_logger(settings)) as session, progress() as bar:
-            samples = sum(run.target_angle_rad.size for run in todo)
+            samples = sum(run.samples for run in todo)
             task = bar.add_task("recording", total=samples)
             done = 0
 
@@ -89,5 +91,5 @@ def record(
     )
     if json:
         told = {"folder": folder, "runs": results, "look_at": bad}
-        emit_json(told if watch is None else {**told, "model": watch.to_json()})
+        emit_json(told if watch is None else {**told, "models": watch.to_json()})
     return 1 if bad else 0

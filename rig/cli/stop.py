@@ -14,11 +14,12 @@ def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
     from rig.config import load_config
     from rig.errors import ExitCode
     from rig.logger import open_logger
+    from rig.machines.choose import machine_of
 
     settings = load_config(config)
     screen = console()
     try:
-        with TeensyLogger(open_logger(settings)) as logger:
+        with TeensyLogger(open_logger(settings), machine_of(settings).profile) as logger:
             logger.disarm()
     except DriverError as error:
         screen.print(f"{settings.name}: UNKNOWN. Take the motors for live.", markup=False)

@@ -1,5 +1,6 @@
-"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, external force."""
+"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, grasp."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -38,6 +39,37 @@ def pique(
         )
     lines = [shown.lead(study), *shown.notes(study)]
     show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def excitation(
+    starts: Annotated[int, typer.Option(min=1, help="Random starts, from seed 0.")] = 5,
+    evaluations: Annotated[
+        int, typer.Option(min=100, help="Condition numbers each search may take of each start.")
+    ] = 3000,
+    trajectory: Annotated[
+        Path | None, typer.Option(help="File for one period of the best one, as text at 200 Hz.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Design an arm's excitation within its limits at every instant, beside the thesis' search."""
+    from rig.reports.table import to_markdown
+    from rig.studies.excitation import run_excitation, table, write_trajectory
+
+    with progress() as bar:
+        task = bar.add_task("starts", total=starts)
+        study, best = run_excitation(starts, evaluations, lambda: bar.advance(task))
+    if trajectory is not None:
+        write_trajectory(best, trajectory)
+
+    def markdown() -> str:
+        title = f"# Excitation of the {study.arm}"
+        return f"{title}\n\n{to_markdown(table(study))}\n{study.provenance.line()}\n"
+
+    show_result([], [table(study)], out, markdown)
     if json:
         emit_json(study)
 
@@ -83,6 +115,37 @@ def delsol(
         return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
     show_result([note], tables(study), out, markdown)
+    if json:
+        emit_json(study)
+
+
+@arm_studies.command()
+def zhang(
+    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
+    state: Annotated[
+        Path | None, typer.Option(help="Folder of finished arms; a cache folder by default.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
+    from rig.reports import zhang as shown
+    from rig.reports.zhang_figures import write_figures
+    from rig.studies.zhang import run_zhang
+
+    kept = state or Path.home() / ".cache" / "rig" / "zhang"
+    with progress() as bar:
+        task = bar.add_task("arms", total=seeds)
+        study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))
+    drawn = write_figures(figures, study) if figures is not None else []
+
+    def markdown() -> str:
+        names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
+        return shown.markdown(study, names)
+
+    show_result([shown.lead(study), *shown.notes(study)], shown.tables(study), out, markdown)
     if json:
         emit_json(study)
 

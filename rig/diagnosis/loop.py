@@ -18,6 +18,7 @@ from rig.config import Config
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import Diagnosed, run_diagnosis
 from rig.errors import UsageError
+from rig.importers.registry import open_campaign
 from rig.logger import open_logger
 from rig.protocol import Protocol, load_protocol, protocol_toml
 from rig.record import Progress, open_campaign_folder, record_campaign
@@ -133,7 +134,7 @@ def run_loop(
         runs = _record(_with_noise_of(config, number), protocol, place, on_progress)
         write_text_atomic(folder / f"round-{number}.protocol.toml", protocol_toml(protocol))
         done = run_diagnosis(
-            folder / "runs",
+            open_campaign(folder / "runs"),
             models,
             ledger,
             seed=seed,

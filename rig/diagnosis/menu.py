@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.recording import Recording
-from rig.config import LimitsSection
+from rig.config import ReferenceLimits
 from rig.protocol import Protocol
 
 LOADS_A = (0.15, 0.5, 0.9)
@@ -29,7 +29,7 @@ class Room:
     loads_a: tuple[float, ...]
 
 
-def room_of(recordings: Sequence[Recording], limits: LimitsSection) -> Room:
+def room_of(recordings: Sequence[Recording], limits: ReferenceLimits) -> Room:
     """Return the travel the recordings have shown, and loads within the rig's limits."""
     angles = np.concatenate([r["spindle_angle_rad"] for r in recordings])
     low, high = (float(v) for v in np.percentile(angles, [1, 99]))
@@ -39,7 +39,7 @@ def room_of(recordings: Sequence[Recording], limits: LimitsSection) -> Room:
     return Room(low, high - low, loads)
 
 
-def within(recordings: Sequence[Recording], limits: LimitsSection) -> bool:
+def within(recordings: Sequence[Recording], limits: ReferenceLimits) -> bool:
     """Say whether simulated runs stay away from every limit."""
     return all(
         float(np.abs(run[name]).max()) <= MARGIN * limit

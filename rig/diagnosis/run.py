@@ -1,11 +1,13 @@
-"""A diagnosis from a path: read the runs, seal the split, search, confirm, remember the look."""
+"""A diagnosis of a campaign: read the runs, seal the split, search, confirm, remember the look."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from estimation import model_file
+from estimation.arm.balances import balances_of
+from estimation.arm.shared import shared_fit, with_links
+from estimation.arm.twin import ArmTwin
+from estimation.campaign import Campaign
 from estimation.diagnosis.clock import steady
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
@@ -17,14 +19,9 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.twins import twins_of
-from rig.errors import UsageError
-from rig.importers.registry import open_campaign
+from rig.diagnosis.twins import Twins, twins_of
 
 Stage = Callable[[str], None]
-
-REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
-"""Shipped models that together declare the reference rig, measured or simulated."""
 
 
 @dataclass(frozen=True)
@@ -46,63 +43,33 @@ class Diagnosed:
     seen: tuple[str, ...]
 
 
-def declared_models(path: Path | None, balance: str | None) -> list[Model]:
-    """Return the declared models to diagnose.
-
-    Args:
-        path: A model file or the name of a shipped one; the balances of the reference rig when
-            None.
-        balance: Only this balance.
-
-    Raises:
-        UsageError: No model of that balance.
-        ModelFileError: The file cannot be read.
-    """
-    if path is not None:
-        models = [model_file.read(path)]
-    else:
-        models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
-    chosen = [model for model in models if balance in (None, model.balance)]
-    if not chosen:
-        known = ", ".join(dict.fromkeys(model.balance for model in models))
-        raise UsageError(
-            f"There is no declared model of the balance {balance!r}.",
-            f"Declared: {known}.",
-            "Name a model file with --model.",
-        )
-    return chosen
-
-
 def run_diagnosis(
-    path: Path,
-    models: list[Model],
+    campaign: Campaign,
+    models: Sequence[Model],
     ledger: Ledger,
     *,
     seed: int = 0,
-    format_name: str | None = None,
     executor: Executor | None = None,
     quick: bool = False,
     on_stage: Stage = lambda _: None,
 ) -> Diagnosed:
-    """Diagnose declared models on the recordings of a path.
+    """Diagnose declared models on a campaign.
 
     Args:
-        path: File, folder or archive of recordings.
+        campaign: The recordings.
         models: Declared models, one a balance.
         ledger: Remembers the look.
         seed: Seed of the split and of everything random.
-        format_name: Importer to use; guessed when None.
         executor: Runs work in parallel.
         quick: A first answer, held against surrogates only, without simulated twins.
         on_stage: Told what begins.
 
     Raises:
-        UsageError: The path does not exist.
-        DataError: It cannot be read.
+        DataError: A recording cannot be read.
         EstimationError: Nothing can be decided; says why.
     """
     on_stage("reading the recordings")
-    whole, lost = steady(evidence(open_campaign(path, format_name)))
+    whole, lost = steady(evidence(campaign))
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
@@ -111,8 +78,16 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
+    discover = [r for r in recordings if r.name in sealed.discover]
+    arm = balances_of(recordings[0])
     on_stage("building the simulated twin of the declared models")
-    twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
+    if arm is None:
+        twins = twins_of(models, discover)
+    else:
+        fitted = shared_fit(arm, discover)
+        recordings = with_links(arm, recordings, fitted)
+        twin = ArmTwin.of(arm, [r for r in recordings if r.name in sealed.discover], fitted)
+        twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
     diagnosis, stories = diagnose(
         recordings,
         models,

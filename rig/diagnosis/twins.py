@@ -1,7 +1,7 @@
 """Twins for a diagnosis: which balances can be played by the simulated rig, and from what fits."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from estimation import model_file
 from estimation.campaign import Campaign
@@ -15,7 +15,7 @@ from rig.simulation.twin import Twin, build_twin
 PLAYED = ("motor", "gearbox", "cable", "stretch")
 """Balances of the simulated rig's own parts."""
 
-Maker = Callable[[Model, Sequence[Recording]], Twin]
+Maker = Callable[[Model, Sequence[Recording]], Callable[[int], Sequence[Recording]]]
 
 
 @dataclass(frozen=True)
@@ -23,20 +23,14 @@ class Twins:
     """What simulates the declared models, or why nothing can.
 
     Attributes:
-        twin: Seed to one campaign with the references of the runs that discover; None if none.
-        balances: Balances it plays.
+        twin: Plays a protocol and its own references; None where nothing can be recorded anew.
+        makers: Balance to what `estimation.diagnosis.diagnose` asks for its twin.
         note: Why some balance has none, in words; empty when all have.
     """
 
     twin: Twin | None
-    balances: tuple[str, ...] = ()
+    makers: Mapping[str, Maker] = field(default_factory=dict)
     note: str = ""
-
-    @property
-    def makers(self) -> Mapping[str, Maker]:
-        """Balance to what `estimation.diagnosis.diagnose` asks for its twin."""
-        twin = self.twin
-        return {} if twin is None else {name: lambda *_: twin for name in self.balances}
 
 
 def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
@@ -62,14 +56,14 @@ def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
     asked = [model.balance for model in models]
     played = tuple(b for b in asked if b in {model.balance for model in fitted})
     if not played:
-        return Twins(None, (), "The simulated rig plays none of these balances.")
+        return Twins(None, note="The simulated rig plays none of these balances.")
     try:
         twin = build_twin(fitted, campaign)
     except (RigError, EstimationError) as error:
-        return Twins(None, (), f"No simulated twin could be made. {error}")
+        return Twins(None, note=f"No simulated twin could be made. {error}")
     left = [balance for balance in asked if balance not in played]
     note = f"The simulated rig does not play {', '.join(left)}: no twins there." if left else ""
-    return Twins(twin, played, note)
+    return Twins(twin, dict.fromkeys(played, lambda *_: twin), note)
 
 
 def _shipped() -> list[Model]:

@@ -3,7 +3,6 @@
 Nothing moves: the board is armed without a setpoint, so the motors stay without current throughout.
 """
 
-import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -13,13 +12,14 @@ from calibration.errors import CalibrationError
 from calibration.zero import drift_verdicts, measure_zeros
 from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import SampleBatch, TeensyLogger
-from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Limits, Trip
+from drivers.teensy.profile import ArmLimits
+from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Trip
 from rig.config import Config
 from rig.devices import openers
 from rig.doctor.finding import Level
 from rig.doctor.stream import device_findings
 from rig.logger import open_logger
-from rig.safety import board_limits
+from rig.machines.choose import machine_of
 
 ZERO_S = 1.0
 APART_S = 3.0
@@ -60,7 +60,7 @@ def _on_the_board(
     name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
 ) -> Check:
     try:
-        with TeensyLogger(open_logger(config)) as logger:
+        with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
             logger.identify()
             logger.start()
             passed, detail = check(logger, config)
@@ -82,17 +82,17 @@ def _zero_drift(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
 
 
 def _travel_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
-    """Arm with a travel that ends before where the spindle stands: the board must trip at once."""
-    here = int(_read(logger, SETTLE_S).samples["spindle"][-1])
-    limits = dataclasses.replace(_limits(config), min_spindle=here + 100, max_spindle=here + 200)
-    return _must_trip(logger, config, limits, Trip.SPINDLE_TRAVEL, SETTLE_S)
+    """Arm with a travel that ends before where the rig stands: the board must trip at once."""
+    here = _read(logger, SETTLE_S).samples[-1]
+    limits, trip = machine_of(config).too_narrow(_limits(config), here)
+    return _must_trip(logger, config, limits, trip, SETTLE_S)
 
 
 def _setpoint_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
-    limits = _limits(config)
-    logger.arm(config.controller.gains(), limits)
+    machine, limits = machine_of(config), _limits(config)
+    logger.arm(machine.gains(config), limits)
     try:
-        logger.queue(np.array([limits.max_spindle + 1]), np.array([0]))
+        logger.queue(*machine.beyond(limits))
     except CommandRefusedError as error:
         return True, error.what
     return False, "A setpoint beyond the travel was taken."
@@ -100,17 +100,15 @@ def _setpoint_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
 
 def _watchdog(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     """Arm and fall silent: the board must trip when its patience is over, not before, not late."""
-    limits = _limits(config)
-    passed, detail = _must_trip(
-        logger, config, limits, Trip.HOST_SILENT, 2 * limits.watchdog_us * 1e-6
-    )
-    late_s = (logger.trip().late_us - limits.watchdog_us) * 1e-6
+    patience_s = config.safety.watchdog_s
+    passed, detail = _must_trip(logger, config, _limits(config), Trip.HOST_SILENT, 2 * patience_s)
+    late_s = logger.trip().late_us * 1e-6 - patience_s
     return passed and 0 <= late_s <= LATEST_TRIP_S, f"{detail}, {late_s * 1e3:.3g} ms late"
 
 
 def _stop(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     """Arm, disarm, and read back: what `rig stop` and every way out rely on."""
-    logger.arm(config.controller.gains(), _limits(config))
+    logger.arm(machine_of(config).gains(config), _limits(config))
     logger.disarm()
     status = int(_read(logger, SETTLE_S).samples["status"][-1])
     return not status & STATUS_ARMED, f"status {status:#06x} read back after disarming"
@@ -126,19 +124,16 @@ BOARD_CHECKS: dict[str, Callable[[TeensyLogger, Config], tuple[bool, str]]] = {
 """Checks on the logger alone, each on a fresh link."""
 
 
-def _limits(config: Config) -> Limits:
+def _limits(config: Config) -> ArmLimits:
     """Return the configured limits, but none that a rig at rest may already be beyond."""
-    limits = board_limits(config, config.calibration_set())
-    wide = Limits.widest()
-    return dataclasses.replace(
-        limits, max_proximal=wide.max_proximal, max_distal=wide.max_distal, stale_ticks=2**31 - 1
-    )
+    machine = machine_of(config)
+    return machine.untroubled(machine.board_limits(config, config.calibration_set()))
 
 
 def _must_trip(
-    logger: TeensyLogger, config: Config, limits: Limits, trip: Trip, within_s: float
+    logger: TeensyLogger, config: Config, limits: ArmLimits, trip: Trip, within_s: float
 ) -> tuple[bool, str]:
-    logger.arm(config.controller.gains(), limits)
+    logger.arm(machine_of(config).gains(config), limits)
     status = int(_read(logger, within_s).samples["status"][-1])
     told = Trip(status >> TRIP_SHIFT)
     return told is trip, f"status {status:#06x}: {told.name.lower().replace('_', ' ')}"

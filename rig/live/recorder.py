@@ -9,7 +9,7 @@ from estimation.recording import Mark
 from rig import __version__
 from rig.log.container import Attached
 from rig.log.run import RunEnd, RunInfo
-from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
+from rig.log.streams import COUNTS, SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 from rig.reading import Reading
 from rig.session import Session
@@ -28,6 +28,7 @@ class LiveRecorder:
         self._folder = folder
         self._log: LogWriter | None = None
         self._path: Path | None = None
+        self._raw = session.machine.counts
         self._start_us = 0
         self._start_ns = 0
         self._samples = 0
@@ -65,13 +66,14 @@ class LiveRecorder:
             zeros_before={f"{name}_counts": zero for name, zero in session.zeros.items()},
             details={"rig_version": __version__, "logger_serial": session.identity.serial},
         )
-        settings = json.dumps(session.config.model_dump(), indent=1).encode()
+        settings = json.dumps(session.config.logged(), indent=1).encode()
         lines = session.calibrations.to_json().encode()
         attached = [
             Attached("config.json", "application/json", settings),
             Attached("calibrations.json", "application/json", lines),
         ]
-        streams = [sample_stream(tuple(session.calibrations.channels)), COUNTS_STREAM]
+        lines_of = tuple(session.calibrations.channels)
+        streams = [sample_stream(lines_of, self._raw.rate_hz), self._raw]
         self._log = LogWriter(self._path, info, streams, attachments=attached)
         self._samples = self._marks = 0
 
@@ -87,7 +89,7 @@ class LiveRecorder:
         time_s = since_us * 1e-6
         rows = {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags}
         self._log.write(SAMPLE, rows, log_time_ns)
-        counts = {field.name: reading.counts[field.name] for field in COUNTS_STREAM.fields}
+        counts = {field.name: reading.counts[field.name] for field in self._raw.fields}
         self._log.write(COUNTS, counts, log_time_ns)
         self._samples += len(reading)
         self._newest_s = float(time_s[-1])

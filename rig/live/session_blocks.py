@@ -15,8 +15,7 @@ from rig.live.calibration_status import CalibrationStatus
 from rig.live.keys import LEAVE, MARK, RECORD, TARE, Keys, no_keys
 from rig.live.recorder import LiveRecorder
 from rig.live.replay import EstimateStream
-from rig.motion import motion_of
-from rig.protocol import RunPlan
+from rig.machines.machine import MachinePlan
 from rig.reading import Reading
 from rig.session import Session
 
@@ -26,7 +25,7 @@ ZERO_S = 0.5
 def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
-    plans: Sequence[RunPlan],
+    plans: Sequence[MachinePlan],
     estimator: EstimateStream | None,
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
@@ -105,10 +104,9 @@ class _Hand:
             self._said = "tared"
 
 
-def _readings(session: Session, plans: Sequence[RunPlan]) -> Iterator[Reading]:
+def _readings(session: Session, plans: Sequence[MachinePlan]) -> Iterator[Reading]:
     for plan in plans:
-        motion = motion_of(plan, session.spindle_angle_rad)
-        yield from session.play(motion.target_angle_rad, motion.load_command_a)
+        yield from session.play(*session.machine.motion(plan, session.here).setpoints)
     if not plans:
         yield from session.watch()
 

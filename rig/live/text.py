@@ -19,6 +19,8 @@ NAMES = {
     "grasp_force_n": "Grasp force",
     "pitch_force_n": "Pitch force",
     "yaw_force_n": "Yaw force",
+    "jaw_1_force_n": "Jaw 1 force",
+    "jaw_2_force_n": "Jaw 2 force",
 }
 
 TIP_CHANNEL = "distal_torque_n_m"

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from estimation.channels import unit_of
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import Frozen
-from estimation.diagnosis.maps import CHANNELS
+from estimation.diagnosis.maps import channels_of
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray
@@ -164,10 +164,11 @@ def _moved(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
 
 def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
     """Draw the residual of the confirm runs over the finding's own variable."""
-    variable = next((v for v in finding.depends_on if v in CHANNELS), None)
+    channels = channels_of(finding.balance, story.confirm[0].channels)
+    variable = next((v for v in finding.depends_on if v in channels), None)
     if variable is None:
         return []
-    channel = CHANNELS[variable]
+    channel = channels[variable]
     if any(channel not in run.channels for run in story.confirm):
         return []
     x = np.concatenate([run.channels[channel][run.used] for run in story.confirm])

@@ -178,21 +178,6 @@ def binned(
     return centres, mean, spread[:, 0], spread[:, 1]
 
 
-def write_svg(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
-    """Write figures as files of their own, named by the keys.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
-    paths = []
-    for name, figure in drawn.items():
-        path = folder / f"{name}.svg"
-        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
-        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
-        paths.append(path)
-    return paths
-
-
 def bars(
     values: Mapping[str, float],
     unit: str,
@@ -270,3 +255,22 @@ def scattered(
         if len(series) <= len(COLOURS):
             _legend_above(ax)
     return _drawn(figure, caption)
+
+
+def write_svgs(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
+    """Write figures as files of their own, in a colour that reads on light and dark pages.
+
+    Args:
+        folder: Where to.
+        drawn: Name of the file to figure.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    paths = []
+    for name, figure in drawn.items():
+        path = folder / f"{name}.svg"
+        text = str(figure).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+        write_text_atomic(path, text.replace("currentColor", "#555555") + "\n")
+        paths.append(path)
+    return paths

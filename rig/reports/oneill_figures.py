@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from estimation.recording import FloatArray
-from rig.reports.figures import Panel, against, over_time, write_svg
+from rig.reports.figures import Panel, against, over_time, write_svgs
 from rig.reports.oneill_networks import SHOWN
 from rig.studies.oneill_shown import Closing, Shown
 
@@ -49,7 +49,7 @@ def draw(shown: Sequence[Shown]) -> dict[str, tuple[str, Markup]]:
 def write(folder: Path, shown: Sequence[Shown]) -> list[tuple[str, Path]]:
     """Write the figures; return caption and file of each."""
     drawn = draw(shown)
-    paths = write_svg(folder, {name: figure for name, (_, figure) in drawn.items()})
+    paths = write_svgs(folder, {name: figure for name, (_, figure) in drawn.items()})
     return [(caption, path) for (caption, _), path in zip(drawn.values(), paths, strict=True)]
 
 

@@ -122,14 +122,19 @@ def _ways(study: Study) -> list[str]:
 
 
 def _parameters(study: Study) -> TextTable:
-    rows = [[p.name, f"{p.value:.4g}", f"{p.standard_error:.2g}"] for p in study.parameters]
+    rows = [
+        [p.name, f"{p.value:.4g}", f"{p.standard_error:.2g}", f"{p.consistent:.4g}"]
+        for p in study.parameters
+    ]
     note = (
         "m: mass, l: first moment, L: inertia about the joint, Ke: spring, Fv and Fs: viscous and"
         " Coulomb friction, Ia: drive inertia, tau0: offset. Standard errors know noise only."
+        " Physically consistent: every link's pseudo-inertia is positive semidefinite, and no"
+        " friction, spring or drive inertia is negative."
     )
     return TextTable(
         f"Base parameters of the thesis' model, fitted on {study.paths[0]}, SI units",
-        ["parameter", "value", "standard error"],
+        ["parameter", "value", "standard error", "physically consistent"],
         rows,
         note,
     )

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.model import predict
 from estimation.recording import FloatArray
 from rig.grasper.current_force import CurrentForce
-from rig.reports.figures import bars, over_time, write_svg
+from rig.reports.figures import bars, over_time, write_svgs
 from rig.reports.table import TextTable, to_markdown
 from rig.simulation.grasper_inputs import hold, periodic
 from rig.simulation.grasper_plant import PROTOTYPES, RATE_HZ
@@ -114,7 +114,7 @@ def write_figures(folder: Path, haptics: Sequence[Answer], seed: int = 0) -> lis
         ours = next(answer for answer in haptics if answer.method == "ours")
         heights = {f"place {s.name}": s.mean_n_rad for s in ours.places}
         drawn["zhao-stiffness"] = bars(heights, "stiffness, N/rad", "Stiffness along the edge")
-    return write_svg(folder, drawn)
+    return write_svgs(folder, drawn)
 
 
 def _count(study: Study) -> int:

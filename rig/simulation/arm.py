@@ -11,11 +11,11 @@ import numba
 import numpy as np
 
 from estimation.arm.kinematics import tip_pose
-from estimation.arm.motion import Motion
+from estimation.arm.motion import JointNames, Motion
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import spatial_jacobians
-from estimation.recording import FloatArray
+from estimation.recording import FloatArray, Recording
 
 RATE_HZ = 100.0
 
@@ -50,6 +50,25 @@ class SimulatedArm:
     values: FloatArray
     hidden: FloatArray
     slip: FloatArray
+
+
+def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:
+    """Return what an arm's sensors tell as a recording; six joints are the PSM's, others turn.
+
+    Args:
+        name: Name of the run.
+        position: Shape (n, joints).
+        torque: Shape (n, joints).
+        rate_hz: Sample rate, Hz.
+    """
+    slides = position.shape[1] == len(PSM.joints)
+    columns = {}
+    for k in range(position.shape[1]):
+        names = JointNames(k + 1, slides and PSM.joints[k].kind == "prismatic")
+        columns[names.position] = position[:, k]
+        columns[names.velocity] = np.gradient(position[:, k], 1 / rate_hz)
+        columns[names.torque] = torque[:, k]
+    return Recording(name, np.arange(len(position)) / rate_hz, columns)
 
 
 @dataclass(frozen=True)
@@ -152,7 +171,7 @@ def contact_motion(rng: np.random.Generator, seconds: float) -> Motion:
 
 def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     """Return spatial wrenches of touching and letting go in turns: up to 7 N, smooth."""
-    time = np.arange(len(motion)) / RATE_HZ
+    time = np.arange(len(motion)) * motion.period_s
     force = sum(
         np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6.28, 3))
         for f in rng.uniform(0.1, 0.7, 5)
@@ -160,7 +179,7 @@ def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     touching = np.clip(3 * np.sin(2 * np.pi * 0.08 * time + rng.uniform(0, 6.28)), 0, 1)
     force = force * (touching * rng.uniform(5, 7) / np.abs(force).max())[:, None]
     twist = 0.1 * touching * np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
-    tips = np.array([tip_pose(PSM, q)[:3, [2, 3]] for q in motion.position])
+    tips = np.array([tip_pose(PSM, q[:6])[:3, [2, 3]] for q in motion.position])
     axis, tip = tips[:, :, 0], tips[:, :, 1]
     moment = np.cross(tip, force) + twist[:, None] * axis
     return np.hstack([force, moment])

@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from drivers.teensy import control
+from drivers.teensy import control, watches
 from drivers.teensy import guard as board_guard
 from drivers.teensy.guard import COLUMNS, Drive
 from rig.errors import UsageError
@@ -50,6 +50,7 @@ def _fingerprint() -> str:
     for module in (
         control,
         board_guard,
+        watches,
         hidden,
         hidden_cable,
         hidden_drive,
@@ -89,7 +90,8 @@ def _board_call(
     return signature, build
 
 
-_call_board_tick: Any = intrinsic(_board_call)
+call_board_tick: Any = intrinsic(_board_call)
+"""For compiled loops with a board behind a pointer."""
 
 
 def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]:
@@ -128,7 +130,7 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         outputs = np.zeros(2, np.int32)
         for k in range(ticks):
             sensors.sample(state, s, effects, seed, first_tick + k, inputs)
-            _call_board_tick(
+            call_board_tick(
                 function,
                 board,
                 np.uint32(tick_us + 1000 * k),

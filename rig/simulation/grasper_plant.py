@@ -98,40 +98,58 @@ KP, KI, KD = 12.0, 5.0, 0.15
 LIMIT_A = 0.6
 
 
+ANGLE, SPEED, BRISTLE = range(3)
+"""Places in an axis' state: rad, rad/s, and the bristle's share of the friction."""
+
+
+@numba.njit(cache=True)
+def contact_torque(p: Any, angle_rad: float) -> float:
+    """Return the torque of what is grasped at a joint's angle, N m; p are `AxisParameters`."""
+    return float(p[9] * max(angle_rad - p[10], 0.0))
+
+
+@numba.njit(cache=True)
+def step_axis(state: Any, p: Any, current_a: float) -> None:
+    """Move one axis by a tick of 0.5 ms, its current constant; `state` is changed in place."""
+    inertia = p[0] * p[0] * p[2]
+    gain = p[0] * p[1]
+    h = 1.0 / RATE_HZ / SUBSTEPS
+    q, w, s = state[ANGLE], state[SPEED], state[BRISTLE]
+    for _ in range(SUBSTEPS):
+        contact = contact_torque(p, q)
+        level = p[3] + p[4] * contact
+        ds = w / p[6] * (1.0 - s * np.sign(w))
+        if abs(s) > p[7]:
+            ds -= (s - p[7] * np.sign(s)) / p[8]
+        s += h * ds
+        s = min(max(s, -1.0), 1.0)
+        w += h / inertia * (gain * current_a - level * s - p[5] * w - contact)
+        q += h * w
+    state[ANGLE], state[SPEED], state[BRISTLE] = q, w, s
+
+
 @numba.njit(cache=True)
 def _run(p: Any, target: Any, kp: float, ki: float, kd: float, limit_a: float) -> Any:
     n = target.shape[0]
     out = np.empty((n, 4))
-    inertia = p[0] * p[0] * p[2]
     gain = p[0] * p[1]
-    h = 1.0 / RATE_HZ / SUBSTEPS
-    q = target[0]
-    w = 0.0
-    s = 0.0
+    state = np.zeros(3)
+    state[ANGLE] = target[0]
     total = 0.0
-    last = q
+    last = target[0]
     for k in range(n):
+        q = state[ANGLE]
         error = target[k] - q
         command = kp * error + ki * total - kd * (q - last) * RATE_HZ
         last = q
         i = min(max(command / gain, -limit_a), limit_a)
         if abs(i) < limit_a:
             total += error / RATE_HZ
-        contact = p[9] * max(q - p[10], 0.0)
         out[k, 0] = i
         out[k, 1] = q
-        out[k, 2] = contact
-        out[k, 3] = s
-        for _ in range(SUBSTEPS):
-            contact = p[9] * max(q - p[10], 0.0)
-            level = p[3] + p[4] * contact
-            ds = w / p[6] * (1.0 - s * np.sign(w))
-            if abs(s) > p[7]:
-                ds -= (s - p[7] * np.sign(s)) / p[8]
-            s += h * ds
-            s = min(max(s, -1.0), 1.0)
-            w += h / inertia * (gain * i - level * s - p[5] * w - contact)
-            q += h * w
+        out[k, 2] = contact_torque(p, q)
+        out[k, 3] = state[BRISTLE]
+        step_axis(state, p, i)
     return out
 
 

@@ -61,6 +61,8 @@ class Kind:
         shapes: Up to two numbers of its row.
         weakest: Smallest strength `draw` gives.
         strongest: Largest strength `draw` gives.
+        alone: Whether it shows in a campaign of usual runs, so that `draw` may pick it: alike in
+            all runs, with the wrist held.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Kind:
     shapes: tuple[Shape, ...]
     weakest: float = 0.7
     strongest: float = 1.4
+    alone: bool = True
 
 
 _PHASE = Shape("phase_rad", 0.0, 2.0 * math.pi)
@@ -249,6 +252,66 @@ KINDS: tuple[Kind, ...] = (
         "error of the jaw encoder along its own angle, with a second harmonic",
         (Shape("periods_per_turn", 10.0, 24.0), _PHASE),
     ),
+    Kind(
+        "motor_viscous_asymmetry",
+        "viscous friction of motor and gear on opening",
+        (Shape("motor_speed_rad_s", 1.0, 4.0),),
+    ),
+    Kind(
+        "gear_load_viscous",
+        "gear friction that grows with torque and with speed, less so when fast",
+        (Shape("motor_speed_rad_s", 60.0, 120.0),),
+    ),
+    Kind(
+        "grease_warmup",
+        "friction of cold grease that fades within the run",
+        (Shape("time_s", 2.0, 6.0),),
+    ),
+    Kind(
+        "gear_wear",
+        "friction of motor and gear beyond the usual",
+        (),
+        alone=False,
+    ),
+    Kind(
+        "cable_stiff",
+        "friction of the cable beyond the usual",
+        (),
+        alone=False,
+    ),
+    Kind(
+        "cable_dwell",
+        "friction of the cable that ages with the logarithm of the time at rest",
+        (Shape("slip_rad", 0.05, 0.15),),
+    ),
+    Kind(
+        "cable_capstan",
+        "cable wrapped on a guide: more is lost on closing than on opening",
+        (Shape("wrap", 0.4, 0.6),),
+    ),
+    Kind(
+        "wrist_capstan",
+        "cable that the bent wrist wraps on its guide",
+        (Shape("friction", 0.7, 1.0),),
+        alone=False,
+    ),
+    Kind(
+        "wrist_pull",
+        "cable that the wrist winds up as it turns",
+        (Shape("bow", 0.1, 0.4),),
+        alone=False,
+    ),
+    Kind(
+        "wrist_pinch",
+        "cable that is pinched at one angle of the wrist",
+        (Shape("wrist_angle_rad", -0.25, 0.25), Shape("width_rad", 0.1, 0.2)),
+        alone=False,
+    ),
+    Kind(
+        "jaw_weight",
+        "weight on the jaw whose arm shortens as it falls",
+        (Shape("level_angle_rad", 0.5, 0.9),),
+    ),
 )
 """Every kind of hidden effect; the place in this tuple is the row of the table."""
 
@@ -288,6 +351,17 @@ KINDS: tuple[Kind, ...] = (
     DISTAL_CROSSTALK,
     JAW_DELAY,
     JAW_ENCODER_WAVE,
+    MOTOR_VISCOUS_ASYMMETRY,
+    GEAR_LOAD_VISCOUS,
+    GREASE_WARMUP,
+    GEAR_WEAR,
+    CABLE_STIFF,
+    CABLE_DWELL,
+    CABLE_CAPSTAN,
+    WRIST_CAPSTAN,
+    WRIST_PULL,
+    WRIST_PINCH,
+    JAW_WEIGHT,
 ) = range(len(KINDS))
 
 NAMES: tuple[str, ...] = tuple(kind.name for kind in KINDS)
@@ -313,9 +387,10 @@ class HiddenEffect:
 
 
 def draw(seed: int) -> HiddenEffect:
-    """Pick one effect, its strength and its shape by seed."""
+    """Pick one effect that shows by itself, its strength and its shape by seed."""
     generator = np.random.default_rng(seed)
-    kind = KINDS[int(generator.integers(len(KINDS)))]
+    kinds = [kind for kind in KINDS if kind.alone]
+    kind = kinds[int(generator.integers(len(kinds)))]
     strength = float(generator.uniform(kind.weakest, kind.strongest))
     shape = []
     for part in kind.shapes:

@@ -7,33 +7,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.simulation.hidden import (
+    CABLE_CAPSTAN,
+    CABLE_DWELL,
     CABLE_GROWING_FRICTION,
     CABLE_LOAD_NOTCH,
     CABLE_POSITION_FRICTION,
+    CABLE_STIFF,
     END_STOP_SPRING,
     FIRST,
     FRICTION_STEP,
     JAW_DETENT,
     JAW_SPRING,
+    JAW_WEIGHT,
     SECOND,
     STRENGTH,
+    WRIST_CAPSTAN,
+    WRIST_PINCH,
     Row,
 )
 
 SPINDLE_FRICTIONS = np.array(
-    [CABLE_POSITION_FRICTION, CABLE_GROWING_FRICTION, CABLE_LOAD_NOTCH, FRICTION_STEP]
+    [
+        CABLE_POSITION_FRICTION,
+        CABLE_GROWING_FRICTION,
+        CABLE_LOAD_NOTCH,
+        FRICTION_STEP,
+        CABLE_STIFF,
+        CABLE_DWELL,
+        CABLE_CAPSTAN,
+        WRIST_CAPSTAN,
+        WRIST_PINCH,
+    ]
 )
 """Effects that `spindle_friction_n_m` sums up."""
 
-JAW_TORQUES = np.array([JAW_SPRING, END_STOP_SPRING, JAW_DETENT])
+JAW_TORQUES = np.array([JAW_SPRING, END_STOP_SPRING, JAW_DETENT, JAW_WEIGHT])
 """Effects that `jaw_torque_n_m` sums up."""
 
 
 @numba.njit()
 def spindle_friction_n_m(
-    effects: NDArray[np.float64], spindle_angle: float, cable_torque: float, clock_s: float
+    effects: NDArray[np.float64],
+    spindle_angle: float,
+    spindle_speed: float,
+    cable_torque: float,
+    clock_s: float,
+    age_s: float,
+    wrist_angle: float,
 ) -> float:
-    """Return what the hidden effects add to the Coulomb level at the spindle."""
+    """Return what the hidden effects add to the Coulomb level at the spindle.
+
+    Args:
+        effects: From `hidden.table`.
+        spindle_angle: rad.
+        spindle_speed: rad/s.
+        cable_torque: Torque the cable carries, at the jaw.
+        clock_s: Time since the bench was started.
+        age_s: State of the contact that ages.
+        wrist_angle: Pitch of the wrist, rad.
+    """
     extra = 0.0
     if effects[CABLE_POSITION_FRICTION, STRENGTH] != 0.0:
         extra += cable_position_friction_n_m(effects[CABLE_POSITION_FRICTION], spindle_angle)
@@ -43,6 +75,19 @@ def spindle_friction_n_m(
         extra += cable_load_notch_n_m(effects[CABLE_LOAD_NOTCH], spindle_angle, cable_torque)
     if effects[FRICTION_STEP, STRENGTH] != 0.0:
         extra += friction_step_n_m(effects[FRICTION_STEP], clock_s)
+    if effects[CABLE_STIFF, STRENGTH] != 0.0:
+        extra += effects[CABLE_STIFF, STRENGTH] * 20e-3
+    if effects[CABLE_DWELL, STRENGTH] != 0.0:
+        extra += cable_dwell_n_m(effects[CABLE_DWELL], age_s)
+    if effects[CABLE_CAPSTAN, STRENGTH] != 0.0:
+        row = effects[CABLE_CAPSTAN]
+        extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
+    if effects[WRIST_CAPSTAN, STRENGTH] != 0.0:
+        row = effects[WRIST_CAPSTAN]
+        wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)
+        extra += wrapped_n_m(wrap, cable_torque, spindle_speed)
+    if effects[WRIST_PINCH, STRENGTH] != 0.0:
+        extra += wrist_pinch_n_m(effects[WRIST_PINCH], wrist_angle)
     return extra
 
 
@@ -56,6 +101,8 @@ def jaw_torque_n_m(effects: NDArray[np.float64], jaw_angle: float) -> float:
         extra += end_stop_spring_n_m(effects[END_STOP_SPRING], jaw_angle)
     if effects[JAW_DETENT, STRENGTH] != 0.0:
         extra += jaw_detent_n_m(effects[JAW_DETENT], jaw_angle)
+    if effects[JAW_WEIGHT, STRENGTH] != 0.0:
+        extra += jaw_weight_n_m(effects[JAW_WEIGHT], jaw_angle)
     return extra
 
 
@@ -180,3 +227,63 @@ def jaw_detent_n_m(row: Row, jaw_angle_rad: float) -> float:
     x = (jaw_angle_rad - row[FIRST]) / row[SECOND]
     bump = 1.0 / (1.0 + x * x)
     return row[STRENGTH] * 24e-3 * x * bump * bump
+
+
+OLD_S = 10.0
+"""Age at which a contact's friction is at the stated level; a bench starts so rested."""
+
+YOUNG_S = 0.05
+
+
+@numba.njit()
+def cable_dwell_rate(row: Row, age_s: float, spindle_speed: float) -> float:
+    """Rate of the contact's age: 1 - |w| age / slip, the ageing law of Dieterich and Ruina."""
+    return 1.0 - abs(spindle_speed) * age_s / row[FIRST]
+
+
+@numba.njit()
+def cable_dwell_n_m(row: Row, age_s: float) -> float:
+    """Extra Coulomb level at the spindle: F ln(1 + age / young) / ln(1 + old / young), F = 40 mN m.
+
+    Logarithmic in the time of rest.
+    """
+    full = math.log(1.0 + OLD_S / YOUNG_S)
+    return row[STRENGTH] * 40e-3 * math.log(1.0 + max(age_s, 0.0) / YOUNG_S) / full
+
+
+@numba.njit()
+def wrapped_n_m(wrap: float, cable_torque_n_m: float, spindle_speed: float) -> float:
+    """Loss of a wrapped cable: |C| 2 x / (2 - x) on closing, |C| 2 x / (2 + x) on opening.
+
+    x is friction times angle of wrap. In between the change is as smooth as the speed's sign.
+    """
+    side = spindle_speed / math.sqrt(spindle_speed * spindle_speed + 0.05 * 0.05)
+    return 2.0 * wrap / (2.0 - min(wrap, 1.5) * side) * abs(cable_torque_n_m)
+
+
+@numba.njit()
+def wrist_pull_rad(row: Row, wrist_angle: float) -> float:
+    """Cable that the wrist winds: c (sin p + b (1 - cos p)), c = 0.025 at strength 1."""
+    bow = row[FIRST] * (1.0 - math.cos(wrist_angle))
+    return row[STRENGTH] * 0.025 * (math.sin(wrist_angle) + bow)
+
+
+@numba.njit()
+def wrist_pull_slope(row: Row, wrist_angle: float) -> float:
+    """Derivative of the cable wound with the wrist's pitch."""
+    return row[STRENGTH] * 0.025 * (math.cos(wrist_angle) + row[FIRST] * math.sin(wrist_angle))
+
+
+@numba.njit()
+def wrist_pinch_n_m(row: Row, wrist_angle: float) -> float:
+    """Extra Coulomb level at one pitch: F / (1 + x^2)^2, x = (p - p0) / width, F = 25 mN m."""
+    x = (wrist_angle - row[FIRST]) / row[SECOND]
+    bump = 1.0 / (1.0 + x * x)
+    return row[STRENGTH] * 25e-3 * bump * bump
+
+
+@numba.njit()
+def jaw_weight_n_m(row: Row, jaw_angle_rad: float) -> float:
+    """Torque that opposes closing: A cos x (1 + 0.15 sin x), x = q - q0, A = 40 mN m."""
+    x = jaw_angle_rad - row[FIRST]
+    return row[STRENGTH] * 40e-3 * math.cos(x) * (1.0 + 0.15 * math.sin(x))

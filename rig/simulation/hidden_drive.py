@@ -10,10 +10,14 @@ from rig.simulation.hidden import (
     FIRST,
     GEAR_ANGLE_VISCOUS,
     GEAR_LOAD_FRICTION,
+    GEAR_LOAD_VISCOUS,
     GEAR_STRIBECK,
     GEAR_TWO_STATE,
+    GEAR_WEAR,
+    GREASE_WARMUP,
     MOTOR_ASYMMETRY,
     MOTOR_DRAG,
+    MOTOR_VISCOUS_ASYMMETRY,
     SECOND,
     STRENGTH,
     Row,
@@ -27,6 +31,10 @@ MOTOR_FRICTIONS = np.array(
         MOTOR_DRAG,
         GEAR_TWO_STATE,
         GEAR_ANGLE_VISCOUS,
+        MOTOR_VISCOUS_ASYMMETRY,
+        GEAR_LOAD_VISCOUS,
+        GREASE_WARMUP,
+        GEAR_WEAR,
     ]
 )
 """Effects that `motor_friction_n_m` sums up."""
@@ -40,6 +48,7 @@ def motor_friction_n_m(
     twist_torque: float,
     gear: float,
     state: float,
+    clock_s: float,
 ) -> float:
     """Return what the hidden effects add to the Coulomb level at the motor shaft.
 
@@ -50,6 +59,7 @@ def motor_friction_n_m(
         twist_torque: Torque the gear carries, at the spindle.
         gear: Spindle turns a motor turn.
         state: State of the two-state friction, 0 or 1.
+        clock_s: Time since the bench was started.
     """
     extra = 0.0
     if effects[GEAR_LOAD_FRICTION, STRENGTH] != 0.0:
@@ -64,6 +74,14 @@ def motor_friction_n_m(
         extra += effects[GEAR_TWO_STATE, STRENGTH] * 0.35e-3 * state
     if effects[GEAR_ANGLE_VISCOUS, STRENGTH] != 0.0:
         extra += gear_angle_viscous_n_m(effects[GEAR_ANGLE_VISCOUS], speed, spindle_angle)
+    if effects[MOTOR_VISCOUS_ASYMMETRY, STRENGTH] != 0.0:
+        extra += motor_viscous_asymmetry_n_m(effects[MOTOR_VISCOUS_ASYMMETRY], speed)
+    if effects[GEAR_LOAD_VISCOUS, STRENGTH] != 0.0:
+        extra += gear * gear_load_viscous_n_m(effects[GEAR_LOAD_VISCOUS], speed, twist_torque)
+    if effects[GREASE_WARMUP, STRENGTH] != 0.0:
+        extra += grease_warmup_n_m(effects[GREASE_WARMUP], clock_s)
+    if effects[GEAR_WEAR, STRENGTH] != 0.0:
+        extra += effects[GEAR_WEAR, STRENGTH] * 0.3e-3
     return extra
 
 
@@ -184,3 +202,26 @@ def gear_stiffening_ratio(row: Row, twist_rad: float) -> float:
     """Factor of the gear's stiffness: 1 + 0.8 x^2 / (1 + x), x = |twist| / x0."""
     x = abs(twist_rad) / row[FIRST]
     return 1.0 + row[STRENGTH] * 0.8 * x * x / (1.0 + x)
+
+
+@numba.njit()
+def motor_viscous_asymmetry_n_m(row: Row, motor_speed_rad_s: float) -> float:
+    """Viscous friction on opening: b |w| (1 - w / sqrt(w^2 + w0^2)) / 2, b = 20 uN m s/rad."""
+    w = motor_speed_rad_s
+    side = 1.0 - w / math.sqrt(w * w + row[FIRST] * row[FIRST])
+    return row[STRENGTH] * 10e-6 * abs(w) * side
+
+
+@numba.njit()
+def gear_load_viscous_n_m(row: Row, motor_speed_rad_s: float, twist_torque_n_m: float) -> float:
+    """Extra friction at the spindle: c |T| |w| / sqrt(1 + (w / w0)^2), c = 6 ms/rad."""
+    x = motor_speed_rad_s / row[FIRST]
+    film = abs(motor_speed_rad_s) / math.sqrt(1.0 + x * x)
+    return row[STRENGTH] * 6e-3 * abs(twist_torque_n_m) * film
+
+
+@numba.njit()
+def grease_warmup_n_m(row: Row, clock_s: float) -> float:
+    """Extra Coulomb level at the motor: F / (1 + y^1.5), y = t / T, F = 0.5 mN m at strength 1."""
+    y = clock_s / row[FIRST]
+    return row[STRENGTH] * 0.5e-3 / (1.0 + y * math.sqrt(y))

@@ -10,14 +10,13 @@ from math import pi
 import numpy as np
 
 from estimation.arm.closed_chain import (
-    Body,
     ClosedChain,
     closed_jacobians,
     closed_regressor,
     parameter_names,
 )
 from estimation.arm.motion import Motion
-from estimation.arm.tables import DhRow
+from estimation.arm.tables import Body, DhRow
 from estimation.recording import FloatArray
 from rig.simulation.arm import dahl
 

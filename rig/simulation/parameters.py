@@ -78,6 +78,9 @@ class PlantParameters:
             friction that sticks. No dry friction does that: it makes a rig of which a smooth change
             of sign is the whole truth.
         spindle_creep_speed_rad_s: The same of spindle and jaw.
+        wrist_middle_rad: Pitch of the wrist about which it swings by itself. Assumed.
+        wrist_swing_rad: Amplitude of that; 0 holds the wrist. Assumed.
+        wrist_period_s: Period of that. Assumed.
     """
 
     substeps_ratio: float = _fixed(20.0)
@@ -111,6 +114,9 @@ class PlantParameters:
     stop_damping_n_m_s_rad: float = 5e-3
     motor_creep_speed_rad_s: float = _fixed(0.0)
     spindle_creep_speed_rad_s: float = _fixed(0.0)
+    wrist_middle_rad: float = _fixed(0.0)
+    wrist_swing_rad: float = _fixed(0.0)
+    wrist_period_s: float = _fixed(1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,6 +152,10 @@ class SensorParameters:
         fsr_noise_count: White noise. Assumed.
         fsr_limit_count: Largest count, 12 bit; the smallest is 0. Datasheet.
         lever_arm_m: From the jaw's axis to the force-sensing resistor. Stated in the paper, 12 mm.
+        torque_colour_n_m: Coloured noise of both torque channels beside the white one, standard
+            deviation. None was measured.
+        current_colour_a: The same of the current. None was measured.
+        colour_time_s: Time within which coloured noise forgets. Assumed.
     """
 
     motor_count_per_turn: float = _fixed(4096.0)
@@ -170,6 +180,9 @@ class SensorParameters:
     fsr_noise_count: float = 4.0
     fsr_limit_count: float = _fixed(4095.0)
     lever_arm_m: float = _fixed(0.012)
+    torque_colour_n_m: float = _fixed(0.0)
+    current_colour_a: float = _fixed(0.0)
+    colour_time_s: float = _fixed(0.05)
 
 
 REFERENCE_GAINS = (20.0, 0.2, 4.0, 0.3, 2700.0)

@@ -56,8 +56,12 @@ TICK_S = 1e-3
     CREEP_SLOW,
     SENSOR_LAG_FIRST,
     SENSOR_LAG_SECOND,
+    AGE,
+    PROXIMAL_COLOUR,
+    DISTAL_COLOUR,
+    CURRENT_COLOUR,
     RING,
-) = range(25)
+) = range(29)
 STATE_SIZE = RING + hidden_sensors.RING
 """Places in the state, SI units: motion, currents, what the torque sensors see, the drift of the
 two torque zeros, the time since the start, and the states of hidden effects; the last ones are the
@@ -82,7 +86,15 @@ def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray
     state[MOTOR_ANGLE] = parameters.gear_ratio * spindle_angle_rad
     state[SPINDLE_ANGLE] = spindle_angle_rad
     state[JAW_ANGLE] = parameters.cable_ratio * spindle_angle_rad + parameters.jaw_zero_rad
+    state[AGE] = hidden_cable.OLD_S
     return state
+
+
+@numba.njit()
+def wrist_pitch_rad(p: Any, clock_s: float) -> float:
+    """Return the pitch of the wrist, which swings by itself, at a time since the bench's start."""
+    phase = 2.0 * math.pi * clock_s / p.wrist_period_s
+    return float(p.wrist_middle_rad + p.wrist_swing_rad * math.sin(phase))
 
 
 FULL = 6.0
@@ -179,6 +191,8 @@ def step_tick(
     pulley = strength[hidden.ECCENTRIC_PULLEY] != 0.0
     creep = strength[hidden.CABLE_CREEP] != 0.0
     hysteresis = strength[hidden.CABLE_HYSTERESIS] != 0.0
+    dwell = strength[hidden.CABLE_DWELL] != 0.0
+    pull = strength[hidden.WRIST_PULL] != 0.0
     jaw_effect = _any(strength, hidden_cable.JAW_TORQUES)
     lag_gain = 1.0
     if late:
@@ -195,7 +209,9 @@ def step_tick(
     bristle, strain = state[BRISTLE], state[CREEP_STRAIN]
     bend, heat, rubbing = state[HYSTERESIS], state[HEAT], state[TWO_STATE]
     lag_first, lag_second = state[LAG_FIRST], state[LAG_SECOND]
-    clock = state[CLOCK]
+    clock, age = state[CLOCK], state[AGE]
+    wrist = wrist_pitch_rad(p, clock)
+    wrist_speed = (wrist_pitch_rad(p, clock + TICK_S) - wrist) / TICK_S
     proximal, distal = state[PROXIMAL_TORQUE], state[DISTAL_TORQUE]
 
     for _ in range(steps):
@@ -250,6 +266,10 @@ def step_tick(
             stretch += hidden_cable.eccentric_pulley_rad(row, spindle)
             stretch_rate += slope * spindle_speed
             lever += slope
+        if pull:
+            row = effects[hidden.WRIST_PULL]
+            stretch += hidden_cable.wrist_pull_rad(row, wrist)
+            stretch_rate += hidden_cable.wrist_pull_slope(row, wrist) * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
         if creep:
             row = effects[hidden.CABLE_CREEP]
@@ -266,7 +286,7 @@ def step_tick(
                 row = effects[hidden.GEAR_TWO_STATE]
                 rubbing = hidden_drive.gear_two_state(row, rubbing, motor_speed)
             motor_limit += hidden_drive.motor_friction_n_m(
-                effects, motor_speed, spindle, twist_torque, gear, rubbing
+                effects, motor_speed, spindle, twist_torque, gear, rubbing, clock
             )
         before = motor_speed
         motor_speed += dt_motor * (
@@ -283,7 +303,12 @@ def step_tick(
             - p.spindle_viscous_n_m_s_rad * spindle_speed
         )
         if spindle_friction:
-            spindle_limit += hidden_cable.spindle_friction_n_m(effects, spindle, cable, clock)
+            if dwell:
+                row = effects[hidden.CABLE_DWELL]
+                age += dt * hidden_cable.cable_dwell_rate(row, age, spindle_speed)
+            spindle_limit += hidden_cable.spindle_friction_n_m(
+                effects, spindle, spindle_speed, cable, clock, age, wrist
+            )
         if spindle_ripple:
             row = effects[hidden.SPINDLE_RIPPLE]
             spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)
@@ -327,5 +352,5 @@ def step_tick(
     state[BRISTLE], state[CREEP_STRAIN] = bristle, strain
     state[HYSTERESIS], state[HEAT], state[TWO_STATE] = bend, heat, rubbing
     state[LAG_FIRST], state[LAG_SECOND] = lag_first, lag_second
-    state[CLOCK] = clock + TICK_S
+    state[CLOCK], state[AGE] = clock + TICK_S, age
     state[PROXIMAL_TORQUE], state[DISTAL_TORQUE] = proximal, distal

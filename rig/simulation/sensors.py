@@ -64,6 +64,13 @@ def sample(
     )
     state[plant.DISTAL_DRIFT] += s.distal_ramp_n_m_s * plant.TICK_S + walk * normal(seed, tick, 1)
 
+    if s.torque_colour_n_m != 0.0 or s.current_colour_a != 0.0:
+        keep = np.exp(-plant.TICK_S / s.colour_time_s)
+        fresh = np.sqrt(1.0 - keep * keep)
+        for k in range(3):
+            place = plant.PROXIMAL_COLOUR + k
+            state[place] = keep * state[place] + fresh * normal(seed, tick, 6 + k)
+
     counts[MOTOR] = int(np.floor(state[plant.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
     counts[SPINDLE] = int(
         np.floor(-state[plant.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
@@ -96,6 +103,7 @@ def sample(
         + s.proximal_offset_n_m
         + state[plant.PROXIMAL_DRIFT]
         + s.proximal_noise_n_m * normal(seed, tick, 2)
+        + s.torque_colour_n_m * state[plant.PROXIMAL_COLOUR]
     )
     seen = state[plant.DISTAL_TORQUE]
     if strength[hidden.DISTAL_DRIFT] != 0.0:
@@ -109,6 +117,7 @@ def sample(
         + s.distal_offset_n_m
         + state[plant.DISTAL_DRIFT]
         + s.distal_noise_n_m * normal(seed, tick, 3)
+        + s.torque_colour_n_m * state[plant.DISTAL_COLOUR]
     )
     counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
     counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
@@ -119,6 +128,7 @@ def sample(
             effects[hidden.CURRENT_SENSOR_BEND], current
         )
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
+    current += s.current_colour_a * state[plant.CURRENT_COLOUR]
     counts[CURRENT] = _converted(
         current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count
     )

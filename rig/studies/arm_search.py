@@ -10,18 +10,15 @@ import numpy as np
 from estimation.arm.base import base_of
 from estimation.arm.effects import ArmEffect, row_count
 from estimation.arm.identification import smoothed
-from estimation.arm.motion import LOW_PASS, joint_channels, motion_of
+from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.signed import Block, Normal, Products, solve
-from estimation.arm.tables import PSM
+from estimation.arm.tables import PSM, PSM_CLOSED
 from estimation.arm.wrist import candidates, gripper
-from estimation.filters import LowPass, zero_phase
+from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
-
-FINE = LowPass(cutoff_hz=20.0, order=3)
-"""Filter of the motion that columns are made from before they are filtered as the torque is."""
 
 EDGE_S = 1.0
 """Left out at either end: the filters' transients, and elements that have not slipped yet."""
@@ -86,6 +83,7 @@ class Prepared:
         position: Filtered positions, shape (n, joints).
         torque: Filtered torque, shape (n, rows): joints, then the gripper.
         thesis: Base columns of filtered motion, as the thesis makes them, shape (n, joints, base).
+        closed: The same of the arm with its loops.
         table: Filtered columns of barely filtered motion: the base, then every candidate.
         blocks: Which columns of the table belong to what; the base first.
         independent_share: Share of its samples that are independent after the filter.
@@ -95,6 +93,7 @@ class Prepared:
     position: FloatArray
     torque: FloatArray
     thesis: FloatArray
+    closed: FloatArray
     table: FloatArray
     blocks: tuple[Block, ...]
     independent_share: float
@@ -188,6 +187,7 @@ def prepare(recording: Recording, tried: Sequence[ArmEffect] | None = None) -> P
         position=coarse.position[kept, : len(PSM.joints)],
         torque=zero_phase(torque[:, :rows], rate_hz, LOW_PASS)[kept],
         thesis=regressor(PSM, coarse)[kept][:, :, base.columns],
+        closed=regressor(PSM_CLOSED, coarse)[kept][:, :, base_of(PSM_CLOSED).columns],
         table=np.concatenate([smoothed(part, rate_hz)[kept] for part in parts], axis=2),
         blocks=_blocks(effects, [part.shape[2] for part in parts]),
         independent_share=min(1.0, 2 * LOW_PASS.cutoff_hz * every / rate_hz),

@@ -16,7 +16,8 @@ from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.frozen import Frozen, Part, freeze
-from estimation.diagnosis.search import Gates, Search, Trial
+from estimation.diagnosis.gates import Gates
+from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import Sealed, split
 from estimation.effects import effect
 from estimation.fitting import fit

@@ -11,14 +11,14 @@ import numpy as np
 
 from estimation.arm.effects import ArmEffect
 from estimation.arm.identification import smoothed
-from estimation.arm.motion import LOW_PASS, joint_channels, motion_of
+from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
 from estimation.arm.payload import SIDE_STEP_M, AddedMass, added_mass, point_mass
 from estimation.arm.tables import PSM
 from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
 from rig.reports.provenance import Provenance
 from rig.reports.table import TextTable
-from rig.studies.arm_search import EDGE_S, FINE, RATE_SHARE, Prepared, prepare
+from rig.studies.arm_search import EDGE_S, RATE_SHARE, Prepared, prepare
 
 LINK = 2
 """The mass turns with joints 1 and 2; the insertion does not move it."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from estimation.arm.base import base_of
+from estimation.arm.consistent import consistent_fit
 from estimation.arm.effects import ArmEffect
 from estimation.arm.identification import Fit, fit, nrmsd_percent
 from estimation.arm.tables import PSM
@@ -21,6 +22,8 @@ THESIS_TABLE_3_2 = (2.38, 4.80, 12.83, 6.49, 15.29, 18.11)
 """The thesis' NRMSD on a path it was not fitted to, %, on another robot."""
 
 THESIS = "thesis' model"
+CLOSED = "thesis' model with the arm's loops"
+CONSISTENT = "thesis' model, physically consistent"
 FILTERED = "columns filtered as the torque"
 EFFECTS = "with the effects kept"
 
@@ -35,7 +38,7 @@ class Row:
         tested_on: Path of the test.
         parameters: Number of parameters.
         condition: Condition number of the fit's weighted columns, each of unit length; None of a
-            damped fit, whose damping sets it.
+            damped or bounded fit, whose damping or bounds set it.
         nrmsd_percent: Error of each joint on the test path, % of its torque's range.
         fitted_nrmsd_percent: The same on the path of the fit.
     """
@@ -51,11 +54,19 @@ class Row:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One identified base parameter of the thesis' model."""
+    """One identified base parameter of the thesis' model.
+
+    Attributes:
+        name: The combination.
+        value: By weighted least squares.
+        standard_error: Of that value; knows noise only.
+        consistent: By the physically consistent fit.
+    """
 
     name: str
     value: float
     standard_error: float
+    consistent: float
 
 
 @dataclass(frozen=True)
@@ -114,11 +125,14 @@ def run_study(
     for one, other in (there, back, *((there[1], prepare(run, effects)) for run in also)):
         rows += [
             _row(THESIS, one, other, one.thesis, other.thesis),
+            _row(CLOSED, one, other, one.closed, other.closed),
+            _consistent_row(one, other),
             _row(FILTERED, one, other, one.filtered, other.filtered),
             _row_with_effects(one, other, kept),
         ]
     found = _fit(there[0], there[0].thesis)
-    named = zip(base_of(PSM).names, found.values, found.errors, strict=True)
+    real = _consistent(there[0])
+    named = zip(base_of(PSM).names, found.values, found.errors, real, strict=True)
     return Study(
         schema="rig.study.pique/1",
         arm=f"{PSM.name}; {PSM.source}",
@@ -126,7 +140,7 @@ def run_study(
         rows=tuple(rows),
         thesis=THESIS_TABLE_3_2,
         trials=tuple(trials),
-        parameters=tuple(Parameter(n, float(v), float(e)) for n, v, e in named),
+        parameters=tuple(Parameter(n, float(v), float(e), float(c)) for n, v, e, c in named),
         provenance=Provenance.now(0),
     )
 
@@ -152,6 +166,21 @@ def _row(model: str, one: Prepared, other: Prepared, own: FloatArray, others: Fl
         nrmsd_percent=error(other, others),
         fitted_nrmsd_percent=error(one, own),
     )
+
+
+def _consistent(path: Prepared) -> FloatArray:
+    torque, weights = path.torque[:, : path.joints], path.weights[: path.joints]
+    return consistent_fit(PSM, path.thesis, torque, weights).base
+
+
+def _consistent_row(one: Prepared, other: Prepared) -> Row:
+    values = _consistent(one)
+
+    def error(path: Prepared) -> tuple[float, ...]:
+        left = nrmsd_percent(path.thesis @ values, path.torque[:, : path.joints])
+        return tuple(map(float, left))
+
+    return Row(CONSISTENT, one.name, other.name, len(values), None, error(other), error(one))
 
 
 def _row_with_effects(one: Prepared, other: Prepared, kept: list[str]) -> Row:

@@ -16,11 +16,11 @@ from estimation.arm.base import base_of
 from estimation.arm.effects import on_joint
 from estimation.arm.elements import slip
 from estimation.arm.identification import fit, nrmsd_percent, smoothed, thesis_weights
-from estimation.arm.motion import motion_of
+from estimation.arm.motion import FINE, LOW_PASS, motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import by_pseudo_inverse, most_likely, spatial_jacobians
-from estimation.filters import LowPass, zero_phase
+from estimation.filters import zero_phase
 from estimation.recording import FloatArray
 from rig.reports.provenance import Provenance
 from rig.simulation.arm import (
@@ -46,8 +46,6 @@ TABLES = {
 
 HAND, SERIES, CONTACT = TABLES
 
-LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
-FINE = LowPass(cutoff_hz=20.0, order=3)
 CUT = slice(100, -100)
 SLIP_SHARE = (0.003, 0.01, 0.03, 0.1)
 DAMPING = 1e-4

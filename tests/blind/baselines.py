@@ -1,17 +1,21 @@
-"""Three textbook ways to pick effects, on the same library of columns, for comparison.
+"""Three textbook ways to pick effects, on the library that `rig diagnose` searches, for comparison.
 
 - `f_test`: an F-test for each candidate on its own, samples taken as independent, with the false
   discovery rate held at 5 % (Benjamini and Hochberg, J. R. Statist. Soc. B 57, 1995);
 - `forward_bic`: the candidate that lowers the Bayesian information criterion most, again and again
   (Schwarz, Ann. Statist. 6, 1978);
-- `stlsq`: sequentially thresholded least squares (Brunton, Proctor and Kutz, PNAS 113, 2016),
-  columns scaled to variance 1, threshold a tenth of the residual's standard deviation.
+- `stlsq`: sequentially thresholded least squares (Brunton, Proctor and Kutz, PNAS 113, 2016) as
+  pysindy has it, columns scaled to variance 1, threshold a tenth of the residual's standard
+  deviation.
 
-Each sees the balance's declared columns fitted along. Shapes stand at the middle of their range.
+A candidate is an effect of the catalogue at one point of its shape's grid, its columns those of the
+search. Each method sees the balance's declared columns fitted along.
 """
 
+import itertools
 import math
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,148 +23,153 @@ import numpy as np
 from scipy import stats
 
 from estimation.campaign import Campaign
-from estimation.derived import measured_channels, settled_places, zero_phase_channels
-from estimation.effects import catalogue
+from estimation.diagnosis.balance import lay_out
+from estimation.diagnosis.candidate import pool
+from estimation.diagnosis.design import covered, prepare, tables
+from estimation.diagnosis.instruments import instruments
+from estimation.diagnosis.instruments import projection as instrumented
 from estimation.fitting import fit
 from estimation.model import Model
-from estimation.recording import FloatArray, MissingChannelError, Recording
+from estimation.recording import FloatArray
 
 MOST = 8
 """Terms `forward_bic` takes at most."""
 
-RATE_HZ = 100
+TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
-    """One balance laid out for a regression, means of the runs removed.
+class Library:
+    """One balance as a regression, what the declared columns explain taken out of both sides.
+
+    Rows are rotated and the empty ones left out, which no sum of squares and no fit notices.
 
     Attributes:
-        target: Shape (n,).
-        declared: Declared columns, shape (n, d).
-        candidates: Family to its columns, each of shape (n, k).
+        target: Shape (m,).
+        columns: Shape (m, k).
+        family: Family of each candidate.
+        block: Columns of each candidate.
+        samples: Samples before the rotation.
+        declared: Declared columns.
     """
 
     target: FloatArray
-    declared: FloatArray
-    candidates: Mapping[str, FloatArray]
+    columns: FloatArray
+    family: Sequence[str]
+    block: Sequence[slice]
+    samples: int
+    declared: int
 
-
-def lay_out(model: Model, campaign: Campaign) -> Table:
-    """Fit the declared model and return its columns and those of every other catalogue effect."""
-    fitted = fit(model, campaign, bootstrap=0)
-    own = {term.effect.id for term in fitted.terms}
-    others = [
-        effect
-        for name, effect in catalogue().items()
-        # noise shared by both sides of a balance looks like an effect to any of the three
-        if name not in own and fitted.target not in effect.roles.values()
-    ]
-    blocks: dict[str, list[FloatArray]] = {}
-    target, declared = [], []
-    for recording in campaign.evidence:
-        usable = [e for e in others if _there(e.roles.values(), recording)]
-        wanted = {c for e in usable for c in e.roles.values()}
-        names = [*fitted.channels, fitted.target, *sorted(wanted)]
-        whole = zero_phase_channels(recording, names, fitted.low_pass)
-        run = whole.at(
-            settled_places(whole, fitted.low_pass, int(recording.sample_rate_hz / RATE_HZ))
+    @classmethod
+    def of(
+        cls,
+        target: FloatArray,
+        declared: FloatArray,
+        candidates: Sequence[tuple[str, FloatArray]],
+    ) -> "Library":
+        """Lay out a library from whole columns of shape (n,), (n, d) and (n, k) each."""
+        whole = np.column_stack([*(columns for _, columns in candidates), target])
+        basis = np.linalg.qr(declared)[0]
+        whole = whole - basis @ (basis.T @ whole)
+        rotated = np.linalg.qr(whole, mode="r")
+        ends = np.cumsum([0, *(columns.shape[1] for _, columns in candidates)])
+        return cls(
+            rotated[:, -1],
+            rotated[:, :-1],
+            [family for family, _ in candidates],
+            [slice(a, b) for a, b in itertools.pairwise(ends.tolist())],
+            len(target),
+            declared.shape[1],
         )
-        target.append(_centred(run[fitted.target]))
-        parts = [t.columns(run, t.numbers(t.effect.shape)) for t in fitted.terms]
-        declared.append(_centred(np.column_stack(parts)))
-        for effect in usable:
-            shape = [math.sqrt(p.lower * p.upper) for p in effect.shape]
-            inputs = {role: run[channel] for role, channel in effect.roles.items()}
-            blocks.setdefault(effect.id, []).append(_centred(effect.columns(inputs, shape)))
-    complete = {k: v for k, v in blocks.items() if len(v) == len(target)}
-    return Table(
-        np.concatenate(target),
-        np.concatenate(declared),
-        {name: np.concatenate(parts) for name, parts in complete.items()},
-    )
 
 
-def _there(channels: object, recording: Recording) -> bool:
-    try:
-        return all(name in recording for name in measured_channels(list(channels)))  # type: ignore[call-overload]
-    except MissingChannelError:
-        return False
+def library(model: Model, campaign: Campaign) -> Library:
+    """Fit the declared model and lay out what a diagnosis searches beside it."""
+    recordings = list(campaign.timed().evidence)
+    fitted = fit(model, Campaign.of(recordings), bootstrap=0)
+    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    tried = pool(model, measured)
+    wanted = [model.target, *model.channels, *instruments(measured)]
+    wanted += [channel for c in tried for _, channel in c.channels]
+    runs = [prepare(r, dict.fromkeys(wanted), model) for r in recordings]
+    tried = covered(tried, runs)
+    told = instrumented(runs, tried, model.target)
+    balance = lay_out(fitted, [told(run) for run in runs])
+    whole = np.vstack(tables(balance.runs, tried, balance.demean))
+    declared = np.vstack(balance.columns(balance.terms))
+    candidates, at = [], 0
+    for candidate in tried:
+        count = len(candidate.effect.amplitudes)
+        candidates.append((candidate.family, whole[:, at : at + count]))
+        at += count
+    return Library.of(np.concatenate(balance.target), declared, candidates)
 
 
-def _centred(columns: FloatArray) -> FloatArray:
-    centred: FloatArray = columns - columns.mean(axis=0)
-    return centred
+def _falls(target: FloatArray, columns: FloatArray, blocks: Sequence[slice]) -> FloatArray:
+    """Return by how much each block of columns lowers the sum of squares, shape (blocks,)."""
+    falls = np.zeros(len(blocks))
+    for k, block in enumerate(blocks):
+        part = columns[:, block]
+        scale = np.linalg.norm(part, axis=0)
+        part = part[:, scale > TINY] / scale[scale > TINY]
+        if part.size:
+            weights = np.linalg.lstsq(part, target, rcond=None)[0]
+            falls[k] = target @ target - np.sum((target - part @ weights) ** 2)
+    return falls
 
 
-def _sum_of_squares(target: FloatArray, columns: FloatArray) -> float:
-    weights = np.linalg.lstsq(columns, target, rcond=None)[0]
-    return float(np.sum((target - columns @ weights) ** 2))
-
-
-def f_test(table: Table, rate: float = 0.05) -> list[str]:
+def f_test(given: Library, rate: float = 0.05) -> list[str]:
     """Return the families that an F-test each and Benjamini-Hochberg call discoveries."""
-    n, base = table.target.size, _sum_of_squares(table.target, table.declared)
-    p_values = {}
-    for name, columns in table.candidates.items():
-        with_it = np.column_stack([table.declared, columns])
-        left, more = _sum_of_squares(table.target, with_it), columns.shape[1]
-        free = n - with_it.shape[1]
-        p_values[name] = float(stats.f.sf((base - left) / more / (left / free), more, free))
-    ranked = sorted(p_values, key=p_values.__getitem__)
-    below = [k for k, name in enumerate(ranked, 1) if p_values[name] <= rate * k / len(ranked)]
-    return ranked[: max(below, default=0)]
+    falls = _falls(given.target, given.columns, given.block)
+    whole = float(given.target @ given.target)
+    more = np.array([block.stop - block.start for block in given.block])
+    free = given.samples - given.declared - more
+    p_values = stats.f.sf(falls / more / ((whole - falls) / free), more, free)
+    order = np.argsort(p_values)
+    below = np.flatnonzero(p_values[order] <= rate * np.arange(1, order.size + 1) / order.size)
+    found = order[: int(below.max()) + 1] if below.size else []
+    return sorted({given.family[int(k)] for k in found})
 
 
-def forward_bic(table: Table) -> list[str]:
+def forward_bic(given: Library) -> list[str]:
     """Return the families taken one after the other while the criterion falls, at most `MOST`."""
-    n, chosen, columns = table.target.size, list[str](), table.declared
-
-    def criterion(tried: FloatArray) -> float:
-        fit_term = n * math.log(_sum_of_squares(table.target, tried) / n)
-        return float(fit_term + tried.shape[1] * math.log(n))
-
-    best = criterion(columns)
+    n, target, columns = given.samples, given.target.copy(), given.columns.copy()
+    chosen: list[str] = []
     while len(chosen) < MOST:
-        rest = [name for name in table.candidates if name not in chosen]
-        scores = {
-            name: criterion(np.column_stack([columns, table.candidates[name]])) for name in rest
-        }
-        name = min(scores, key=scores.__getitem__, default=None)
-        if name is None or scores[name] >= best:
-            return chosen
-        best, columns = scores[name], np.column_stack([columns, table.candidates[name]])
-        chosen.append(name)
-    return chosen
-
-
-def stlsq(table: Table, share: float = 0.1, rounds: int = 20) -> list[str]:
-    """Return the families with a column whose scaled weight survives the threshold."""
-    names = [name for name, c in table.candidates.items() for _ in range(c.shape[1])]
-    if not names:
-        return []
-    weights = np.linalg.lstsq(table.declared, table.target, rcond=None)[0]
-    left = table.target - table.declared @ weights
-    library = np.column_stack(list(table.candidates.values()))
-    library = library - table.declared @ np.linalg.lstsq(table.declared, library, rcond=None)[0]
-    scale = library.std(axis=0)
-    library = library / np.where(scale > 0.0, scale, 1.0)
-    kept = scale > 0.0
-    threshold = share * left.std()
-    for _ in range(rounds):
-        found = np.zeros(len(names))
-        found[kept] = np.linalg.lstsq(library[:, kept], left, rcond=None)[0]
-        still = kept & (np.abs(found) >= threshold)
-        if np.array_equal(still, kept):
+        whole = float(target @ target)
+        left = np.maximum(whole - _falls(target, columns, given.block), TINY * whole)
+        sizes = np.array([block.stop - block.start for block in given.block])
+        change = n * np.log(left / whole) + sizes * math.log(n)
+        best = int(np.argmin(change))
+        if change[best] >= 0.0:
             break
-        kept = still
-    return sorted({name for name, stays in zip(names, kept, strict=True) if stays})
+        chosen.append(given.family[best])
+        basis = np.linalg.qr(columns[:, given.block[best]])[0]
+        target = target - basis @ (basis.T @ target)
+        columns = columns - basis @ (basis.T @ columns)
+    return sorted(set(chosen))
 
 
-METHODS: Mapping[str, Callable[[Table], list[str]]] = {
+def stlsq(given: Library, share: float = 0.1) -> list[str]:
+    """Return the families with a column whose scaled weight survives the threshold."""
+    from pysindy.optimizers import STLSQ
+
+    scale = np.linalg.norm(given.columns, axis=0) / math.sqrt(given.samples)
+    kept = np.flatnonzero(scale > TINY)
+    spread = float(np.linalg.norm(given.target)) / math.sqrt(given.samples)
+    method = STLSQ(threshold=share * spread, alpha=0.0, max_iter=20)
+    with warnings.catch_warnings():  # it warns when nothing, or everything, survives
+        warnings.simplefilter("ignore")
+        method.fit(given.columns[:, kept] / scale[kept], given.target[:, None])
+    alive = set(kept[np.flatnonzero(method.coef_[0])].tolist())
+    pairs = zip(given.family, given.block, strict=True)
+    return sorted({family for family, block in pairs if alive & {*range(block.start, block.stop)}})
+
+
+METHODS: Mapping[str, Callable[[Library], list[str]]] = {
     "F-test with Benjamini-Hochberg": f_test,
     "forward BIC": forward_bic,
-    "STLSQ": stlsq,
+    "STLSQ of pysindy": stlsq,
 }
 
 
@@ -174,11 +183,13 @@ class Picked:
 
 
 def run_all(models: Sequence[Model], campaign: Campaign) -> list[Picked]:
-    """Return what each method picks in any of the balances."""
-    tables = [lay_out(model, campaign) for model in models]
-    picked = []
-    for name, method in METHODS.items():
-        start = time.perf_counter()
-        families = sorted({family for table in tables for family in method(table)})
-        picked.append(Picked(name, tuple(families), time.perf_counter() - start))
-    return picked
+    """Return what each method picks in any of the balances; making the columns takes no time."""
+    families: dict[str, set[str]] = {name: set() for name in METHODS}
+    seconds = dict.fromkeys(METHODS, 0.0)
+    for model in models:
+        given = library(model, campaign)
+        for name, method in METHODS.items():
+            start = time.perf_counter()
+            families[name] |= set(method(given))
+            seconds[name] += time.perf_counter() - start
+    return [Picked(name, tuple(sorted(families[name])), seconds[name]) for name in METHODS]

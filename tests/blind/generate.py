@@ -6,6 +6,7 @@ written to another folder, under a name that says nothing.
 
 import hashlib
 import json
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -16,22 +17,34 @@ from estimation.recording import FloatArray, Instrument, Recording
 from rig import trajectory
 from rig.log.convert import write_recording
 from rig.motion import motion_of
-from rig.protocol import RunPlan, load_protocol
+from rig.protocol import RunPlan
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import KINDS, NAMES, HiddenEffect
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
+from rig.simulation.plant import TICK_S
 from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
+from tests.blind.excitation import RUNS, plans_of, wrist_motion
 from tests.blind.truths import CATALOGUED, OUTSIDE, TRUTHS
 
 CLASSES = ("strong", "weak", "pair", "outside", "partial", "confounded", "control")
 WEAK = 0.3
 """Strength of a weak case for one of a strong one."""
 
-CONTROLS = ("plain", "coloured", "drifting", "skewed")
+CHAINS = ("plain", "coloured", "drifting", "skewed")
+"""What a logger may do to a case beside white noise and counts."""
+
+CONTROLS = (*((chain, "usual") for chain in CHAINS), ("coloured", "rests"), ("coloured", "wrist"))
+"""Chain and excitation of controls, in turn."""
+
 SPREAD = 0.1
 EPOCH_NS = 1_700_000_000_000_000_000
+APART_S = 30.0
+"""From the start of one run to that of the next."""
+
+FADE_S = 120.0
+WRIST_COUNTS = 8192
 
 
 @dataclass(frozen=True)
@@ -43,7 +56,8 @@ class Answer:
         kind: One of `CLASSES`.
         effects: The hidden effects; none in a control.
         runs: Places of the runs that have them.
-        variant: How a control or a confounded case is made; else empty.
+        excitation: One of `EXCITATIONS`.
+        chain: One of `CHAINS`.
         either: For a confounded case: families that cannot be told apart on its runs.
     """
 
@@ -51,39 +65,65 @@ class Answer:
     kind: str
     effects: tuple[HiddenEffect, ...]
     runs: tuple[int, ...]
-    variant: str = ""
+    excitation: str = "usual"
+    chain: str = "plain"
     either: tuple[str, ...] = ()
+
+    def in_run(self, index: int) -> tuple[HiddenEffect, ...]:
+        """Return the effects of one run, as strong as they are there."""
+        if index not in self.runs:
+            return ()
+        return tuple(
+            replace(e, strength=e.strength / (1.0 + index * APART_S / FADE_S))
+            if TRUTHS[e.name].course == "fades"
+            else e
+            for e in self.effects
+        )
 
 
 def draw(kind: str, number: int, seed: int) -> Answer:
     """Draw a case's answer; the same class, number and seed give the same case."""
+    if kind not in CLASSES:
+        raise ValueError(f"There is no class {kind!r}; there are {', '.join(CLASSES)}.")
     word = hashlib.sha256(f"{kind}/{number}/{seed}".encode()).hexdigest()
     random = np.random.default_rng(int(word[:15], 16))
-    runs = tuple(range(14))
-    variant, names = "", list[str]()
+    chain, excitation = CHAINS[int(random.integers(len(CHAINS)))], "usual"
+    if kind == "control":
+        chain, excitation = CONTROLS[number % len(CONTROLS)]
     either: tuple[str, ...] = ()
-    if kind in ("strong", "weak", "partial"):
-        names = [_cycled(sorted(CATALOGUED), number, seed)]
-    elif kind == "outside":
-        names = [_cycled(sorted(OUTSIDE), number, seed)]
-    elif kind == "pair":
-        first, second = random.choice(sorted(CATALOGUED), 2, replace=False)
-        while CATALOGUED[first].names(CATALOGUED[second].family):
-            first, second = random.choice(sorted(CATALOGUED), 2, replace=False)
-        names = [str(first), str(second)]
-    elif kind == "confounded":
-        variant = ("one spring", "constant speed")[number % 2]
-        other = "friction.position" if variant == "one spring" else "friction.load_viscous"
-        names, either = ["gear_load_friction"], ("friction.load", other)
-    elif kind == "control":
-        variant = CONTROLS[number % len(CONTROLS)]
-    else:
-        raise ValueError(f"There is no class {kind!r}; there are {', '.join(CLASSES)}.")
+    if kind == "confounded":
+        excitation = ("one spring", "constant speed")[number % 2]
+        other = "friction.position" if excitation == "one spring" else "friction.load_viscous"
+        either = ("friction.load", other)
+    names = _names(kind, number, seed, random)
+    needed = {TRUTHS[name].needs for name in names} - {"usual"}
+    excitation = needed.pop() if needed else excitation
+    effects = tuple(_shaped(name, random, WEAK if kind == "weak" else 1.0) for name in names)
+    runs = tuple(range(RUNS))
     if kind == "partial":
         count = int(random.integers(5, 9))
-        runs = tuple(sorted(int(k) for k in random.choice(14, count, replace=False)))
-    effects = tuple(_shaped(name, random, WEAK if kind == "weak" else 1.0) for name in names)
-    return Answer(f"case-{word[-10:]}", kind, effects, runs, variant, either)
+        runs = tuple(sorted(int(k) for k in random.choice(RUNS, count, replace=False)))
+    elif any(TRUTHS[name].course == "comes" for name in names):
+        runs = tuple(range(int(random.integers(5, 10)), RUNS))
+    return Answer(f"case-{word[-10:]}", kind, effects, runs, excitation, chain, either)
+
+
+def _names(kind: str, number: int, seed: int, random: np.random.Generator) -> list[str]:
+    if kind in ("strong", "weak"):
+        return [_cycled(sorted(CATALOGUED), number, seed)]
+    lasting = sorted(name for name, truth in CATALOGUED.items() if not truth.course)
+    if kind == "partial":
+        return [_cycled(lasting, number, seed)]
+    if kind == "outside":
+        return [_cycled(sorted(OUTSIDE), number, seed)]
+    if kind == "confounded":
+        return ["gear_load_friction"]
+    while kind == "pair":
+        first, second = (str(name) for name in random.choice(lasting, 2, replace=False))
+        one, other = CATALOGUED[first], CATALOGUED[second]
+        if not one.names(other.family) and "usual" in (one.needs, other.needs):
+            return [first, second]
+    return []
 
 
 def _cycled(names: list[str], number: int, seed: int) -> str:
@@ -115,47 +155,55 @@ def write(answer: Answer, cases: Path, answers: Path, runs: int | None = None) -
     folder = cases / answer.case
     folder.mkdir(parents=True)
     write_text_atomic(answers / f"{answer.case}.json", json.dumps(asdict(answer), indent=1) + "\n")
+    for recording in record(answer, range(RUNS if runs is None else runs)):
+        write_recording(folder / f"{recording.name}.mcap", recording)
+    return folder
+
+
+def record(answer: Answer, places: Iterable[int] = range(RUNS)) -> Iterator[Recording]:
+    """Yield a case's recordings at some places; they do not say what is hidden."""
     rig_seed = int(answer.case[-8:], 16)
     plant = vary(DECLARED_PLANT, rig_seed, SPREAD)
+    sensors = _sensors(answer.chain, rig_seed)
+    plans = plans_of(answer.excitation)
+    for index in places:
+        plan = plans[index]
+        moved = replace(plant, **wrist_motion(answer.excitation, index))
+        made = _record(plan, moved, sensors, answer.in_run(index), rig_seed * 1009 + index, index)
+        if answer.excitation == "wrist":
+            made = made.with_columns(wrist_pitch_rad=_wrist(plan, moved))
+        yield _skewed(made, rig_seed * 1013 + index) if answer.chain == "skewed" else made
+
+
+def _sensors(chain: str, rig_seed: int) -> SensorParameters:
+    """Return the sensors of a rig with one of `CHAINS`."""
     sensors = vary(SensorParameters(), rig_seed, SPREAD)
-    if answer.variant == "drifting":
-        sensors = replace(
+    if chain == "drifting":
+        return replace(
             sensors,
             proximal_ramp_n_m_s=5.0 * sensors.proximal_ramp_n_m_s,
             distal_ramp_n_m_s=5.0 * sensors.distal_ramp_n_m_s,
             torque_walk_n_m_s=3.0 * sensors.torque_walk_n_m_s,
         )
-    for index, plan in enumerate(_plans(answer.variant)[:runs]):
-        effects = answer.effects if index in answer.runs else ()
-        recording = _record(plan, plant, sensors, effects, rig_seed * 1009 + index, index)
-        recording = _disturbed(recording, answer.variant, rig_seed * 1013 + index)
-        write_recording(folder / f"{plan.name}.mcap", recording)
-    return folder
+    if chain == "coloured":
+        random = np.random.default_rng(rig_seed)
+        return replace(
+            sensors,
+            torque_colour_n_m=0.3e-3,
+            current_colour_a=1e-3,
+            colour_time_s=float(random.uniform(0.02, 0.1)),
+        )
+    return sensors
 
 
-def _plans(variant: str) -> list[RunPlan]:
-    if variant == "one spring":
-        return [_sprung(plan) for plan in load_protocol("diagnosis").plans()]
-    if variant == "constant speed":
-        return [_steady(index) for index in range(14)]
-    return load_protocol("diagnosis").plans()
-
-
-def _sprung(plan: RunPlan) -> RunPlan:
-    """Return the run against one spring: the load is a function of the angle in every run."""
-    load = 0.1 + 0.7 * np.clip(plan.target_angle_rad + 1.05, 0.0, None)
-    name = "-".join(plan.name.split("-")[:2])
-    conditions = {k: v for k, v in plan.conditions.items() if k != "load_command_a"}
-    return RunPlan(name, plan.target_angle_rad, load, conditions)
-
-
-def _steady(index: int) -> RunPlan:
-    """Return a run at one speed either way, against one of several loads."""
-    load = (0.1, 0.3, 0.5, 0.7, 0.9)[index % 5]
-    start = -1.0 + 0.05 * (index % 3)
-    angle = trajectory.speed_staircase(start, 0.7, [0.5] * 5, 1e-3)
-    conditions: dict[str, float | str] = {"load_command_a": load, "jaw_start_rad": start}
-    return RunPlan(f"{index:03d}-steady", angle, np.full(angle.size, load), conditions)
+def _wrist(plan: RunPlan, plant: PlantParameters) -> FloatArray:
+    """Return what the encoder of the wrist reads during a run."""
+    motion = motion_of(plan, float(plan.target_angle_rad[0]))
+    phase = 2.0 * np.pi * TICK_S * np.arange(motion.first, motion.last)
+    pitch = plant.wrist_middle_rad + plant.wrist_swing_rad * np.sin(phase / plant.wrist_period_s)
+    step = 2.0 * np.pi / WRIST_COUNTS
+    read: FloatArray = np.floor(pitch / step) * step
+    return read
 
 
 def _record(
@@ -180,32 +228,14 @@ def _record(
         conditions=plan.conditions,
         rig="simulated rig",
         instrument=Instrument(model="Maryland", serial="SIM-TOOL-1", side="left"),
-        started_at_ns=EPOCH_NS + index * 30_000_000_000,
+        started_at_ns=EPOCH_NS + round(index * APART_S * 1e9),
         source="simulated",
     )
 
 
-def _disturbed(recording: Recording, variant: str, seed: int) -> Recording:
-    """Return the recording of a control as a worse logger would have made it."""
+def _skewed(recording: Recording, seed: int) -> Recording:
+    """Return the recording as a logger with a clock of its own would have dated it."""
     random = np.random.default_rng(seed)
-    if variant == "coloured":
-        n = len(recording)
-        return recording.with_columns(
-            proximal_torque_n_m=recording["proximal_torque_n_m"] + 0.3e-3 * _coloured(n, random),
-            distal_torque_n_m=recording["distal_torque_n_m"] + 0.3e-3 * _coloured(n, random),
-            motor_current_a=recording["motor_current_a"] + 1e-3 * _coloured(n, random),
-        )
-    if variant == "skewed":
-        skew = 1.0 + 1e-4 * random.uniform(-1.0, 1.0)
-        jitter_s = 2e-6 * random.uniform(-1.0, 1.0, len(recording))
-        return replace(recording, time_s=recording.time_s * skew + jitter_s)
-    return recording
-
-
-def _coloured(n: int, random: np.random.Generator) -> FloatArray:
-    """Return noise of variance 1 that forgets within 20 to 100 ms."""
-    from scipy.signal import lfilter
-
-    keep = float(np.exp(-1e-3 / random.uniform(0.02, 0.1)))
-    values: FloatArray = lfilter([np.sqrt(1 - keep**2)], [1.0, -keep], random.standard_normal(n))
-    return values
+    skew = 1.0 + 1e-4 * random.uniform(-1.0, 1.0)
+    jitter_s = 2e-6 * random.uniform(-1.0, 1.0, len(recording))
+    return replace(recording, time_s=recording.time_s * skew + jitter_s)

@@ -24,17 +24,15 @@ from estimation.files import write_text_atomic
 from rig.cli.output import JsonFlag, console, emit_json
 from rig.errors import UsageError
 from rig.reports.provenance import Provenance
-from rig.reports.table import TextTable, to_markdown, to_rich
+from rig.reports.table import to_markdown, to_rich
 from tests.blind.generate import CLASSES, Answer, draw, write
-from tests.blind.score import OUTCOMES, outcome, right, wilson
+from tests.blind.score import outcome, right
+from tests.blind.summary import counted, tables
 from tests.blind.truths import TRUTHS
 
 COUNTS = "strong=40,weak=40,pair=30,outside=30,partial=10,confounded=20,control=100"
 COMMAND = f"{sys.executable} -m rig diagnose {{case}} --json {{out}}"
 TIME_LIMIT_S = 900.0
-DECLARED = "motor"
-"""Shipped model whose balance the textbook methods are given."""
-
 Result = Mapping[str, Any]
 
 
@@ -104,12 +102,15 @@ def run_case(
         "right": right(answer, result),
         "seconds": seconds,
         "hidden": [effect.name for effect in answer.effects],
-        "variant": answer.variant,
+        "excitation": answer.excitation,
+        "chain": answer.chain,
         "found": [
             (f["verdict"], f["balance"], f["family"]) for f in (diagnosis or {}).get("findings", [])
         ],
         "message": "" if diagnosis is not None else said[-500:],
     }
+    if diagnosis is not None:
+        scored["ratio"] = _ratio(folder, answer, diagnosis)
     if baselines:
         scored["baselines"] = _baselines(folder, answer)
     shutil.rmtree(folder)
@@ -132,81 +133,41 @@ def _ask(words: Sequence[str], found: Path) -> tuple[Mapping[str, Any] | None, s
         return None, f"the answer is not JSON: {error}"
 
 
+def _ratio(folder: Path, answer: Answer, diagnosis: Mapping[str, Any]) -> float | None:
+    """Return the confirm error over that of the true structure, the worst of the named balances.
+
+    None where nothing that shows in its balance is named, or its channels do not tell the truth.
+    """
+    from rig.importers.registry import open_campaign
+    from tests.blind.true_structure import told, true_rmse
+
+    truths = [TRUTHS[effect.name] for effect in answer.effects]
+    named = {
+        finding["balance"]
+        for finding in diagnosis["findings"]
+        if finding["verdict"] == "identified"
+        and any(t.names(finding["family"]) and finding["balance"] in t.balances for t in truths)
+    }
+    recordings = list(open_campaign(folder))
+    discover = diagnosis["runs"]["discover"]
+    ratios = [
+        diagnosis["rmse_after"][balance] / true_rmse(answer, balance, recordings, discover)
+        for balance in sorted(named)
+        if told(answer, balance)
+    ]
+    return max(ratios, default=None)
+
+
 def _baselines(folder: Path, answer: Answer) -> list[dict[str, Any]]:
-    from estimation.model_file import read
+    from rig.diagnosis.subject import declared_models
     from rig.importers.registry import open_campaign
     from tests.blind.baselines import run_all
 
-    truths = [TRUTHS[effect.name] for effect in answer.effects]
-    picked = run_all([read(Path(DECLARED))], open_campaign(folder))
+    hidden = [effect.name for effect in answer.effects]
     return [
-        {
-            "method": one.method,
-            "right": sum(any(t.names(f) for f in one.families) for t in truths),
-            "false": sum(not any(t.names(f) for t in truths) for f in one.families),
-            "seconds": one.seconds,
-        }
-        for one in picked
+        {"method": one.method, "seconds": one.seconds} | counted(one.families, hidden)
+        for one in run_all(declared_models(None, None), open_campaign(folder))
     ]
-
-
-def tables(state: Mapping[str, Any]) -> list[TextTable]:
-    """Return the summary of what has been scored: classes, and textbook methods where they ran."""
-    rows = []
-    for kind in CLASSES:
-        done = [r for r in state.values() if r["kind"] == kind]
-        if not done:
-            continue
-        good, wrong = (sum(map(test, done)) for test in (lambda r: r["right"], _harmful))
-        counts = [str(sum(r["outcome"] == name for r in done)) for name in OUTCOMES]
-        seconds = sorted(r["seconds"] for r in done)[len(done) // 2]
-        rows.append(
-            [
-                kind,
-                str(len(done)),
-                _share(good, len(done)),
-                _share(wrong, len(done)),
-                *counts,
-                f"{seconds:.1f}",
-            ]
-        )
-    columns = ["class", "cases", "right (95 %)", "wrong (95 %)", *OUTCOMES, "median s"]
-    note = "Right: named; confounded: the whole set and a next experiment; outside: the right "
-    note += "variables and no name; control: nothing. Wrong: a confident wrong name or, in a "
-    note += "control, any finding. Intervals are Wilson's."
-    found = [TextTable("Diagnosis of undeclared effects", columns, rows, note)]
-    picked = [(r, one) for r in state.values() for one in r.get("baselines", [])]
-    if picked:
-        found.append(_textbook(picked))
-    return found
-
-
-def _textbook(picked: Sequence[tuple[Any, Any]]) -> TextTable:
-    rows = []
-    for method in dict.fromkeys(one["method"] for _, one in picked):
-        mine = [(r, one) for r, one in picked if one["method"] == method]
-        hidden = sum(len(r["hidden"]) for r, _ in mine)
-        hits = sum(one["right"] for _, one in mine)
-        false = sum(one["false"] for _, one in mine) / len(mine)
-        seconds = sum(one["seconds"] for _, one in mine) / len(mine)
-        rows.append([method, _share(hits, hidden), f"{false:.2f}", f"{seconds:.2f}"])
-    note = "On the motor's balance, the whole catalogue as library; right names are out of all "
-    note += "hidden effects, also those that show in no motor balance."
-    return TextTable(
-        "Textbook methods",
-        ["method", "right names (95 %)", "false names a case", "s a case"],
-        rows,
-        note,
-    )
-
-
-def _harmful(result: Mapping[str, Any]) -> bool:
-    return result["outcome"] in ("wrong name", "false finding")
-
-
-def _share(hits: int, total: int) -> str:
-    low, high = wilson(hits, total)
-    return f"{hits}/{total} ({100 * low:.0f}-{100 * high:.0f} %)"
 
 
 def blind(

@@ -11,6 +11,7 @@ DIRECTION = frozenset({"velocity_sign", "velocity"})
 SPEED = frozenset({"velocity"})
 MEMORY = frozenset({"history", "velocity"})
 LOAD = frozenset({"load", "current"})
+WRIST = frozenset({"wrist_pitch"})
 """Words of a diagnosis that mean the same on one rig: its angles move together, and so on."""
 
 
@@ -24,6 +25,9 @@ class Truth:
         accepted: Families that cannot be told from it.
         depends_on: For `unknown`: one word of each group, and none beside them, is right.
         scale: Strength of a strong case; 1 unless the effect is faint or loud on this rig.
+        needs: Excitation that shows it, one of `EXCITATIONS`.
+        course: How it goes from run to run: empty for alike in all, `comes` with one run and
+            stays, or `fades`.
     """
 
     family: str
@@ -31,6 +35,8 @@ class Truth:
     accepted: frozenset[str] = frozenset()
     depends_on: tuple[frozenset[str], ...] = ()
     scale: float = 1.0
+    needs: str = "usual"
+    course: str = ""
 
     def names(self, family: str) -> bool:
         """Say whether a family is a right name."""
@@ -43,17 +49,25 @@ class Truth:
         return said <= known and all(said & group for group in self.depends_on)
 
 
-def _of(family: str, balances: str, accepted: str = "", scale: float = 1.0) -> Truth:
-    return Truth(family, frozenset(balances.split()), frozenset(accepted.split()), (), scale)
+def _of(
+    family: str,
+    balances: str,
+    accepted: str = "",
+    scale: float = 1.0,
+    needs: str = "usual",
+    course: str = "",
+) -> Truth:
+    where, equal = frozenset(balances.split()), frozenset(accepted.split())
+    return Truth(family, where, equal, (), scale, needs, course)
 
 
-def _outside(balances: str, *groups: frozenset[str]) -> Truth:
-    return Truth("unknown", frozenset(balances.split()), frozenset(), groups)
+def _outside(balances: str, *groups: frozenset[str], needs: str = "usual") -> Truth:
+    return Truth("unknown", frozenset(balances.split()), frozenset(), groups, needs=needs)
 
 
 CATALOGUED: dict[str, Truth] = {
     # motor and gear losses
-    "motor_asymmetry": _of("friction.coulomb_asymmetry", "motor", "", 1.5),
+    "motor_asymmetry": _of("friction.coulomb_asymmetry", "motor", "", 4.0),
     "motor_drag": _of("friction.drag", "motor"),
     "gear_stribeck": _of("friction.stribeck", "motor"),
     "gear_load_friction": _of("friction.load", "motor"),
@@ -89,6 +103,17 @@ CATALOGUED: dict[str, Truth] = {
     "jaw_delay": _of("sensor.delay", "stretch", "sensor.lag"),
     "friction_step": _of("change.step", "cable"),
     "jaw_mass": _of("inertia.missing", "stretch cable"),
+    # losses that take speed, load, rest, age or another axis to show
+    "motor_viscous_asymmetry": _of("friction.viscous_asymmetry", "motor"),
+    "gear_load_viscous": _of("friction.load_viscous", "motor"),
+    "grease_warmup": _of("friction.warmup", "motor"),
+    "gear_wear": _of("change.step", "motor", course="comes"),
+    "cable_stiff": _of("friction.warmup", "cable", course="fades"),
+    "cable_dwell": _of("friction.dwell", "cable", needs="rests"),
+    "cable_capstan": _of("friction.capstan", "cable"),
+    "wrist_capstan": _of("friction.capstan", "cable", needs="wrist"),
+    "wrist_pull": _of("coupling.kinematic", "stretch", needs="wrist"),
+    "jaw_weight": _of("gravity.payload", "cable stretch"),
 }
 
 OUTSIDE: dict[str, Truth] = {
@@ -97,6 +122,16 @@ OUTSIDE: dict[str, Truth] = {
     "gear_two_state": _outside("motor", DIRECTION, MEMORY),
     "gear_angle_viscous": _outside("motor", SPEED, ANGLE),
     "jaw_detent": _outside("cable stretch", ANGLE),
+    "wrist_pinch": _outside("cable", DIRECTION, WRIST, needs="wrist"),
 }
 
 TRUTHS = CATALOGUED | OUTSIDE
+
+NOT_HIDDEN = {
+    "friction.coulomb": "declared",
+    "friction.viscous": "declared",
+    "compliance.link": "declared",
+    "coupling.torque": "needs another axis with a torque of its own",
+    "unknown": "the answer to what no catalogue holds",
+}
+"""Families that no case hides, and why the simulated rig cannot."""

@@ -10,24 +10,40 @@ import pytest
 from drivers.device import Batch, Device, SampleFlag
 from drivers.errors import DriverError, LinkLostError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
-from drivers.transport.faulty import Fault, Faults
+from drivers.teensy.device import TeensyDevice
+from drivers.teensy.fake import TeensyFake
+from drivers.teensy.grasper import GRASPER
+from drivers.teensy.grasper_guard import GRASPER_LOGIC
+from drivers.transport.faulty import Fault, Faults, FaultyTransport
+from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.emulated_board import MISSING
 from tests.drivers.emulated_board import open_fake as open_emulated
+from tests.drivers.test_grasper_twin import ScriptedGrasper, moving
 
 NAMES = sorted(drivers())
 EMULATED = "teensy on a Cortex-M4"
+GRASPER_BOARD = "teensy at a grasper"
 PLACES = [
     *NAMES,
+    GRASPER_BOARD,
     pytest.param(EMULATED, marks=pytest.mark.skipif(bool(MISSING), reason=MISSING)),
 ]
-"""Every driver on its fake, and the logger's on the firmware an emulated processor runs."""
+"""Every driver on its fake, and the logger's on a grasper's board and on an emulated processor."""
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 STRIKES = 8
 
 
 def opened(name: str, faults: Faults | None = None) -> Device:
-    open_fake = open_emulated if name == EMULATED else fakes()[name]
+    own = {EMULATED: open_emulated, GRASPER_BOARD: open_grasper}
+    open_fake = own[name] if name in own else fakes()[name]
     return open_fake(faults or Faults())
+
+
+def open_grasper(faults: Faults) -> Device:
+    """Open the logger's driver on a grasper's board, its motors turned by hand."""
+    board = TeensyFake(ScriptedGrasper(moving(100_000)), logic=GRASPER_LOGIC)
+    link = SimulatedTransport(board, "sim://grasper", tick_s=GRASPER.tick_us * 1e-6)
+    return TeensyDevice(FaultyTransport(link, faults), profile=GRASPER)
 
 
 def troubles(device: Device) -> int:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from drivers.escon.fake import EsconFake
 from drivers.escon.scaling import EsconWiring, Line, SetValueError
-from drivers.teensy.protocol import SAMPLE_DTYPE
+from drivers.teensy.reference import SAMPLE_DTYPE
 
 PWM = EsconWiring(Line(0.1, -2.0, 0.9, 2.0), "pwm", Line(0.0, -2.0, 3.3, 2.0))
 ANALOG = EsconWiring(Line(0.0, -1.0, 3.3, 1.0), "analog", Line(0.3, -1.0, 3.0, 1.0), limit_a=1.0)

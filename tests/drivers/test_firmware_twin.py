@@ -13,7 +13,8 @@ from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError
-from drivers.teensy.protocol import Kind, Limits, SafeState, Trip
+from drivers.teensy.protocol import Kind, SafeState, Trip
+from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, Limits
 from tests.drivers.bench_physics import PlainBench, ScriptedBench
 
 GAINS = np.array([20.0, 0.05, -1.0, 0.2, 10000.0])
@@ -29,12 +30,12 @@ def command(kind: Kind, sequence: int) -> bytes:
 
 
 def arm(sequence: int, limits: Limits = WIDEST, gains: np.ndarray = GAINS) -> bytes:
-    return encode_frame(protocol.encode_arm(sequence, gains, limits))
+    return encode_frame(REFERENCE.encode_arm(sequence, gains, limits))
 
 
 def setpoints(sequence: int, targets: list[int], load_ma: int = 0) -> bytes:
     loads = np.full(len(targets), load_ma)
-    return encode_frame(protocol.encode_setpoints(sequence, np.array(targets), loads))
+    return encode_frame(REFERENCE.encode_setpoints(sequence, (np.array(targets), loads)))
 
 
 def ping(sequence: int, token: int) -> bytes:
@@ -75,9 +76,9 @@ def assert_twins(
 
 
 def statuses(data: bytes) -> set[int]:
-    frames = FrameStream(protocol.SAMPLE_DTYPE.itemsize).feed(data)
+    frames = FrameStream(SAMPLE_DTYPE.itemsize).feed(data)
     assert frames.bad == 0
-    return set(np.unique(frames.payloads.view(protocol.SAMPLE_DTYPE)["status"]).tolist())
+    return set(np.unique(frames.payloads.view(SAMPLE_DTYPE)["status"]).tolist())
 
 
 def assert_tripped(data: bytes, trip: Trip) -> None:
@@ -119,7 +120,7 @@ def test_saturation_and_a_host_that_does_not_read(library: Path) -> None:
     seen = statuses(assert_twins(script, library))
     assert any(status & protocol.STATUS_SATURATED for status in seen)
     data = assert_twins([command(Kind.START, 2), 3000, 5, 1500, 1], library)
-    last = FrameStream(42).feed(data).payloads[-1:].view(protocol.SAMPLE_DTYPE)[0, 0]
+    last = FrameStream(42).feed(data).payloads[-1:].view(SAMPLE_DTYPE)[0, 0]
     assert last["dropped"] > 1000
     assert last["sequence"] == 4505
 
@@ -272,7 +273,7 @@ def test_holding_keeps_the_spindle_where_it_was_and_a_second_trip_releases(libra
     inputs[100, 3] = 20001
     script: list[Action] = [command(Kind.START, 1), arm(2, limits), setpoints(3, [0] * 100), 130]
     data = assert_twins(script, library, make_bench=lambda: ScriptedBench(inputs))
-    samples = FrameStream(42).feed(data).payloads.view(protocol.SAMPLE_DTYPE)[:, 0]
+    samples = FrameStream(42).feed(data).payloads.view(SAMPLE_DTYPE)[:, 0]
     holding = (samples["status"] & protocol.STATUS_HOLDING) != 0
     assert (np.flatnonzero(holding) == np.arange(21, 100)).all()
     assert len(set(samples["target"][holding].tolist())) == 1

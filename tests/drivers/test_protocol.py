@@ -7,14 +7,15 @@ from hypothesis import strategies as st
 
 from drivers.errors import FrameError
 from drivers.teensy import protocol
-from drivers.teensy.protocol import Ack, Kind, Limits, Trip
+from drivers.teensy.protocol import Ack, Kind, Trip
+from drivers.teensy.reference import LIMIT_NAMES, REFERENCE, SAMPLE_DTYPE, SETPOINT_DTYPE, Limits
 
 u16 = st.integers(0, 2**16 - 1)
 i32 = st.integers(-(2**31), 2**31 - 1)
 
 
 def test_the_sample_is_laid_out_as_documented() -> None:
-    layout = protocol.SAMPLE_DTYPE
+    layout = SAMPLE_DTYPE
     assert layout.itemsize == 42
     offsets = {name: layout.fields[name][1] for name in layout.names}
     assert list(offsets.values()) == [0, 1, 2, 4, 8, 12, 16, 20, 24, 28, 30, 32, 34, 36, 38, 40]
@@ -22,59 +23,61 @@ def test_the_sample_is_laid_out_as_documented() -> None:
 
 
 def test_no_other_frame_has_the_size_of_a_sample() -> None:
-    layouts = {kind: layout for kind, layout in protocol.LAYOUTS.items() if kind != Kind.SAMPLE}
-    assert protocol.SAMPLE_DTYPE.itemsize not in {item.itemsize for item in layouts.values()}
-    assert (protocol.SAMPLE_DTYPE.itemsize - 4) % protocol.SETPOINT_DTYPE.itemsize
+    layouts = {kind: layout for kind, layout in REFERENCE.layouts.items() if kind != Kind.SAMPLE}
+    assert SAMPLE_DTYPE.itemsize not in {item.itemsize for item in layouts.values()}
+    assert (SAMPLE_DTYPE.itemsize - 4) % SETPOINT_DTYPE.itemsize
 
 
 def test_the_text_names_every_kind() -> None:
-    lines = protocol.layout_text().splitlines()
+    lines = REFERENCE.text.splitlines()
     assert [line.split(":")[0] for line in lines[2:-3]] == [f"{k} {k.name}" for k in Kind]
 
 
 @given(u16, st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), st.tuples(*[i32] * 19))
 def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ...]) -> None:
-    payload = protocol.encode_arm(sequence, np.array(gains), Limits(*limits))
-    kind, number, fields = protocol.decode(payload)
+    payload = REFERENCE.encode_arm(sequence, np.array(gains), Limits(*limits))
+    kind, number, fields = REFERENCE.decode(payload)
     assert (kind, number) == (Kind.ARM, sequence)
     assert [float(fields[name]) for name in protocol.GAIN_NAMES] == gains
-    assert tuple(int(fields[name]) for name in protocol.LIMIT_NAMES) == limits
+    assert tuple(int(fields[name]) for name in LIMIT_NAMES) == limits
 
 
 @given(u16, st.sampled_from(list(Trip)), i32, i32, st.integers(0, 2**32 - 1))
 def test_a_trip_report_comes_back(sequence: int, code: Trip, value: int, limit: int, at: int):
     payload = protocol.encode_trip_report(sequence, code, 3, value, limit, at, 2**40)
-    report = protocol.decode_trip_report(protocol.decode(payload)[2])
+    report = REFERENCE.decode_trip_report(REFERENCE.decode(payload)[2])
     assert report == protocol.TripReport(code, "proximal", value, limit, at, 2**32 - 1)
 
 
 def test_an_unknown_trip_is_refused() -> None:
-    fields = protocol.decode(protocol.encode_trip_report(1, 99, 255, 0, 0, 0, 0))[2]
+    fields = REFERENCE.decode(protocol.encode_trip_report(1, 99, 255, 0, 0, 0, 0))[2]
     with pytest.raises(FrameError, match="99"):
-        protocol.decode_trip_report(fields)
+        REFERENCE.decode_trip_report(fields)
 
 
 @given(u16, st.lists(st.tuples(i32, st.integers(-(2**15), 2**15 - 1)), min_size=1, max_size=100))
 def test_setpoints_come_back(sequence: int, setpoints: list[tuple[int, int]]) -> None:
     targets, loads = (np.array(values) for values in zip(*setpoints, strict=True))
-    payload = protocol.encode_setpoints(sequence, targets, loads)
-    assert protocol.decode(payload)[:2] == (Kind.SETPOINTS, sequence)
-    assert protocol.decode_setpoints(payload).tolist() == setpoints
+    payload = REFERENCE.encode_setpoints(sequence, (targets, loads))
+    assert REFERENCE.decode(payload)[:2] == (Kind.SETPOINTS, sequence)
+    assert REFERENCE.decode_setpoints(payload).tolist() == setpoints
 
 
 @given(u16, st.sampled_from(list(Kind)), st.integers(0, 6), u16, u16)
 def test_an_ack_comes_back(sequence: int, command: Kind, result: int, status: int, free: int):
     ack = Ack(sequence, command, result, status, free)
-    assert protocol.decode_ack(protocol.decode(protocol.encode_ack(ack))[2]) == ack
+    assert protocol.decode_ack(REFERENCE.decode(protocol.encode_ack(ack))[2]) == ack
 
 
 def test_identity_and_pong_come_back() -> None:
-    fields = protocol.decode(protocol.encode_hello_reply(9, "TEENSY-0042"))[2]
+    fields = REFERENCE.decode(
+        protocol.encode_hello_reply(9, "TEENSY-0042", REFERENCE.protocol_hash)
+    )[2]
     identity = protocol.decode_identity(fields)
     assert identity.serial == "TEENSY-0042"
-    assert identity.protocol_hash == protocol.PROTOCOL_HASH
-    assert identity.firmware_version == "0.2.0"
-    kind, sequence, pong = protocol.decode(protocol.encode_pong(5, 2**64 - 1, 2**32 - 1))
+    assert identity.protocol_hash == REFERENCE.protocol_hash
+    assert identity.firmware_version == protocol.version_text(protocol.FIRMWARE_VERSION)
+    kind, sequence, pong = REFERENCE.decode(protocol.encode_pong(5, 2**64 - 1, 2**32 - 1))
     assert (kind, sequence) == (Kind.PONG, 5)
     assert (int(pong["token"]), int(pong["tick_us"])) == (2**64 - 1, 2**32 - 1)
 
@@ -95,4 +98,4 @@ def test_identity_and_pong_come_back() -> None:
 )
 def test_anything_else_is_refused(payload: bytes) -> None:
     with pytest.raises(FrameError):
-        protocol.decode(payload)
+        REFERENCE.decode(payload)

@@ -18,7 +18,8 @@ from drivers.teensy import protocol
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard
-from drivers.teensy.protocol import Limits, Result
+from drivers.teensy.protocol import Result
+from drivers.teensy.reference import REFERENCE, Limits
 from drivers.transport.faulty import FaultyTransport, once
 from drivers.transport.simulated import Board, SimulatedTransport
 from tests.drivers.bench_physics import START_SPINDLE, PlainBench
@@ -66,7 +67,7 @@ def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) ->
     logger = logger_of(make_board(serial="TEENSY-0042"))
     identity = logger.identify()
     assert identity.serial == "TEENSY-0042"
-    assert identity.protocol_hash == protocol.PROTOCOL_HASH
+    assert identity.protocol_hash == REFERENCE.protocol_hash
     logger.start()
     rest = joined(read_for(logger, 100))
     assert not rest["status"].any()
@@ -234,7 +235,7 @@ def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
     board = TeensyFake(PlainBench(), protocol_hash=0xDEADBEEF)
     logger = logger_of(board)
     with pytest.raises(
-        ProtocolMismatchError, match=f"deadbeef.*{protocol.PROTOCOL_HASH:08x}.*rig firmware flash"
+        ProtocolMismatchError, match=f"deadbeef.*{REFERENCE.protocol_hash:08x}.*rig firmware flash"
     ):
         logger.arm(GAINS, WIDEST)
     logger.close()

@@ -9,7 +9,7 @@ from drivers.teensy import channels
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.fake_device import HandMovedBench
-from drivers.teensy.protocol import SAMPLE_DTYPE
+from drivers.teensy.reference import SAMPLE_DTYPE
 from drivers.transport.simulated import SimulatedTransport
 
 

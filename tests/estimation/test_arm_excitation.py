@@ -1,19 +1,25 @@
 """Excitation within limits at every instant, and better told parameters than at the start."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from estimation.arm.design import by_active_set, designed
 from estimation.arm.excitation import (
     ACCELERATION_PER_SPEED,
     FUNDAMENTAL_HZ,
     condition,
-    designed,
     fitted,
+    reached,
     start,
 )
 from estimation.arm.tables import PSM
+from rig.cli.study import study_app
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
@@ -43,3 +49,27 @@ def test_the_design_tells_parameters_better_than_its_starts():
     starts = [condition(PSM, fitted(PSM, start(PSM, seed))) for seed in range(2)]
     found = condition(PSM, designed(PSM, seeds=2, evaluations=150))
     assert found < 0.7 * min(starts)
+
+
+def test_the_bound_of_every_instant_tells_what_sampled_limits_let_pass():
+    first = fitted(PSM, start(PSM, 3))
+    assert reached(PSM, first) == pytest.approx(1.0)  # scaled up to the first limit it meets
+    found = by_active_set(PSM, first, 150)
+    assert condition(PSM, found) < condition(PSM, first)
+    doubled = replace(found, sine=2 * found.sine, cosine=2 * found.cosine)
+    assert reached(PSM, doubled) > 1.2
+
+
+def test_the_command_writes_a_table_and_a_trajectory_within_limits(tmp_path):
+    out, path = tmp_path / "excitation.md", tmp_path / "trajectory.csv"
+    words = ["excitation", "--starts", "1", "--evaluations", "150", "--out", str(out)]
+    ran = CliRunner().invoke(study_app, [*words, "--trajectory", str(path), "--json"])
+    assert ran.exit_code == 0, ran.output
+    (row,) = json.loads(ran.stdout)["starts"]
+    assert row["ours"]["condition"] < row["condition"]
+    assert row["ours"]["limits_share"] <= 1 + 1e-9
+    assert "active set: condition" in out.read_text()
+    values = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert values.shape == (2000, 7)
+    for k, joint in enumerate(PSM.joints):
+        assert joint.lower <= values[:, k + 1].min() < values[:, k + 1].max() <= joint.upper

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.audit import audit, delay_s
+from estimation.diagnosis.clock import skips, steady
 from estimation.recording import Recording
 
 
@@ -38,7 +39,7 @@ def test_unrelated_or_short_channels_have_no_delay():
     assert delay_s(both.slice_time(0, 2), "motor_angle_rad", "spindle_angle_rad") is None
 
 
-def test_delays_jumps_and_what_is_held_are_said():
+def test_delays_skips_and_what_is_held_are_said():
     runs = [
         run(5e-3, k, load_command_a=np.full(20000, 0.1 * k), motor_current_a=np.zeros(20000))
         for k in range(4)
@@ -47,8 +48,23 @@ def test_delays_jumps_and_what_is_held_are_said():
     time_s[7000:] += 0.25
     said = audit([*runs[:2], replace(runs[2], time_s=time_s), runs[3]])
     assert any("spindle_angle_rad comes +5.0 ms after motor_angle_rad" in s for s in said)
-    (jump,) = [s for s in said if "jumps" in s]
-    assert "run2 jumps 1 times, the longest by 0.251 s at 7 s" in jump
+    (skip,) = [s for s in said if "skips" in s]
+    assert "run2 skips 1 times, the longest by 0.251 s at 7 s" in skip
     assert any(s.startswith("load_command_a is held within each run") for s in said)
     assert any(s.startswith("motor_current_a never varies") for s in said)
-    assert not any("jumps" in s for s in audit(runs))
+    assert not any("skips" in s for s in audit(runs))
+
+
+def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_says_so_is_kept():
+    whole = run()
+    time_s = whole.time_s.copy()
+    time_s[7000:] += 0.25
+    jumps = replace(whole, name="jumps", time_s=time_s)
+    flags = np.zeros(len(whole), np.uint8)
+    flags[6999:7001] = 1
+    flagged = replace(jumps, name="flagged", flags=flags)
+    skipping = replace(whole, name="skips", time_s=np.where(time_s > 7.1, time_s - 0.24, time_s))
+    kept, lost = steady([whole, jumps, flagged, skipping])
+    assert [r.name for r in kept] == ["run0", "flagged", "skips"]
+    assert "Run jumps is left out: its clock jumps by 0.251 s at 6.999 s" in lost[0]
+    assert [s.split()[4] for s in skips(kept)] == ["flagged", "skips"]

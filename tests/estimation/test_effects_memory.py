@@ -11,7 +11,7 @@ from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.diagnose import diagnose
-from estimation.diagnosis.search import Gates
+from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.fitting import fit

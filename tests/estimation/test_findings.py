@@ -1,8 +1,11 @@
 """When two balances show one fault."""
 
+from dataclasses import replace
+
 import pytest
 
-from estimation.diagnosis.findings import same_fault
+from estimation.diagnosis import findings
+from estimation.diagnosis.findings import Told, echoes, same_fault
 from estimation.diagnosis.result import Finding, Value
 
 
@@ -49,3 +52,26 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
     gear = finding("gearbox", "sensor.encoder_inl", ("spindle_angle",), order=14.0)
     motor = finding("motor", "eccentric.load", ("spindle_angle", "load"), order=14.1)
     assert same_fault(gear, motor)
+
+
+@pytest.mark.parametrize(("before", "small"), [(1.02, {"gearbox": {0}}), (1.5, {})])
+def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(
+    monkeypatch, before, small
+):
+    ripple = finding("motor", "ripple.motor")
+    inertia = replace(finding("gearbox", "inertia.missing"), rmse_before=before)
+    told = [Told(f, {}, None, 0) for f in (ripple, inertia)]
+    monkeypatch.setattr(findings, "_causes", lambda stories: told)
+    assert echoes({}) == small
+
+
+def test_findings_come_in_the_order_found_however_much_each_explains(monkeypatch):
+    small, large = finding("motor", "friction.drag"), finding("motor", "ripple.motor")
+    told = [  # in the order of what each explains
+        findings.Told(finding("gearbox", "sensor.creep"), {}, None, 0),
+        findings.Told(replace(large, rmse_after=0.1), {}, None, 1),
+        findings.Told(small, {}, None, 0),
+    ]
+    monkeypatch.setattr(findings, "_causes", lambda _: told)
+    listed = findings.one_cause_one_finding({"motor": None, "gearbox": None})
+    assert [f.family for f in listed] == ["friction.drag", "ripple.motor", "sensor.creep"]

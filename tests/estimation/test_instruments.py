@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from estimation.campaign import Campaign
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import prepare, tables
+from estimation.diagnosis.endogeneity import kept_share
 from estimation.diagnosis.evidence import leave_one_run_out
 from estimation.diagnosis.instruments import instruments, projection
 from estimation.effects import effect
@@ -84,3 +86,45 @@ def test_without_other_sensors_the_reading_stays_as_it_is(noisy):
 def prepare_without(prepared):
     left = {k: v for k, v in prepared.channels.items() if k != "distal_torque_n_m"}
     return replace(prepared, channels=left)
+
+
+LOOP = Candidate.of(
+    Term(effect("hysteresis.bouc_wen"), -1, {"travel": "spindle_angle_rad"}), [0.02, 2.0]
+)
+STIFFNESS_N_M_RAD = 2.0
+
+
+def stretched(k: int, noise_n_m: float, loop_rad: float) -> Recording:
+    """Return a run with a jaw behind an elastic cable, and slow noise in its torque sensor."""
+    made = run(f"r{k}", 0.1 + 0.02 * k, 0.1, seed=k, noise_n_m=1e-4)
+    speed = np.gradient(made["motor_angle_rad"], made.time_s)
+    distal = made["distal_torque_n_m"] + 0.05 * np.tanh(speed)
+    white = np.random.default_rng(200 + k).normal(size=len(made))
+    slow = signal.lfilter([np.sqrt(1 - 0.98**2)], [1.0, -0.98], white)
+    jaw = 1.4 * made["spindle_angle_rad"] - distal / STIFFNESS_N_M_RAD
+    return made.with_columns(
+        jaw_angle_rad=jaw - loop_rad * np.tanh(speed),
+        distal_torque_n_m=distal + noise_n_m * slow,
+    )
+
+
+@pytest.mark.parametrize(
+    ("noise_n_m", "loop_rad", "low", "high"), [(0.03, 0.0, -0.4, 0.4), (0.002, 0.02, 0.8, 1.2)]
+)
+def test_a_loop_made_of_slow_noise_is_lost_through_instruments_and_a_true_one_is_not(
+    noise_n_m, loop_rad, low, high
+):
+    recordings = [stretched(k, noise_n_m, loop_rad) for k in range(5)]
+    model = fit(read(shipped()["stretch"]), Campaign.of(recordings), bootstrap=0)
+    names = [*model.channels, model.target, *instruments(MEASURED)]
+    balance = lay_out(model, [prepare(r, names, model) for r in recordings])
+    assert 1 - balance.loss([*balance.terms, LOOP]) / balance.loss(balance.terms) > 0.05
+    share = kept_share(balance, balance.terms, [LOOP])
+    assert share is not None
+    assert low < share < high
+
+
+def test_without_other_sensors_nothing_is_said_of_the_noise(noisy):
+    model, runs = noisy
+    balance = lay_out(model, [prepare_without(r) for r in runs])
+    assert kept_share(balance, balance.terms, LAGS[:1]) is None

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from estimation.effects import catalogue
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, Term
-from estimation.model_file import ModelFileError, parse, read, shipped, to_toml, write
+from estimation.model_file import ModelFileError, parse, parse_all, read, shipped, to_toml, write
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 ESTIMATES = st.builds(
@@ -52,6 +52,19 @@ def models(draw: st.DrawFn) -> Model:
 @given(model=models())
 def test_what_is_written_is_read_back(model):
     assert parse(to_toml(model)) == model
+
+
+@settings(deadline=None, max_examples=20)
+@given(several=st.lists(models(), min_size=2, max_size=4))
+def test_several_balances_are_read_back_from_one_file(several):
+    text = to_toml(*several)
+    assert parse_all(text) == several
+    assert parse(text) == several[0]
+
+
+def test_a_file_of_no_model_is_told():
+    with pytest.raises(ModelFileError, match="holds no model"):
+        parse_all('schema = "rig.models/1"\nmodels = []\n')
 
 
 def test_shipped_models_are_declared_and_not_fitted():

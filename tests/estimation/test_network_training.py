@@ -88,3 +88,33 @@ def test_rows_that_cannot_be_learnt_from_are_refused(monkeypatch):
     monkeypatch.setattr(training, "has_torch", lambda: False)
     with pytest.raises(NetworkError, match="torch is not installed"):
         train(x, y, (IN, OUT[:1]))
+
+
+def test_rows_held_out_choose_the_step():
+    truth, random = make(3), np.random.default_rng(4)
+    x, held = rows(60), rows(400, seed=6)
+    half = np.ptp(truth.output_range, axis=0) / 2
+    y, wanted = (truth(r) + 0.3 * half * random.normal(size=(len(r), 2)) for r in (x, held))
+
+    def error(**more: object) -> float:
+        settings = Settings(nodes=6, iterations=60)
+        found = train(x, y, (IN, OUT), settings, **more).network  # type: ignore[arg-type]
+        return float(np.mean(((found(held) - wanted) / half) ** 2))
+
+    chosen = error(validation=(held, wanted))
+    assert chosen <= error()
+    assert chosen == error(validation=(held, wanted))
+
+
+def test_training_goes_on_from_another_network():
+    source = make(3)
+    x = rows(400)
+    half = np.ptp(source.output_range, axis=0) / 2
+    y = source(x) + 0.2 * half
+    untouched = train(x, y, (IN, OUT), Settings(iterations=0), start=source).network
+    np.testing.assert_allclose(untouched(x), source(x))
+    moved = train(x, y, (IN, OUT), Settings(iterations=10), start=source).network
+    assert np.sqrt(np.mean(((moved(x) - y) / half) ** 2)) < 0.02
+    np.testing.assert_array_equal(moved.input_range, source.input_range)
+    with pytest.raises(NetworkError, match="other inputs"):
+        train(x[:, :1], y, (IN[:1], OUT), start=source)

@@ -47,7 +47,7 @@ def setting():
     fitted = fit(MOTOR, Campaign.of(recordings), bootstrap=0)
     measured = list(recordings[0].columns)
     offered = pool(fitted, measured)
-    wanted = {MOTOR.target, *MOTOR.channels, *needed_channels(measured)}
+    wanted = {MOTOR.target, *MOTOR.channels, *needed_channels("motor", measured)}
     wanted |= {channel for c in offered for _, channel in c.channels}
     balance = lay_out(fitted, [prepare(r, wanted, fitted) for r in recordings])
     rivals = [

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation import model_file
 from estimation.diagnosis import candidate
-from estimation.diagnosis.search import Gates
+from estimation.diagnosis.gates import Gates
 from estimation.recording import Recording
 from rig.motion import motion_of
 from rig.protocol import Protocol

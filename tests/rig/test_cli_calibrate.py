@@ -152,14 +152,7 @@ def test_a_curve_on_data_with_hysteresis_is_told_so(
     )
     _, said = calibrate("fsr", "--hold-s", "0", "--curve-only")
     (digest,) = said["records"]
-    assert main(["cal", "diagnose", digest, "--json"]) == 0
+    assert main(["cal", "diagnose", digest, "--json", "--ledger", "looks"]) == 0
     found = json.loads(capsys.readouterr().out)["findings"]
     named = {f["family"] for f in found if f["verdict"] == "identified"}
     assert named == ({"hysteresis.presliding"} if hysteresis else set())
-
-
-def test_only_an_fsr_record_is_diagnosed_from_its_raw_logs(calibrate, capsys):
-    _, said = calibrate("ft")
-    (digest,) = said["records"]
-    assert main(["cal", "diagnose", digest]) == 2
-    assert "rig diagnose LOGS" in capsys.readouterr().err

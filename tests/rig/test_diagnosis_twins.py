@@ -37,7 +37,7 @@ def answered(rippled):
     """The diagnosis with its twins, in this process."""
     sealed = split(rippled, 0)
     twins = twins_of([MOTOR], [r for r in rippled if r.name in sealed.discover])
-    assert twins.balances == ("motor",)
+    assert [*twins.makers] == ["motor"]
     return (twins, *diagnose(rippled, [MOTOR], sealed, gates=QUICK, twins=twins.makers))
 
 

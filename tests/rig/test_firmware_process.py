@@ -100,7 +100,7 @@ def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:
 
 def test_a_missing_program_says_what_to_type(tmp_path: Path) -> None:
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
-        FirmwareProcess(tmp_path / "none")
+        FirmwareProcess(program=tmp_path / "none")
 
 
 WATCHER = """

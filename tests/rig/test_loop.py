@@ -41,8 +41,8 @@ def diagnosed(monkeypatch):
     """What the diagnoses say, one a round, and the names of the runs each was given."""
     told = SimpleNamespace(answers=[], seen=[])
 
-    def stand_in(path, models, ledger, **_):
-        told.seen.append(open_campaign(path).names)
+    def stand_in(campaign, models, ledger, **_):
+        told.seen.append(campaign.names)
         return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1])
 
     monkeypatch.setattr(looping, "run_diagnosis", stand_in)

@@ -87,6 +87,21 @@ def test_si_samples_and_counts_tell_the_same_story(folder):
     assert set(log.end.drift) == {"proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"}
 
 
+def test_what_is_hidden_does_not_stand_beside_what_is_recorded(tmp_path):
+    hiding = simulated(hidden={"motor_ripple": 0.987}, draw_hidden=4321)
+    record(tmp_path, hiding, short_protocol(1))
+    told = [p.read_text() for p in tmp_path.rglob("*") if p.is_file() and p.suffix != ".mcap"]
+    for path in tmp_path.glob("*.mcap"):
+        log = read_log(path)
+        told += [a.data.decode() for a in log.attachments]
+        told.append(json.dumps([dict(log.run.conditions), log.run.notes, dict(log.run.details)]))
+    assert any("simulation" in text for text in told)
+    assert not [text for text in told if "ripple" in text or "0.987" in text or "4321" in text]
+    # and yet another hidden effect is another campaign
+    with pytest.raises(UsageError, match="another protocol or configuration"):
+        record(tmp_path, simulated(hidden={"motor_drag": 1.0}), short_protocol(1), resume=True)
+
+
 def test_one_seed_gives_one_campaign(folder, tmp_path):
     record(tmp_path / "again")
     for log in sorted(folder.glob("*.mcap")):

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from calibration.linear import shipped_calibration_set
-from drivers.teensy.protocol import STATUS_ARMED, TOP, Limits, SafeState, Trip, TripReport
+from drivers.teensy.protocol import STATUS_ARMED, TOP, SafeState, Trip, TripReport
+from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
 from rig.errors import ExitCode, SafetyTripError, exit_code_of
+from rig.machines.reference import ReferenceMachine
 from rig.safety import board_limits, check_samples
 from rig.session import Session
 from rig.trips import WORDS, HostWatch, trip_error
@@ -25,7 +27,10 @@ def test_every_trip_has_words():
     assert set(WORDS) == set(Trip) - {Trip.NONE}
     for trip, (what, fix) in WORDS.items():
         error = trip_error(
-            TripReport(trip, "", 1, 1, 0, 3000), shipped_calibration_set("reference"), ""
+            TripReport(trip, "", 1, 1, 0, 3000),
+            shipped_calibration_set("reference"),
+            "",
+            ReferenceMachine(),
         )
         assert what in error.what
         assert f"code {int(trip)}" in error.what
@@ -105,10 +110,10 @@ def test_the_host_repeats_what_the_board_is_blind_to():
         readings = session.play(HOLD[:600], LOAD[:600])
         reading = next(r for r in readings if len(r) and (r.counts["status"] & STATUS_ARMED).any())
     narrow = dataclasses.replace(Limits.widest(), max_current=1)
-    crossing = HostWatch(narrow).check(reading)
+    crossing = HostWatch(narrow, ReferenceMachine()).check(reading)
     assert crossing is not None
     assert crossing.code is Trip.OVER_CURRENT
-    assert HostWatch(Limits.widest()).check(reading) is None
+    assert HostWatch(Limits.widest(), ReferenceMachine()).check(reading) is None
 
 
 def test_the_hosts_watch_carries_on_from_reading_to_reading():
@@ -119,7 +124,8 @@ def test_the_hosts_watch_carries_on_from_reading_to_reading():
     counts["status"] |= STATUS_ARMED
     counts["proximal"] = 77
     stuck = dataclasses.replace(reading, counts=counts)
-    watch = HostWatch(dataclasses.replace(Limits.widest(), stale_ticks=len(counts) + 50))
+    patient = dataclasses.replace(Limits.widest(), stale_ticks=len(counts) + 50)
+    watch = HostWatch(patient, ReferenceMachine())
     assert watch.check(stuck) is None
     crossing = watch.check(stuck)
     assert crossing is not None

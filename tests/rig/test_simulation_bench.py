@@ -15,7 +15,7 @@ from numba import types
 
 from drivers.teensy import control
 from drivers.teensy.guard import Drive
-from drivers.teensy.protocol import Limits
+from drivers.teensy.reference import Limits
 from rig.simulation.bench import BenchInputError, SimulatedBench
 from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.parameters import REFERENCE_GAINS

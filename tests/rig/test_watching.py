@@ -12,7 +12,9 @@ from estimation.fitting import fit
 from estimation.model import NotFittedError
 from estimation.recording import Recording
 from rig.cli.main import main
+from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
+from rig.live.estimator import ModelEstimator
 from rig.live.replay import replay_blocks
 from rig.live.watching import watched
 from rig.record import open_campaign_folder, record_campaign
@@ -51,7 +53,8 @@ def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path) -> None:
     assert "stops fitting, since run 000" in news  # the first run of the second campaign
     assert said.index(news) >= 5
     assert not watch.fits
-    assert watch.to_json()["since"].startswith("000")
+    (told,) = watch.to_json()
+    assert told["since"].startswith("000")
 
 
 def test_record_tells_what_the_watch_saw(model, tmp_path, capsys) -> None:
@@ -62,8 +65,22 @@ def test_record_tells_what_the_watch_saw(model, tmp_path, capsys) -> None:
     words = ["record", "-p", str(protocol), "-o", str(out), "--model", str(model), "--json"]
     assert main(words) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["model"]["fits"] is True
-    assert len(said["model"]["runs"]) == 2
+    (watched,) = said["models"]
+    assert watched["fits"] is True
+    assert len(watched["runs"]) == 2
+
+
+def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(
+    model, tmp_path
+) -> None:
+    logs = open_campaign(model.parent / "logs")
+    gearbox = fit(model_file.read(Path("gearbox")), logs, bootstrap=0)
+    path = tmp_path / "both.model.toml"
+    model_file.write_all([model_file.read(model), gearbox], path)
+    assert [one["name"] for one in watch_runs(path).to_json()] == ["motor", "gearbox"]
+    assert ModelEstimator(path, 1000.0).target_channel == "proximal_torque_n_m"
+    assert [m.balance for m in declared_models(path, None)] == ["motor", "gearbox"]
+    assert [m.balance for m in declared_models(path, "gearbox")] == ["gearbox"]
 
 
 def test_a_model_without_values_cannot_be_watched() -> None:

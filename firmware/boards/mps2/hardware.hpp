@@ -61,8 +61,8 @@ class Mps2Hardware {
         return us_;
     }
 
-    Inputs sample() { return plant_.sample(); }
-    void drive(const Outputs& outputs) { plant_.step(outputs); }
+    ReferenceProfile::Inputs sample() { return plant_.sample(); }
+    void drive(const ReferenceProfile::Outputs& outputs) { plant_.step(outputs); }
     std::size_t read(std::uint8_t* out, std::size_t room) { return received.take(out, room); }
 
     std::size_t write(const std::uint8_t* data, std::size_t size) {

@@ -23,7 +23,7 @@ __attribute__((section(".vectors"), used)) const Handler vectors[17] = {
 namespace {
 
 constexpr std::size_t kTransmitCapacity = 65536;
-constexpr std::uint32_t kTickUs = static_cast<std::uint32_t>(rig::kTickUs);
+constexpr std::uint32_t kTickUs = static_cast<std::uint32_t>(rig::ReferenceProfile::kTickUs);
 
 rig::Mps2Hardware* hardware() {
     static rig::Mps2Hardware only;
@@ -31,7 +31,7 @@ rig::Mps2Hardware* hardware() {
 }
 
 [[noreturn]] void run() {
-    static rig::App<rig::Mps2Hardware, kTransmitCapacity> app(*hardware(), "MPS2-0001");
+    static rig::App<rig::ReferenceProfile, rig::Mps2Hardware, kTransmitCapacity> app(*hardware(), "MPS2-0001");
     hardware()->begin();
     // the timer says when a tick is due, so one that came late is caught up
     for (std::uint32_t due_us = hardware()->now_us() + kTickUs;;) {

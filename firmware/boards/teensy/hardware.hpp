@@ -1,11 +1,13 @@
-// A Teensy as `rig::App` wants its hardware; the 4.1 unless the 3.5 is compiled for. Nothing has run on
-// a board yet: it is compiled, and tried on a host against tests/arduino, which stands for the parts of
-// the Arduino core used here.
+// A Teensy at the reference rig as `rig::App` wants its hardware; the 4.1 unless the 3.5 is compiled for.
+// Nothing has run on a board yet: it is compiled, and tried on a host against tests/arduino, which stands
+// for the parts of the Arduino core used here.
 #pragma once
 
 #include <Arduino.h>
 
 #include "../../core/app.hpp"
+#include "../../core/profile_reference.hpp"
+#include "link.hpp"
 #if defined(ARDUINO_TEENSY35)
 #include "counters35.hpp"
 #else
@@ -14,16 +16,11 @@
 
 namespace rig {
 
-class TeensyHardware {
+class ReferenceHardware : public TeensyLink {
   public:
-    // The sampling timer interrupts everything; what it shares is touched with interrupts off.
-    class Lock {
-      public:
-        Lock() { noInterrupts(); }
-        ~Lock() { interrupts(); }
-        Lock(const Lock&) = delete;
-        Lock& operator=(const Lock&) = delete;
-    };
+    using Profile = ReferenceProfile;
+    using Inputs = Profile::Inputs;
+    using Outputs = Profile::Outputs;
 
     // Motors off first, whatever else fails.
     void begin() {
@@ -45,8 +42,6 @@ class TeensyHardware {
         Serial.begin(115200);  // the rate has no effect on USB
     }
 
-    std::uint32_t now_us() { return micros(); }
-
     Inputs sample() {
         Inputs counts;
         counts.motor = encoders_.motor();
@@ -67,23 +62,6 @@ class TeensyHardware {
         digitalWrite(wiring::kDriveEnablePin, outputs.in_force ? HIGH : LOW);
         digitalWrite(wiring::kLoadEnablePin, outputs.in_force ? HIGH : LOW);
         enabled_ticks_ = outputs.in_force ? enabled_ticks_ + 1 : 0;
-    }
-
-    std::size_t read(std::uint8_t* out, std::size_t room) {
-        std::size_t count = 0;
-        while (count < room && Serial.available() > 0) {
-            out[count++] = static_cast<std::uint8_t>(Serial.read());
-        }
-        return count;
-    }
-
-    // Only what fits: a write that waits for the host would stop the main loop.
-    std::size_t write(const std::uint8_t* data, std::size_t size) {
-        const int fits = Serial.availableForWrite();
-        const std::size_t room = fits > 0 ? static_cast<std::size_t>(fits) : 0;
-        const std::size_t count = Serial.write(data, size < room ? size : room);
-        Serial.send_now();
-        return count;
     }
 
   private:

@@ -1,12 +1,19 @@
-// The logger on a Teensy 3.5 or 4.1: a timer samples and drives once a millisecond, the loop carries bytes.
+// The logger on a Teensy: a timer samples and drives, the loop carries bytes. The profile is chosen by the
+// build: the reference rig's, or with -DRIG_GRASPER the grasper's.
+#if defined(RIG_GRASPER)
+#include "grasper_hardware.hpp"
+using Hardware = rig::GrasperHardware;
+#else
 #include "hardware.hpp"
+using Hardware = rig::ReferenceHardware;
+#endif
 
 namespace {
 
 constexpr std::size_t kTransmitCapacity = 65536;
 
-rig::TeensyHardware hardware;
-rig::App<rig::TeensyHardware, kTransmitCapacity> app(hardware, rig::wiring::kSerial);
+Hardware hardware;
+rig::App<Hardware::Profile, Hardware, kTransmitCapacity> app(hardware, rig::wiring::kSerial);
 IntervalTimer timer;
 
 void sample() { app.tick(); }
@@ -16,7 +23,7 @@ void sample() { app.tick(); }
 void setup() {
     hardware.begin();
     timer.priority(rig::wiring::kSamplePriority);
-    timer.begin(sample, 1000);
+    timer.begin(sample, static_cast<int>(Hardware::Profile::kTickUs));
 }
 
 void loop() { app.exchange(); }

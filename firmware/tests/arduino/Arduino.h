@@ -55,9 +55,11 @@ inline FakeSerial Serial;
 struct IntervalTimer {
     void (*function)() = nullptr;
     int level = 128;
+    int period_us = 0;
     void priority(int asked) { level = asked; }
-    bool begin(void (*called)(), int) {
+    bool begin(void (*called)(), int every_us) {
         function = called;
+        period_us = every_us;
         return true;
     }
 };

@@ -1,0 +1,122 @@
+"""The profile of the 3-DOF grasper: three motors, each in a position loop of its own, 2 kHz.
+
+The twin of `firmware/core/profile_grasper.hpp`. Motor 1 turns the yaw, 2 and 3 the two jaws. Every
+motor has its encoder, its current read-back, its force sensor, its limits and its guard.
+"""
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.teensy.profile import Profile, choice_is_valid
+from drivers.teensy.protocol import (
+    CHOICE_NAMES,
+    GAIN_NAMES,
+    HEADER_FIELDS,
+    MOTOR_LIMIT_NAMES,
+    SAMPLE_FIELDS,
+    TOP,
+    WATCHDOG_US,
+    SafeState,
+    layout,
+)
+
+MOTORS = (1, 2, 3)
+INPUT_NAMES = tuple(f"{what}_{k}" for what in ("motor", "current", "force") for k in MOTORS)
+"""Fields of a sample a trip can name, in the order of its channel number."""
+AXIS_LIMIT_NAMES = ("max_current", "max_force", "min_motor", "max_motor", *MOTOR_LIMIT_NAMES)
+
+GRASPER = Profile(
+    "grasper",
+    "rig teensy protocol 1, grasper",
+    500,
+    layout(
+        *SAMPLE_FIELDS,
+        *(f"motor_{k} i4" for k in MOTORS),
+        *(f"target_{k} i4" for k in MOTORS),
+        *(f"current_{k} i2" for k in MOTORS),
+        *(f"force_{k} u2" for k in MOTORS),
+        *(f"command_{k}_e4 i2" for k in MOTORS),
+        "dropped u2",
+    ),
+    layout(
+        *HEADER_FIELDS,
+        *(f"{name}_{k} f8" for k in MOTORS for name in GAIN_NAMES),
+        *(f"{name}_{k} i4" for k in MOTORS for name in AXIS_LIMIT_NAMES),
+        *(f"{name} i4" for name in CHOICE_NAMES),
+    ),
+    layout(*(f"target_{k} i4" for k in MOTORS)),
+    max_setpoints=50,
+    motors=len(MOTORS),
+    input_names=INPUT_NAMES,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLimits:
+    """What the board holds against one motor's counts while armed.
+
+    Attributes:
+        max_current: Largest size of the measured current, counts of 1 mA.
+        max_force: Largest force, counts.
+        min_motor: Lowest count of the motor's encoder, for the sample and for a setpoint.
+        max_motor: Highest.
+        max_motor_step: Fastest, counts a tick, in three ticks on end.
+        continuous_current: Current that warms the motor no further, counts.
+        i2t: Heat above it that the motor can take, counts^2 s.
+        stall_current: Current, counts, above which a motor that does not move is stalled.
+        stall_motion: Motor counts within which it does not move.
+    """
+
+    max_current: int = TOP
+    max_force: int = TOP
+    min_motor: int = -TOP - 1
+    max_motor: int = TOP
+    max_motor_step: int = TOP
+    continuous_current: int = TOP
+    i2t: int = TOP
+    stall_current: int = TOP
+    stall_motion: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """Whether a board takes them."""
+        sizes = (self.max_current, self.max_force, self.max_motor_step, self.continuous_current)
+        return (
+            min(*sizes, self.i2t, self.stall_current, self.stall_motion) >= 0
+            and self.min_motor <= self.max_motor
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GrasperLimits:
+    """What the board holds against every sample while armed; what is not given, it does not hold.
+
+    Attributes:
+        axes: Limits of each motor.
+        stall_ticks: How long a motor may be stalled.
+        saturated_ticks: How long a current or force count may be at the end of its range.
+        stale_ticks: How long a current or force count may stay the same.
+        watchdog_us: How long the host may be silent, 5 ms to 1 s.
+        safe_state: `SafeState`; what is held, holds all three motors.
+        hold_command_e4: Largest command while holding, 1e-4 of full scale.
+    """
+
+    axes: tuple[AxisLimits, AxisLimits, AxisLimits] = (AxisLimits(), AxisLimits(), AxisLimits())
+    stall_ticks: int = TOP
+    saturated_ticks: int = TOP
+    stale_ticks: int = TOP
+    watchdog_us: int = WATCHDOG_US
+    safe_state: int = SafeState.RELEASE
+    hold_command_e4: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """Whether a board takes them: the twin of the checks in the firmware."""
+        return all(axis.valid for axis in self.axes) and choice_is_valid(self)
+
+    def as_array(self) -> NDArray[np.int64]:
+        """Return the limits in the order of the wire, shape (33,)."""
+        axes, *choice = astuple(self)
+        return np.array([*(limit for axis in axes for limit in axis), *choice], np.int64)

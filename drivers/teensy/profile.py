@@ -1,0 +1,217 @@
+"""What differs from board to board: what is sampled and asked for, how often, within which limits.
+
+A profile is the twin of a class in `firmware/core/profile_*.hpp`. Its `text` is the contract both
+sides hash: `firmware/core` holds the same text, and its CRC-32 is compared before anything moves.
+"""
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import FrameError
+from drivers.teensy.protocol import (
+    ACK_DTYPE,
+    HEADER_DTYPE,
+    HELLO_REPLY_DTYPE,
+    MAX_WATCHDOG_US,
+    MIN_WATCHDOG_US,
+    PING_DTYPE,
+    PONG_DTYPE,
+    STATUS_ARMED,
+    STATUS_HOLDING,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_QUEUE_DRY,
+    STATUS_SATURATED,
+    STATUS_WATCHDOG_TRIPPED,
+    TRIP_REPORT_DTYPE,
+    TRIP_SHIFT,
+    VERSION,
+    Kind,
+    Result,
+    SafeState,
+    Trip,
+    TripReport,
+    encode_command,
+)
+
+
+class ArmLimits(Protocol):
+    """The limits a board is armed with."""
+
+    def as_array(self) -> NDArray[np.int64]:
+        """Return the limits in the order of the wire."""
+        ...
+
+
+class SafetyChoice(Protocol):
+    """How the limits of every profile end, see `drivers.teensy.protocol.CHOICE_NAMES`."""
+
+    @property
+    def stall_ticks(self) -> int: ...  # noqa: D102
+    @property
+    def saturated_ticks(self) -> int: ...  # noqa: D102
+    @property
+    def stale_ticks(self) -> int: ...  # noqa: D102
+    @property
+    def watchdog_us(self) -> int: ...  # noqa: D102
+    @property
+    def safe_state(self) -> int: ...  # noqa: D102
+    @property
+    def hold_command_e4(self) -> int: ...  # noqa: D102
+
+
+def choice_is_valid(choice: SafetyChoice) -> bool:
+    """Say whether a board takes these, as `SafetyChoice::valid` of the firmware does."""
+    return (
+        min(choice.stall_ticks, choice.saturated_ticks, choice.stale_ticks) >= 1
+        and MIN_WATCHDOG_US <= choice.watchdog_us <= MAX_WATCHDOG_US
+        and choice.safe_state in (SafeState.RELEASE, SafeState.HOLD)
+        and 0 <= choice.hold_command_e4 <= 10_000
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A kind of board, as its frames tell it.
+
+    Attributes:
+        name: Its name: in the host library, in messages, in configurations.
+        title: First line of the contract.
+        tick_us: Period of a control tick and of a sample, microseconds.
+        sample: Layout of a sample.
+        arm: Layout of the arm command: header, gains, limits.
+        setpoint: Layout of one setpoint, one field a motor.
+        max_setpoints: Most setpoints in one frame.
+        motors: Motors with a position loop.
+        input_names: Fields of a sample a trip can name, in the order of its channel number.
+    """
+
+    name: str
+    title: str
+    tick_us: int
+    sample: np.dtype[np.void]
+    arm: np.dtype[np.void]
+    setpoint: np.dtype[np.void]
+    max_setpoints: int
+    motors: int
+    input_names: tuple[str, ...]
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples and control ticks a second."""
+        return 1e6 / self.tick_us
+
+    @property
+    def setpoint_names(self) -> tuple[str, ...]:
+        """Names of a setpoint's fields."""
+        return tuple(self.setpoint.names or ())
+
+    @cached_property
+    def layouts(self) -> dict[Kind, np.dtype[np.void]]:
+        """Layout of every frame kind; that of setpoints is the header before them."""
+        return {
+            Kind.SAMPLE: self.sample,
+            Kind.HELLO_REPLY: HELLO_REPLY_DTYPE,
+            Kind.ACK: ACK_DTYPE,
+            Kind.PONG: PONG_DTYPE,
+            Kind.TRIP_REPORT: TRIP_REPORT_DTYPE,
+            Kind.HELLO: HEADER_DTYPE,
+            Kind.ARM: self.arm,
+            Kind.START: HEADER_DTYPE,
+            Kind.SETPOINTS: HEADER_DTYPE,
+            Kind.STOP: HEADER_DTYPE,
+            Kind.DISARM: HEADER_DTYPE,
+            Kind.PING: PING_DTYPE,
+            Kind.TRIP: HEADER_DTYPE,
+        }
+
+    @cached_property
+    def text(self) -> str:
+        """The contract, one line a frame kind, the same in the firmware's source."""
+        lines = [self.title, "COBS(payload, CRC-16/CCITT-FALSE u2) 00"]
+        repeated = f", {self.max_setpoints} x ({_fields(self.setpoint)})"
+        for kind, layout in self.layouts.items():
+            more = repeated if kind is Kind.SETPOINTS else ""
+            lines.append(f"{kind} {kind.name}: {_fields(layout)}{more}")
+        lines.append(
+            f"status: {STATUS_ARMED} ARMED, {STATUS_SATURATED} SATURATED,"
+            f" {STATUS_QUEUE_DRY} QUEUE_DRY, {STATUS_WATCHDOG_TRIPPED} WATCHDOG_TRIPPED,"
+            f" {STATUS_LIMIT_TRIPPED} LIMIT_TRIPPED, {STATUS_HOLDING} HOLDING,"
+            f" trip << {TRIP_SHIFT}"
+        )
+        lines.append("trip: " + ", ".join(f"{trip.value} {trip.name}" for trip in Trip))
+        lines.append("result: " + ", ".join(f"{result.value} {result.name}" for result in Result))
+        return "".join(f"{line}\n" for line in lines)
+
+    @cached_property
+    def protocol_hash(self) -> int:
+        """CRC-32 of `text`; the board's hello carries its own."""
+        return zlib.crc32(self.text.encode())
+
+    def encode_arm(self, sequence: int, gains: NDArray[np.float64], limits: ArmLimits) -> bytes:
+        """Return the payload of the arm command; gains motor after motor."""
+        fields = (VERSION, Kind.ARM, sequence, *gains.ravel().tolist(), *limits.as_array().tolist())
+        return np.array(fields, self.arm).tobytes()
+
+    def encode_setpoints(self, sequence: int, columns: Sequence[NDArray[Any]]) -> bytes:
+        """Return the payload of one block of setpoints: a column a field, each of shape (n,)."""
+        block = np.empty(len(columns[0]), self.setpoint)
+        for name, values in zip(self.setpoint_names, columns, strict=True):
+            block[name] = values
+        return encode_command(Kind.SETPOINTS, sequence) + block.tobytes()
+
+    def decode(self, payload: bytes) -> tuple[Kind, int, np.void]:
+        """Return kind, sequence and fields of any frame but a sample.
+
+        The fields of a block of setpoints are its header; the block is `decode_setpoints`.
+
+        Raises:
+            FrameError: Too short, of another version, of an unknown kind, or of the wrong size.
+        """
+        if len(payload) < HEADER_DTYPE.itemsize:
+            raise FrameError(f"A frame of {len(payload)} bytes holds no header.")
+        version, number = payload[0], payload[1]
+        if version != VERSION:
+            raise FrameError(f"A frame has layout version {version}, not {VERSION}.")
+        if number not in Kind.__members__.values() or number == Kind.SAMPLE:
+            raise FrameError(f"A frame has the unknown kind {number}.")
+        kind = Kind(number)
+        body = len(payload) - self.layouts[kind].itemsize
+        setpoints, rest = divmod(body, self.setpoint.itemsize)
+        whole = rest == 0 and 1 <= setpoints <= self.max_setpoints
+        if not (whole if kind is Kind.SETPOINTS else body == 0):
+            raise FrameError(f"A {kind.name} frame has {len(payload)} bytes.")
+        fields = np.frombuffer(payload, self.layouts[kind], count=1)[0]
+        return kind, int(fields["sequence"]), fields
+
+    def decode_setpoints(self, payload: bytes) -> NDArray[np.void]:
+        """Return the setpoints of a block, shape (n,), fields as in `setpoint`."""
+        return np.frombuffer(payload, self.setpoint, offset=HEADER_DTYPE.itemsize)
+
+    def decode_trip_report(self, fields: np.void) -> TripReport:
+        """Return what a board says it tripped over.
+
+        Raises:
+            FrameError: It gives a reason this program does not know.
+        """
+        code, channel = int(fields["code"]), int(fields["channel"])
+        if code not in Trip.__members__.values():
+            raise FrameError(f"A board tripped for the unknown reason {code}.")
+        return TripReport(
+            code=Trip(code),
+            channel=self.input_names[channel] if channel < len(self.input_names) else "",
+            value=int(fields["value"]),
+            limit=int(fields["limit"]),
+            tick_us=int(fields["tick_us"]),
+            late_us=int(fields["late_us"]),
+        )
+
+
+def _fields(layout: np.dtype[np.void]) -> str:
+    assert layout.names is not None  # noqa: S101
+    return ", ".join(f"{name} {layout[name].str.lstrip('<|')}" for name in layout.names)

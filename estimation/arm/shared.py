@@ -1,0 +1,110 @@
+"""What an arm's joints share: the links' parameters, fitted on all joints together.
+
+The links' torque stands as a channel beside the measured ones, with the changes that its fit is
+least sure of. The direction of each joint is made before the filter, since a filter and a sign do
+not commute. Wrist motors behind a coupling get channels of their own angles: their friction is a
+function of those, felt in several joints.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arm.balances import CORRECTIONS, ArmBalances
+from estimation.arm.identification import fit, smoothed, thesis_weights
+from estimation.arm.kinematics import ArmError
+from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
+from estimation.filters import zero_phase
+from estimation.recording import FloatArray, Recording
+
+DAMPING = 1e-9
+"""Of the shared fit: small enough not to bend what is told, enough for what is not told at all."""
+
+EDGE_S = 0.5
+"""Left out of the shared fit at either end of a run: the filter works on a reflection there."""
+
+
+@dataclass(frozen=True)
+class SharedFit:
+    """Declared parameters that fit all joints together.
+
+    Attributes:
+        values: Shape (parameters,).
+        corrections: Of each joint, the changes of the links' parameters that the fit is least sure
+            of, as that joint feels them: what an effect that is missing may have bent. Shape
+            (joints, parameters, CORRECTIONS), one standard error each.
+    """
+
+    values: FloatArray
+    corrections: FloatArray
+
+
+def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
+    """Fit the declared parameters to all joints of all runs together.
+
+    Args:
+        arm: The arm.
+        recordings: The runs that discover; others have no part in it.
+
+    Raises:
+        ArmError: They are too short.
+    """
+    tables, torques = [], []
+    for run in recordings:
+        rate_hz = run.sample_rate_hz
+        position, _, torque = joint_channels(run)
+        edge, every = round(EDGE_S * rate_hz), round(rate_hz / (10 * LOW_PASS.cutoff_hz))
+        inner = slice(edge, len(position) - edge, max(1, every))
+        columns = arm.columns(motion_of(position, 1 / rate_hz, FINE))
+        tables.append(smoothed(columns, rate_hz)[inner])
+        torques.append(zero_phase(torque[:, : len(arm.joints)], rate_hz, LOW_PASS)[inner])
+    table, aim = np.concatenate(tables), np.concatenate(torques)
+    if len(aim) < 2 * table.shape[2]:
+        raise ArmError(
+            f"{len(aim)} samples do not tell the {table.shape[2]} parameters of {arm.name}.",
+            "They are what the runs that discover hold at the filter's rate.",
+            "Record longer runs.",
+        )
+    found = fit(table, aim, thesis_weights(aim), DAMPING)
+    values, vectors = np.linalg.eigh(found.covariance[np.ix_(arm.shared, arm.shared)])
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    corrections = np.zeros((len(arm.joints), table.shape[2], CORRECTIONS))
+    for k in range(len(arm.joints)):
+        felt = table[:, k, arm.shared] @ root
+        _, _, directions = np.linalg.svd(felt, full_matrices=False)
+        corrections[k, arm.shared] = root @ directions[:CORRECTIONS].T
+    return SharedFit(found.values, corrections)
+
+
+def with_links(
+    arm: ArmBalances, recordings: Sequence[Recording], fitted: SharedFit
+) -> list[Recording]:
+    """Return recordings with each joint's links' torque and direction, and the motors' angles.
+
+    Args:
+        arm: The arm.
+        recordings: Its runs.
+        fitted: Declared parameters, from `shared_fit`.
+    """
+    return [r.with_columns(**_added(arm, r, fitted)) for r in recordings]
+
+
+def _added(arm: ArmBalances, recording: Recording, fitted: SharedFit) -> Mapping[str, FloatArray]:
+    position, _, _ = joint_channels(recording)
+    motion = motion_of(position, 1 / recording.sample_rate_hz, FINE)
+    columns = arm.columns(motion)
+    links = columns @ np.where(arm.shared, fitted.values, 0.0)
+    direction = np.tanh(motion.velocity[:, : len(arm.joints)] / arm.sign_width)
+    added: dict[str, FloatArray] = {}
+    for k, names in enumerate(arm.joints):
+        added |= {names.links: links[:, k], names.direction: direction[:, k]}
+        for j, change in enumerate(fitted.corrections[k].T, start=1):
+            added[names.links_correction(j)] = columns[:, k] @ change
+    if arm.motors is not None:
+        last = arm.wrist + len(arm.motors)
+        angles = position[:, arm.wrist : last] @ arm.motors.T
+        for names in arm.joints[arm.wrist :]:
+            for k, angle in enumerate(angles.T, start=arm.wrist + 1):
+                added[names.drive(k)] = angle
+    return added

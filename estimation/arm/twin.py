@@ -1,0 +1,73 @@
+"""The twin of an arm's declared model: its runs as they would be if nothing were missing.
+
+The positions are the measured ones; the torque is the declared model's on them, with friction that
+changes sign as sharply as declared, so that what filters do to it is in the twin as in the arm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arm.balances import ArmBalances
+from estimation.arm.motion import FINE, joint_channels, motion_of
+from estimation.arm.shared import SharedFit
+from estimation.filters import zero_phase
+from estimation.recording import FloatArray, Recording
+
+
+@dataclass(frozen=True)
+class ArmTwin:
+    """Seed to the runs that discover, their torque made by the declared model.
+
+    Attributes:
+        runs: The runs, with the declared torque in the torque channels.
+        noise: Standard deviation of each torque channel's white noise.
+    """
+
+    runs: tuple[Recording, ...]
+    noise: dict[str, float]
+
+    @classmethod
+    def of(cls, arm: ArmBalances, runs: Sequence[Recording], fitted: SharedFit) -> "ArmTwin":
+        """Make the twin of a fitted arm.
+
+        Args:
+            arm: The arm.
+            runs: Runs that discover, with the links' torque.
+            fitted: Declared parameters, from `estimation.arm.shared.shared_fit`.
+        """
+        made, loud = [], []
+        for run in runs:
+            position, _, torque = joint_channels(run)
+            declared = (
+                arm.columns(motion_of(position, 1 / run.sample_rate_hz, FINE)) @ fitted.values
+            )
+            own = {names.torque: declared[:, k] for k, names in enumerate(arm.joints)}
+            made.append(replace(run, columns={**run.columns, **own}))
+            loud.append(_noise(torque[:, : len(arm.joints)], run.sample_rate_hz))
+        noise = np.sqrt(np.mean(np.square(loud), axis=0))
+        return cls(
+            tuple(made), {n.torque: float(x) for n, x in zip(arm.joints, noise, strict=True)}
+        )
+
+    def __call__(self, seed: int) -> list[Recording]:
+        """Return the runs with noise of a seed."""
+        random = np.random.default_rng(seed)
+        return [
+            run.with_columns(
+                **{
+                    name: run[name] + size * random.normal(size=len(run))
+                    for name, size in self.noise.items()
+                }
+            )
+            for run in self.runs
+        ]
+
+
+def _noise(torque: FloatArray, rate_hz: float) -> FloatArray:
+    """Return white noise by what stands above the filter, shape (joints,)."""
+    above = torque - zero_phase(torque, rate_hz, FINE)
+    share = max(1 - 2 * FINE.cutoff_hz / rate_hz, 0.1)
+    spread: FloatArray = above.std(axis=0) / np.sqrt(share)
+    return spread

@@ -1,0 +1,59 @@
+"""What an effect must pass before it is claimed."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Gates:
+    """What an effect must pass on the runs that discover.
+
+    Attributes:
+        chance: Largest p-value of the max statistic over the whole catalogue.
+        floor: Least share of squared error removed on runs left out.
+        agree: Largest p-value of the signed-rank test over the runs.
+        most: Effects added to a balance at most.
+        surrogates: Number of surrogates.
+        rival: A rival has at least this share of the winner's gain.
+        veto: A map withdraws a name when it leaves at most this share of the name's error.
+        form: A map of no other variables than the name's own does so only when the name removes
+            less than this share of what the map removes: no formula has the true form.
+        map_floor: The floor of a map: with its many columns it bends to
+            the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
+            rig with nothing missing, three seeds, no twins).
+        kept: Least share of what an effect adds that is left when it is fitted through instruments:
+            less, and it is made of the noise of a regressor.
+        leftover: Least share that an effect has in what all found in a balance remove together:
+            what a name's form leaves of its own cause is no second cause.
+        parameters: Named parameters of the whole model at most, or None for no limit.
+        akin: Whether an effect may be added beside one that looks alike: where a model must
+            predict well rather than be named surely.
+        sure: Least confidence of `identified`.
+        balances: Balances that are searched: each is given its share of the chance.
+    """
+
+    chance: float = 0.02
+    floor: float = 0.02
+    agree: float = 0.05
+    most: int = 4
+    surrogates: int = 199
+    rival: float = 0.5
+    veto: float = 0.9
+    form: float = 0.7
+    sure: float = 0.9
+    map_floor: float = 0.2
+    kept: float = 0.5
+    leftover: float = 0.15
+    parameters: int | None = None
+    akin: bool = False
+    balances: int = 1
+
+    @property
+    def level(self) -> float:
+        """Largest p-value on surrogates in one balance of several (Bonferroni)."""
+        return self.chance / self.balances
+
+    @property
+    def draws(self) -> int:
+        """Number of surrogates: as asked, and enough to reach the level."""
+        return max(self.surrogates, math.ceil(1.0 / self.level) - 1)

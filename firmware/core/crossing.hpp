@@ -1,0 +1,23 @@
+// What a guard says of a tick: which limit was crossed, by what, and how late it was noticed.
+#pragma once
+
+#include <cstdint>
+
+#include "protocol.hpp"
+
+namespace rig {
+
+constexpr std::int32_t kMissing = INT32_MIN;  // count of a sensor that gave nothing
+constexpr std::uint8_t kNoChannel = 255;
+
+struct Crossing {
+    Trip code = kNoTrip;
+    std::uint8_t channel = kNoChannel;
+    std::int64_t value = 0;
+    std::int64_t limit = 0;
+    std::int64_t late_us = 0;  // since it began
+};
+
+constexpr std::int64_t magnitude(std::int64_t value) { return value < 0 ? -value : value; }
+
+}  // namespace rig

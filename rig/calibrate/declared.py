@@ -1,0 +1,243 @@
+"""A calibration as the diagnosis takes it: what it declares, and the runs it was made from.
+
+A resistor's calibration is `reference = calibrated`. Where weights are known exactly (`torque`,
+`ft`) it is `read = applied`: the noisy side is the target, else its noise would pass for an effect.
+A part's (`current`, `gearbox`, `encoder`) is the equation of its session. Samples that a session
+leaves out because the rig does not move steadily are flagged here: no fit or search sees them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.fsr import FsrCurve
+from calibration.fsr_memory import FsrMemory
+from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
+from calibration.procedure import Measurement, Result
+from calibration.sessions.current import CURRENT, TORQUE
+from calibration.sessions.encoder import PAIRS
+from calibration.sessions.fsr import SMOOTH, FsrSession
+from calibration.sessions.motion import stands
+from calibration.torque import weight_torque_n_m
+from estimation.derived import zero_phase_channels
+from estimation.effects import effect
+from estimation.filters import LowPass
+from estimation.model import Model, Term
+from estimation.recording import Flag, Recording
+from estimation.rest import SPINDLE_SPEED
+from rig.errors import UsageError
+
+STEADY = LowPass(cutoff_hz=20.0, order=3)
+"""Steady motion is slow; noise of the current, a regressor, would pass for creep."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What one calibration declares.
+
+    Attributes:
+        model: Its equation, a model of the balance `calibration.KIND`.
+        recordings: The runs it was made from.
+    """
+
+    model: Model
+    recordings: list[Recording]
+
+
+def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) -> Declared:
+    """Return what a calibration declares.
+
+    Args:
+        kind: Kind of calibration.
+        result: What it came to.
+        measurements: What it came from, in the order of the steps.
+
+    Raises:
+        UsageError: Nothing is known of the kind.
+    """
+    if kind not in MAKERS:
+        raise UsageError(
+            f"A calibration of the kind {kind} cannot be diagnosed.",
+            "It keeps no runs, or nobody has declared its equation.",
+            f"Kinds that can: {', '.join(MAKERS)}.",
+        )
+    return MAKERS[kind](result, measurements)
+
+
+def _fsr(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    curve, memory = fsr_of(result)
+    made = []
+    for run in FsrSession().pressed(measurements):
+        volts = np.clip(run.fsr_v, curve.low_v, curve.high_v)
+        force = memory.force_n(curve, run.time_s, volts)
+        columns = {"calibrated_n": force, "reference_n": run.force_n}
+        made.append(Recording(run.name, run.time_s - run.time_s[0], columns, rig="fsr"))
+    return Declared(_of_sensor("fsr", "calibrated_n", "reference_n", SMOOTH), made)
+
+
+def _torque(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    """Each way up or down through the weights is a run."""
+    line, steps = result.fit.parameters, []
+    for measurement in measurements:
+        said, counts = measurement.recording.conditions, measurement.counts
+        if "mass_kg" not in said or counts is None:
+            continue  # the shunt is no torque
+        torque = float(weight_torque_n_m(float(said["mass_kg"]), float(said["arm_m"])))
+        read = (counts[result.input].astype(np.float64) - line["zero"]) * line["slope"]
+        columns = {"applied_n_m": np.full(len(read), torque), "read_n_m": read}
+        steps.append(replace(measurement.recording, columns=columns))
+    level = np.array([step["applied_n_m"][0] for step in steps])
+    way = np.sign(np.diff(level, prepend=level[0] - 1.0))
+    number = np.cumsum(np.diff(way, prepend=way[0]) != 0)
+    made = [
+        _in_a_row(f"way-{k}", [s for s, n in zip(steps, number, strict=True) if n == k])
+        for k in range(int(number[-1]) + 1)
+    ]
+    return Declared(_of_sensor("torque", "applied_n_m", "read_n_m", LowPass()), made)
+
+
+def _ft(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    """Each axis of force in each round through the poses is a run, its reading less the bias."""
+    tool = result.fit.parameters
+    weight_n = tool["mass_kg"] * STANDARD_GRAVITY_M_S2
+    rounds: dict[str, list[Recording]] = {}
+    seen: list[tuple[float, ...]] = []
+    for measurement in measurements:
+        recording = measurement.recording
+        down = tuple(float(recording.conditions[f"gravity_{axis}_ratio"]) for axis in "xyz")
+        applied = np.full((len(recording), 3), weight_n) * down
+        for k, axis in enumerate(AXES[:3]):
+            columns = {
+                "applied_n": applied[:, k],
+                "second_axis_n": applied[:, (k + 1) % 3],
+                "third_axis_n": applied[:, (k + 2) % 3],
+                "read_n": recording[axis] - tool[f"bias_{axis}"],
+            }
+            run = f"round-{seen.count(down)}-{'xyz'[k]}"
+            rounds.setdefault(run, []).append(replace(recording, columns=columns))
+        seen.append(down)
+    made = [_in_a_row(name, parts) for name, parts in rounds.items()]
+    return Declared(_of_sensor("ft", "applied_n", "read_n", LowPass()), made)
+
+
+def _current(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    if result.input != CURRENT:
+        raise UsageError(
+            f"{result.channel} from {result.input} is the driver's own line.",
+            "What it lacks shows in the torque of the same session.",
+            "Name that session's record of spindle_torque_n_m.",
+        )
+    speed = {"speed": SPINDLE_SPEED}
+    terms = (
+        Term(effect("motor.torque_constant"), 1, {"source": CURRENT}),
+        Term(effect("friction.coulomb"), -1, speed),
+        Term(effect("friction.viscous"), -1, speed),
+        # nothing in steady motion, but a ripple shakes the motor
+        Term(effect("inertia.missing"), -1, {"acceleration": "motor_acceleration_rad_s2"}),
+        Term(effect("sensor.offset"), 1),
+    )
+    model = _of_part("current", TORQUE, terms, "Torque at the spindle from the motor's current.")
+    return Declared(model, [_moving(m.recording) for m in measurements])
+
+
+def _gearbox(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    # small against a count of the encoders, and no more than that: damping, and the friction of
+    # the spindle, which twists the gear and does not reach the sensor
+    terms = [
+        Term(effect("compliance.link"), 1, {"load": TORQUE}),
+        Term(effect("transmission.damping"), -1, {"rate": "proximal_torque_rate_n_m_s"}),
+        Term(effect("friction.coulomb"), 1, {"speed": SPINDLE_SPEED}),
+        Term(effect("friction.viscous"), 1, {"speed": SPINDLE_SPEED}),
+    ]
+    if "backlash_rad" in result.fit.parameters:
+        terms.append(Term(effect("transmission.backlash"), 1, {"load": TORQUE}))
+    terms.append(Term(effect("sensor.offset"), 1))
+    about = "Twist of the gear under the torque at the spindle."
+    model = _of_part("gearbox", "gearbox_differential_rad", tuple(terms), about)
+    return Declared(model, [_moving(m.recording) for m in measurements])
+
+
+def _encoder(result: Result, measurements: Sequence[Measurement]) -> Declared:
+    moved = [m.recording for m in measurements if "mark_ratio" not in m.recording.conditions]
+    marked = next(m.recording for m in measurements if "mark_ratio" in m.recording.conditions)
+    pair = PAIRS[str(marked.conditions["encoder"])]
+    terms = [
+        Term(effect("transmission.ratio"), 1, {"load": "reference_angle_rad"}),
+        Term(effect("compliance.link"), -1, {"load": "between_torque_n_m"}),
+        Term(effect("friction.coulomb"), -1, {"speed": "reference_velocity_rad_s"}),
+        Term(effect("sensor.offset"), 1),
+    ]
+    if "wave_sine_rad" in result.fit.parameters:
+        terms.append(Term(effect("sensor.encoder_inl"), 1, {"encoder": "reference_angle_rad"}))
+    about = f"{pair.channel} against {pair.reference}."
+    model = _of_part("encoder", "calibrated_angle_rad", tuple(terms), about)
+    made = []
+    for recording in map(_moving, moved):
+        columns = {
+            "calibrated_angle_rad": recording[pair.channel],
+            "reference_angle_rad": pair.nominal_ratio * recording[pair.reference],
+            "between_torque_n_m": recording[pair.torque],
+            CURRENT: recording[CURRENT],
+        }
+        made.append(replace(recording, columns=columns))
+    return Declared(model, made)
+
+
+MAKERS: Mapping[str, Callable[[Result, Sequence[Measurement]], Declared]] = {
+    "fsr": _fsr,
+    "torque": _torque,
+    "ft": _ft,
+    "current": _current,
+    "gearbox": _gearbox,
+    "encoder": _encoder,
+}
+"""Kind to what makes its declaration."""
+
+
+def fsr_of(result: Result) -> tuple[FsrCurve, FsrMemory]:
+    """Return the curve and the memory that an FSR's calibration holds.
+
+    Raises:
+        UsageError: It states no range of voltage.
+    """
+    values = result.fit.parameters
+    powers = [name for name in values if name.startswith("c") and name[1:].isdigit()]
+    coefficients = tuple(values[f"c{k}"] for k in range(len(powers)))
+    if result.low is None or result.high is None:
+        raise UsageError("The calibration of the resistor states no range of voltage.")
+    memory = FsrMemory(
+        gap_n=values.get("loading_gap_n", 0.0), creep_ratio=values.get("creep_ratio", 0.0)
+    )
+    return FsrCurve(coefficients, result.low, result.high), memory
+
+
+def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
+    """Return a line from one to the other, whose gain and zero a fit may still move."""
+    terms = (
+        Term(effect("motor.torque_constant"), 1, {"source": source}),
+        Term(effect("sensor.offset"), 1),
+    )
+    about = "What the calibrated sensor says, against what it was given."
+    return Model(kind, f"calibration.{kind}", target, terms, about, low_pass, False, "all")
+
+
+def _of_part(kind: str, target: str, terms: tuple[Term, ...], about: str) -> Model:
+    return Model(kind, f"calibration.{kind}", target, terms, about, STEADY, False)
+
+
+def _moving(recording: Recording) -> Recording:
+    """Return a run with the samples flagged that a session leaves out: at rest or turning."""
+    speed = zero_phase_channels(recording, [SPINDLE_SPEED], STEADY)[SPINDLE_SPEED]
+    left_out = np.where(stands(speed, recording.sample_rate_hz), np.uint8(Flag.SUSPECT), 0)
+    return replace(recording, flags=(recording.flags | left_out).astype(np.uint8))
+
+
+def _in_a_row(name: str, steps: Sequence[Recording]) -> Recording:
+    """Return what rested in several steps as one run, one step after the other."""
+    columns = {
+        channel: np.concatenate([step[channel] for step in steps]) for channel in steps[0].columns
+    }
+    flags = np.concatenate([step.flags for step in steps])
+    time_s = np.arange(len(flags)) / steps[0].sample_rate_hz
+    return replace(steps[0], name=name, time_s=time_s, columns=columns, flags=flags, conditions={})

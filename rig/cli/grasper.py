@@ -1,0 +1,68 @@
+"""`rig grasper`: the 3-DOF grasper: its designs, and recordings of the simulated one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.output import JsonFlag, console, emit_json, progress
+
+grasper_app = typer.Typer(
+    name="grasper",
+    help="The 3-DOF grasper: possible designs, and recordings of the simulated one.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+
+@grasper_app.command()
+def designs(json: JsonFlag = False) -> None:
+    """List every combination of Table 1 of Zhao and Nelson 2016, the most compact one marked."""
+    from rig.grasper.wrist import designs as every
+    from rig.grasper.wrist import most_compact
+    from rig.reports.table import TextTable, to_rich
+
+    found = every()
+    best = most_compact(found)
+    rows = [
+        [
+            f"1:{design.planetary.gear_ratio:g}",
+            f"{design.planetary.sun_over_carrier:g}",
+            design.drive,
+            f"{design.pulley_ratio:.3g}",
+            f"{design.area:.3g}",
+            str(design.extra_stages),
+            "most compact" if design is best else design.obstacle,
+        ]
+        for design in found
+    ]
+    columns = ["gears", "sun/carrier", "driven", "d2/d1", "area", "extra stages", "remark"]
+    console().print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
+    if json:
+        emit_json({"designs": found, "most_compact": best})
+
+
+@grasper_app.command()
+def record(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the recordings.")],
+    pulley_ratio: Annotated[
+        float, typer.Option(min=0.5, max=2.0, help="d2/d1 as built; 1 decouples the jaws.")
+    ] = 1.0,
+    runs: Annotated[int, typer.Option(min=3, help="Number of runs.")] = 12,
+    seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
+    json: JsonFlag = False,
+) -> None:
+    """Record the simulated grasper, all joints moving at once, one log a run."""
+    from rig.log.convert import write_recording
+    from rig.simulation.wrist_plant import Wrist, wrist_campaign
+
+    out.mkdir(parents=True, exist_ok=True)
+    logs = []
+    with progress() as bar:
+        task = bar.add_task("runs", total=runs)
+        for recording in wrist_campaign(Wrist(pulley_ratio), seed, runs):
+            logs.append(write_recording(out / f"{recording.name}.mcap", recording))
+            bar.update(task, advance=1, description=recording.name)
+    console().print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
+    if json:
+        emit_json({"folder": out, "logs": logs})

@@ -1,0 +1,111 @@
+"""What is diagnosed: the recordings at a path, and the models that are declared of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from estimation import model_file
+from estimation.arm.balances import balances_of
+from estimation.campaign import Campaign
+from estimation.model import Model
+from rig.calibrate.declared import Declared
+from rig.calibrate.diagnose import declared_by_folder, is_raw
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
+
+REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
+"""Shipped models that together declare the reference rig, measured or simulated."""
+
+WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
+"""Those that declare the kinematics of a grasper with three degrees of freedom."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is diagnosed.
+
+    Attributes:
+        campaign: The recordings.
+        models: Declared models, one a balance.
+    """
+
+    campaign: Campaign
+    models: Sequence[Model]
+
+
+def subject(
+    path: Path,
+    model: Path | None = None,
+    balance: str | None = None,
+    format_name: str | None = None,
+) -> Subject:
+    """Return the recordings at a path and what is declared of them.
+
+    Without a model, raw logs of a calibration are declared by that calibration, an arm's by its
+    joints, and others by the shipped models of the rig that their channels tell.
+
+    Args:
+        path: File, folder or archive of recordings.
+        model: A model file or the name of a shipped one.
+        balance: Only this balance.
+        format_name: Importer to use; guessed when None.
+
+    Raises:
+        UsageError: The path does not exist, or there is no model of that balance.
+        ModelFileError: The model cannot be read.
+        DataError: The recordings cannot be read.
+    """
+    if model is not None:
+        models = declared_models(model, balance)
+        return Subject(open_campaign(path, format_name), models)
+    if format_name is None and is_raw(path):
+        return of_calibration(declared_by_folder(path), balance)
+    of_wrist = {m.balance for m in _shipped(WRIST)}
+    if balance is not None and not balance.startswith("joint.") and balance not in of_wrist:
+        models = declared_models(None, balance)
+        return Subject(open_campaign(path, format_name), models)
+    campaign = open_campaign(path, format_name)
+    first = next(iter(campaign.evidence), None)
+    arm = None if first is None else balances_of(first)
+    if arm is not None:
+        return Subject(campaign, _of(arm.models, balance))
+    angles = {m.target for m in _shipped(WRIST)}
+    names = WRIST if first is not None and angles <= set(first.columns) else REFERENCE_RIG
+    return Subject(campaign, _of(_shipped(names), balance))
+
+
+def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
+    """Return a calibration as what is diagnosed."""
+    return Subject(Campaign.of(declared.recordings), _of([declared.model], balance))
+
+
+def declared_models(path: Path | None, balance: str | None) -> list[Model]:
+    """Return the declared models to diagnose.
+
+    Args:
+        path: A model file or the name of a shipped one; the balances of the reference rig when
+            None.
+        balance: Only this balance.
+
+    Raises:
+        UsageError: No model of that balance.
+        ModelFileError: The file cannot be read.
+    """
+    models = _shipped(REFERENCE_RIG) if path is None else model_file.read_all(path)
+    return _of(models, balance)
+
+
+def _shipped(names: Sequence[str]) -> list[Model]:
+    return [model_file.read(Path(name)) for name in names]
+
+
+def _of(models: Sequence[Model], balance: str | None) -> list[Model]:
+    chosen = [model for model in models if balance in (None, model.balance)]
+    if not chosen:
+        known = ", ".join(dict.fromkeys(model.balance for model in models))
+        raise UsageError(
+            f"There is no declared model of the balance {balance!r}.",
+            f"Declared: {known}.",
+            "Name a model file with --model.",
+        )
+    return chosen

@@ -1,0 +1,15 @@
+"""The machine a configuration names."""
+
+from rig.config import Config
+from rig.machines.machine import Machine
+
+
+def machine_of(config: Config) -> Machine:
+    """Return what a session on this configuration moves."""
+    if config.logger.profile == "grasper":
+        from rig.machines.grasper import GrasperMachine
+
+        return GrasperMachine()
+    from rig.machines.reference import ReferenceMachine
+
+    return ReferenceMachine()

@@ -1,0 +1,96 @@
+"""The reference rig: a drive motor turns the spindle, a load motor works against the jaw."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.teensy.guard import Drive, first_crossing
+from drivers.teensy.profile import ArmLimits
+from drivers.teensy.protocol import TOP, Trip
+from drivers.teensy.reference import REFERENCE, Limits
+from rig.config import Config
+from rig.errors import UsageError
+from rig.log.streams import COUNTS_STREAM
+from rig.machines.machine import FloatArray, MachinePlan
+from rig.motion import Motion, motion_of, settling
+from rig.protocol import RunPlan
+from rig.safety import board_limits, check_setpoints
+
+
+class ReferenceMachine:
+    """Implements `rig.machines.machine.Machine`."""
+
+    profile = REFERENCE
+    counts = COUNTS_STREAM
+    setpoint_channels = ("target_angle_rad", "load_command_a")
+    channels_of_inputs: Mapping[str, str] = {
+        "motor": "motor_angle_rad",
+        "spindle": "spindle_angle_rad",
+        "jaw": "jaw_angle_rad",
+        "proximal": "proximal_torque_n_m",
+        "distal": "distal_torque_n_m",
+        "current": "motor_current_a",
+    }
+    shown = ("distal_torque_n_m",)
+    board_limits = staticmethod(board_limits)
+    guard = Drive
+    first_crossing = staticmethod(first_crossing)
+
+    def first_look(self, config: Config) -> str:
+        """Return the quick protocol, without load where there is no load motor."""
+        return "quick" if config.reference_limits.load_command_a else "unloaded"
+
+    def gains(self, config: Config) -> Sequence[float]:
+        """Return the gains of the position controller."""
+        return config.controller.gains()
+
+    def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:
+        """Hold the limits of travel and load against a trajectory."""
+        limits = config.reference_limits
+        asked = (
+            ("spindle_angle_rad", limits.spindle_angle_rad),
+            (
+                "load_command_a",
+                limits.load_command_a,
+            ),
+        )
+        check_setpoints(
+            (name, values, limit) for (name, limit), values in zip(asked, setpoints, strict=True)
+        )
+
+    def here(self, columns: Mapping[str, FloatArray]) -> tuple[float, ...]:
+        """Return where the spindle stands."""
+        return (float(columns["spindle_angle_rad"][-1]),)
+
+    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> Motion:
+        """Return approach, run and release of the spindle."""
+        if not isinstance(plan, RunPlan):
+            raise UsageError(
+                f"The run {plan.name} moves the joints of a grasper.",
+                "This rig has a spindle.",
+                "Choose a protocol for it, such as quick.",
+            )
+        return motion_of(plan, here[0])
+
+    def settling(self, here: tuple[float, ...]) -> Motion:
+        """Return a little motion of the unloaded spindle."""
+        return settling(here[0])
+
+    def too_narrow(self, limits: ArmLimits, sample: np.void) -> tuple[ArmLimits, Trip]:
+        """Return limits whose travel begins beyond where the spindle stands."""
+        assert isinstance(limits, Limits)  # noqa: S101
+        here = int(sample["spindle"])
+        narrow = dataclasses.replace(limits, min_spindle=here + 100, max_spindle=here + 200)
+        return narrow, Trip.SPINDLE_TRAVEL
+
+    def beyond(self, limits: ArmLimits) -> tuple[NDArray[np.integer], ...]:
+        """Return a spindle target beyond the travel."""
+        assert isinstance(limits, Limits)  # noqa: S101
+        return np.array([limits.max_spindle + 1]), np.array([0])
+
+    def untroubled(self, limits: ArmLimits) -> ArmLimits:
+        """Return the limits without torques, and sensors that may be idle."""
+        assert isinstance(limits, Limits)  # noqa: S101
+        return dataclasses.replace(limits, max_proximal=TOP, max_distal=TOP, stale_ticks=TOP)

@@ -1,0 +1,110 @@
+"""An arm's joints as balances of a diagnosis, on simulated arms whose hidden friction is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.arm.balances import balances_of, closed
+from estimation.arm.kinematics import ArmError
+from estimation.arm.motion import motion_of
+from estimation.arm.shared import shared_fit, with_links
+from estimation.arm.twin import ArmTwin
+from estimation.diagnosis.candidate import pool
+from estimation.diagnosis.diagnose import diagnose
+from estimation.diagnosis.split import split
+from estimation.recording import Recording
+from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
+from rig.simulation.hydraulic_arm import HYDRAULIC, SIGN_RAD_S
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+
+
+def campaign(presliding_on: int | None, runs: int = 9, seconds: float = 15.0) -> list[Recording]:
+    """Runs of one arm; hidden friction with memory on one joint, from 1, or on none."""
+    rng = np.random.default_rng(7)
+    arm = draw_arm(rng)
+    hidden = np.zeros_like(arm.hidden)
+    if presliding_on is not None:
+        hidden[0, presliding_on - 1] = arm.hidden[0, presliding_on - 1]
+    arm = replace(arm, hidden=hidden)
+    made = []
+    for k in range(runs):
+        run = simulate(arm, excitation(rng, seconds), rng)
+        made.append(recorded(f"run {k}", run.position, run.torque, RATE_HZ))
+    return made
+
+
+def positions(run: Recording) -> np.ndarray:
+    return np.column_stack([run[names.position] for names in balances_of(run).joints])
+
+
+def diagnosed(recordings: list[Recording], *joints: int):
+    arm, sealed = balances_of(recordings[0]), split(recordings, 0)
+    values = shared_fit(arm, [r for r in recordings if r.name in sealed.discover])
+    whole = with_links(arm, recordings, values)
+    twin = ArmTwin.of(arm, [r for r in whole if r.name in sealed.discover], values)
+    models = [arm.models[j - 1] for j in joints]
+    return diagnose(whole, models, sealed, twins={m.balance: lambda *_: twin for m in models})[0]
+
+
+def test_hidden_friction_is_named_on_its_joint_and_on_no_other() -> None:
+    found = diagnosed(campaign(presliding_on=2), 1, 2)
+    (finding,) = found.findings
+    # Dahl's friction is presliding, and the Bouc-Wen loop with its sharpest corner
+    assert finding.family in ("hysteresis.presliding", "hysteresis.bouc_wen")
+    assert finding.balance == "joint.2"
+    assert finding.runs_improved == finding.runs_total == 3
+    assert found.errors["joint.2"].after < 0.2 * found.errors["joint.2"].before
+    assert set(finding.depends_on) == {"joint_2", "history"}
+
+
+def test_an_arm_that_lacks_nothing_is_told_so() -> None:
+    assert diagnosed(campaign(presliding_on=None), 2, 3).verdict == "nothing_missing"
+
+
+def test_the_links_share_one_set_of_parameters_over_all_joints() -> None:
+    (run,) = campaign(None, runs=1, seconds=30.0)
+    arm = balances_of(run)
+    (whole,) = with_links(arm, [run], shared_fit(arm, [run]))
+    fitted = shared_fit(arm, [run])
+    declared = arm.columns(motion_of(positions(run), 1 / RATE_HZ)) @ fitted.values
+    for k, names in enumerate(arm.joints[:3]):
+        left = (whole[names.torque] - declared[:, k])[200:-200]
+        assert np.std(left) < 0.05 * np.std(whole[names.torque])
+        assert 0 < np.std(whole[names.links]) < 2 * np.std(whole[names.torque])
+    with pytest.raises(ArmError, match="Record longer runs"):
+        shared_fit(arm, [run.at(np.arange(120))])
+
+
+def test_the_wrists_motors_and_a_sliding_joint_are_among_the_candidates() -> None:
+    (run,) = campaign(None, runs=1, seconds=30.0)
+    position = positions(run)
+    torque = np.column_stack([run[n.torque] for n in balances_of(run).joints])
+    seven = recorded("whole", *(np.hstack([x, x[:, 5:]]) for x in (position, torque)), RATE_HZ)
+    slides = {f"joint_3_{new}": seven[f"joint_3_{old}"] for old, new in RENAMED.items()}
+    kept = {n: x for n, x in seven.columns.items() if not n.startswith("joint_3_")}
+    seven = replace(seven, columns={**kept, **slides})
+    arm = balances_of(seven)
+    (whole,) = with_links(arm, [seven], shared_fit(arm, [seven]))
+    read = {
+        model.balance: {c for one in pool(model, list(whole.columns)) for _, c in one.channels}
+        for model in arm.models
+    }
+    assert "joint_6_drive_7_angle_rad" in read["joint.6"]
+    assert not any("drive" in channel for channel in read["joint.4"])
+    assert {"joint_3_position_m", "joint_3_velocity_m_s"} <= read["joint.3"]
+
+
+RENAMED = {"angle_rad": "position_m", "velocity_rad_s": "velocity_m_s", "torque_n_m": "force_n"}
+
+
+def test_a_closed_chains_joints_are_balances_too() -> None:
+    time = np.arange(1500)[:, None] / 50
+    position = 0.3 * np.sin(2 * np.pi * time * (0.1 + 0.07 * np.arange(5)) + np.arange(5))
+    run = recorded("swing", position, np.cumsum(0.01 * np.sin(position), axis=0), 50.0)
+    arm = closed(HYDRAULIC, run, SIGN_RAD_S)
+    (whole,) = with_links(arm, [run], shared_fit(arm, [run]))
+    assert [m.balance for m in arm.models] == [f"joint.{k}" for k in range(1, 6)]
+    assert np.isfinite(whole["joint_5_links_torque_n_m"]).all()
+    assert balances_of(run) is None

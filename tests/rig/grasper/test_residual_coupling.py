@@ -1,0 +1,67 @@
+"""A wrist built with a wrong pulley ratio: the real diagnosis finds the coupling of equation 5."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.cli.main import main
+from rig.simulation.wrist_plant import Wrist, play_wrist
+
+
+def diagnosed(folder, *, pulley_ratio, seed=3):
+    words = [
+        "-o",
+        str(folder),
+        "--pulley-ratio",
+        str(pulley_ratio),
+        "--seed",
+        str(seed),
+        "--runs",
+        "9",
+    ]
+    assert main(["grasper", "record", *words]) == 0
+    told = folder.with_suffix(".json")
+    ledger = folder.with_suffix(".ledger")
+    assert main(["diagnose", str(folder), "--json", str(told), "--ledger", str(ledger)]) == 0
+    return json.loads(told.read_text())
+
+
+def test_a_wrong_pulley_ratio_is_found_from_a_folder_of_recordings(tmp_path):
+    told = diagnosed(tmp_path / "wrong", pulley_ratio=1.1)
+    assert set(told["rmse_before"]) == {"grasp", "pitch", "yaw"}
+    (finding,) = told["findings"]
+    assert (finding["balance"], finding["family"]) == ("pitch", "coupling.kinematic")
+    assert finding["verdict"] == "identified"
+    ratio = finding["parameters"]["ratio"]
+    assert ratio["value"] == pytest.approx(Wrist(1.1).pitch_per_yaw, rel=0.05)
+
+
+def test_the_right_pulley_ratio_lacks_nothing(tmp_path):
+    assert diagnosed(tmp_path / "right", pulley_ratio=1.0)["findings"] == []
+
+
+def test_the_residual_coupling_is_equation_5():
+    # a carrier angle of a shortens the cable by (d2 - d1) a / 2; the jaw's radius is 2.5 mm
+    expected = -(1.2 - 1.0) * 0.004 / 2 / 0.0025 / 2  # yaw is twice the carrier's angle
+    assert Wrist(1.2).pitch_per_yaw == pytest.approx(expected)
+
+
+def test_a_yaw_alone_turns_the_jaws_of_the_wrong_wrist_along():
+    yaw = 0.5 * np.sin(np.linspace(0.0, 6.0, 4000))
+    asked = np.column_stack([yaw, 0 * yaw, 0 * yaw])
+    for ratio in (1.0, 1.3):
+        wrist = Wrist(ratio)
+        run = play_wrist("yaw", wrist, asked, np.zeros(3), np.random.default_rng(0))
+        slope = np.polyfit(run["yaw_tip_angle_rad"], run["pitch_tip_angle_rad"], 1)[0]
+        assert slope == pytest.approx(wrist.pitch_per_yaw, abs=2e-3)
+        # nothing else moves: the motors of the jaws were not asked to, and grasp stays
+        assert np.abs(run["grasp_tip_angle_rad"]).max() < 0.01
+
+
+def test_designs_are_listed_with_the_most_compact_one(capsys):
+    assert main(["grasper", "designs", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["designs"]) == 27
+    assert told["most_compact"]["drive"] == "carrier"
+    assert told["most_compact"]["planetary"] == {"gear_ratio": 1.0, "sun_over_carrier": 0.0}

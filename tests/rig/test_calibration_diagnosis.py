@@ -1,0 +1,113 @@
+"""What a calibration lacks is told by the same diagnosis as everything else, of each kind."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rig.calibrate.hands import HandledBench, LoadedRdt
+from rig.cli.main import main
+from rig.config import SIMULATED
+
+
+@pytest.fixture
+def rig(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
+    monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        assert main([*words]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    def calibrated(kind, *words, hidden="{}"):
+        """Calibrate a rig without hidden losses but those given."""
+        text = SIMULATED.read_text()
+        text = text.replace("seed = 0", f'seed = 0\nplant = "declared"\nhidden = {hidden}')
+        (tmp_path / "rig.toml").write_text(text)
+        how = ["--operator", "Ada", "--yes", "--json", "--config", "rig.toml", "--out", "raw"]
+        return run("calibrate", kind, *words, *how)["records"]
+
+    calibrated.run = run
+    return calibrated
+
+
+def families(told):
+    return [(f["balance"], f["family"], f["verdict"]) for f in told["findings"]]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "hidden", "family"),
+    [
+        ("gearbox", ["--stiffness-only"], "{ gear_backlash = 1.0 }", "transmission.backlash"),
+        ("encoder", ["--which", "jaw", "--line-only"], "{ jaw_encoder_wave = 1.0 }",
+         "sensor.encoder_inl"),
+        ("current", [], "{ motor_ripple = 1.0 }", "ripple.motor"),
+    ],
+)  # fmt: skip
+def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, family):
+    records = rig(kind, *words, hidden=hidden)
+    wanted = [(f"calibration.{kind}", family, "identified")]
+    digest = next(d for d, r in records.items() if r["channel"] != "jaw_angle_rad")
+    assert families(rig.run("cal", "diagnose", digest, "--json")) == wanted
+    # the same from the folder of raw logs, as any other recordings
+    assert families(rig.run("diagnose", "raw", "--json", "-", "--ledger", "other")) == wanted
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("gearbox", []),
+        ("encoder", ["--which", "jaw"]),
+        ("current", []),
+        ("torque", ["--repeats", "4"]),
+        ("ft", ["--repeats", "3"]),
+    ],
+)
+def test_a_calibration_that_lacks_nothing_is_told_nothing(rig, kind, words):
+    rig(kind, *words)
+    assert families(rig.run("diagnose", "raw", "--json", "-")) == []
+
+
+def test_a_torque_sensor_with_a_kink_is_told_so(rig, monkeypatch):
+    hang = HandledBench.hang
+
+    def kinked(self, sensor, torque_n_m):
+        hang(self, sensor, torque_n_m - 0.03 * max(torque_n_m - 0.12, 0.0))
+
+    monkeypatch.setattr(HandledBench, "hang", kinked)
+    (digest,) = rig("torque", "--repeats", "4")
+    told = families(rig.run("cal", "diagnose", digest, "--json"))
+    assert told == [("calibration.torque", "sensor.gain_nonlinear", "identified")]
+
+
+def test_a_force_sensor_whose_axes_mix_is_told_so(rig, monkeypatch):
+    load = LoadedRdt.load
+
+    def mixed(self, tick):
+        counts = load(self, tick)
+        counts[1] += round(0.01 * 1e6 * self.wrench[0])
+        counts[2] += round(0.01 * 1e6 * self.wrench[1])
+        counts[0] += round(0.01 * 1e6 * self.wrench[2])
+        return counts
+
+    monkeypatch.setattr(LoadedRdt, "load", mixed)
+    (digest,) = rig("ft", "--repeats", "3")
+    told = families(rig.run("cal", "diagnose", digest, "--json"))
+    assert told == [("calibration.ft", "sensor.crosstalk", "identified")]
+
+
+def test_a_gap_that_was_modelled_is_not_told_again(rig):
+    (digest,) = rig("gearbox", hidden="{ gear_backlash = 1.0 }")
+    assert families(rig.run("cal", "diagnose", digest, "--json")) == []
+
+
+def test_only_raw_logs_can_be_diagnosed(rig, capsys):
+    records = rig("current")
+    driver = next(d for d, r in records.items() if r["channel"] == "motor_current_a")
+    assert main(["cal", "diagnose", driver]) == 2
+    assert "spindle_torque_n_m" in capsys.readouterr().err
+    for log in Path("raw").glob("*.mcap"):
+        log.unlink()
+    assert main(["cal", "diagnose", driver]) == 2
+    assert "not where they were" in capsys.readouterr().err

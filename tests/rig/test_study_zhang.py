@@ -1,0 +1,161 @@
+"""`rig study zhang`: seven joints on simulated arms, networks and physical model."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from estimation.arm.wrist import candidates
+from estimation.networks.training import Settings, has_torch
+from rig.cli.study import study_app
+from rig.simulation.arm import draw_arm
+from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrument
+from rig.simulation.psm_grasp import configurations, grasp_and_release
+from rig.simulation.psm_instruments import KINDS
+from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
+from rig.studies import zhang_free, zhang_networks, zhang_physics, zhang_seed
+from rig.studies.zhang import PAPER, run_zhang
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+torch_only = pytest.mark.skipif(
+    not has_torch(), reason="torch is not installed: pip install 'rig[learn]'"
+)
+
+
+@pytest.fixture(scope="module")
+def psm():
+    rng = np.random.default_rng(0)
+    return with_instrument(rng, draw_arm(rng), "CF")
+
+
+def test_shown_torque_is_the_true_one_through_both_couplings(psm):
+    motion = with_gripper(random_path(np.random.default_rng(1), 4.0), 0.3, 0.8)
+    free, held = (
+        simulate(psm, motion, np.random.default_rng(2), grip_n_m=grip, lead=lead_samples())
+        for grip in (None, np.full(len(motion), 0.1))
+    )
+    leaked = np.mean(held.torque - free.torque, axis=0)
+    expected = np.linalg.inv(psm.nominal_coupling).T @ psm.true_coupling.T @ [0, 0, 0, 0.1]
+    np.testing.assert_allclose(leaked[4:], expected[1:], atol=1e-9)
+    assert leaked[GRIPPER] == pytest.approx(0.1, rel=0.4)
+    assert abs(leaked[5]) > 1e-4
+    assert leaked[2] > 0.1
+    np.testing.assert_allclose(leaked[:2], 0, atol=1e-9)
+
+
+def test_paths_keep_to_the_limits_and_a_held_gripper_stays(psm):
+    rng = np.random.default_rng(3)
+    path = random_path(rng, 20.0)
+    limits = np.array([(joint.lower, joint.upper) for joint in psm.table.joints])
+    assert np.all((path >= limits[:, 0]) & (path <= limits[:, 1]))
+    moving = moving_gripper(rng, 20.0, 0.8)
+    assert 0 < moving.min() < 0.1
+    assert moving.max() == pytest.approx(0.8)
+    motion = with_gripper(path, 0.2, 0.8)
+    assert motion.position[0, GRIPPER] == pytest.approx(0.8)
+    assert np.all(motion.position[lead_samples() :, GRIPPER] == 0.2)
+
+
+def test_every_instrument_has_a_nominal_coupling():
+    rng = np.random.default_rng(4)
+    arm = draw_arm(rng)
+    for name in KINDS:
+        psm = with_instrument(rng, arm, name)
+        assert psm.leak.shape == (4, 4)
+        assert 0 < np.abs(psm.leak - np.eye(4)).max() < 0.8
+        assert np.array(psm.table.wrist_coupling).shape == (3, 3)
+
+
+def test_grasps_hold_what_the_paper_holds(psm):
+    rng = np.random.default_rng(5)
+    force = grasp_and_release(rng).force(psm)
+    assert 3.5 < force.max() < 5.0
+    assert force[: 10 * round(RATE_HZ)].max() == 0
+    grasp, place = configurations(rng)
+    held = grasp.force(psm)
+    assert set(place) == {-1, 0, 1, 2, 3, 4}
+    assert held[place == 0].mean() == pytest.approx(3.0, abs=0.1)
+    assert np.ptp([held[place == k].mean() for k in range(5)]) > 0.05
+    wrist = grasp.motion.position[:, WRIST]
+    np.testing.assert_allclose(wrist[place == 1, 1], np.radians(60.0))
+
+
+def test_networks_see_the_gripper_from_joint_3_on():
+    for joint in range(7):
+        names = zhang_networks.input_names(joint, gripper=True)
+        assert any(name.startswith("q7") for name in names) == (joint >= 2)
+        assert not any(name[1] == "7" for name in zhang_networks.input_names(joint, gripper=False))
+
+
+def test_states_look_back_and_never_ahead(psm):
+    run = simulate(
+        psm, with_gripper(random_path(np.random.default_rng(6), 4.0), 0.1, 0.8),
+        np.random.default_rng(7),
+    )  # fmt: skip
+    rows = zhang_networks.states(run, ("q1 0", "q1 10", "v3 5"))
+    np.testing.assert_array_equal(rows[20], [
+        run.position[20, 0], run.position[10, 0], run.velocity[15, 2],
+    ])  # fmt: skip
+    np.testing.assert_array_equal(rows[0], [run.position[0, 0]] * 2 + [run.velocity[0, 2]])
+
+
+def test_free_motion_tells_what_the_coupling_matrix_gets_wrong():
+    rng = np.random.default_rng(1)
+    psm = with_instrument(rng, draw_arm(rng), "CF")
+    runs = []
+    for gripper in (moving_gripper(rng, 60.0, psm.kind.open_rad), 0.0):
+        motion = with_gripper(random_path(rng, 60.0), gripper, psm.kind.open_rad)
+        runs.append(simulate(psm, motion, rng, lead=lead_samples()))
+    tried = [*candidates(psm.table), *zhang_physics.of_long_slips()]
+    wanted = ("wrist drive hysteresis", "cable slip J7", "long slip J3")
+    effects = [effect for effect in tried if effect.name in wanted]
+    found = zhang_physics.fitted(psm.table, effects, runs, network=False).leaks
+    true = psm.leak[1:3, 3] / psm.leak[3, 3]
+    assert np.abs(true).min() > 0.1
+    np.testing.assert_allclose(found[2:], true, atol=0.02)
+
+
+@torch_only
+def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(zhang_free, "MINUTES", 2.8)
+    monkeypatch.setattr(zhang_free, "OTHER_MINUTES", (1.0, 0.3, 0.4))
+    monkeypatch.setattr(zhang_free, "OUR_OTHER_MINUTES", 0.5)
+    monkeypatch.setattr(zhang_networks, "SETTINGS", Settings(nodes=4, iterations=8))
+    monkeypatch.setattr(zhang_networks, "TRANSFER", Settings(nodes=4, iterations=5))
+    monkeypatch.setattr("rig.studies.zhang._each", here)
+    out, state = tmp_path / "zhang.md", tmp_path / "state"
+    words = ["zhang", "--seeds", "1", "--json", "--out", str(out), "--state", str(state)]
+    ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path)])
+    assert ran.exit_code == 0, ran.output
+    (cells,) = json.loads(ran.stdout)["outcomes"]
+    networks, ours = (
+        np.array(cells[f"I | M+C on M | {method}"])
+        for method in (zhang_free.NETWORKS, zhang_free.OURS)
+    )
+    assert np.sum(ours < networks) >= 5
+    assert "wrist drive hysteresis" in json.loads(ran.stdout)["effects"]
+    assert np.all(np.array(cells[f"I | C on M | {zhang_free.NETWORKS}"])[3:] > 1.2 * networks[3:])
+    for name in KINDS:
+        if name != "LND":
+            before, after = (
+                cells[f"II {when} | {name} | {zhang_free.NETWORKS}"][0]
+                for when in ("before", "after")
+            )
+            assert after < before / 2
+    assert "| M+C on M: paper | lost | lost | 6.11 | lost | lost | lost |" in out.read_text()
+    assert (tmp_path / "zhang-grasp.svg").exists()
+    monkeypatch.setattr("rig.studies.zhang._each", nothing_left)
+    again = run_zhang(1, state)
+    assert {cell: list(numbers) for cell, numbers in again.outcomes[0].items()} == cells
+    assert set(PAPER) <= {cell.rsplit(" | ", 1)[0] for cell in cells}
+
+
+def here(seeds, workers):
+    for seed in seeds:
+        yield seed, zhang_seed.one_seed(seed)
+
+
+def nothing_left(seeds, workers):
+    assert seeds == []
+    return iter(())
