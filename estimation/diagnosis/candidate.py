@@ -122,7 +122,8 @@ class Candidate:
         """Say whether runs show it as what it is, and not as something simpler.
 
         A wave of which no run covers a period is a slow change with the angle; a direction that
-        takes half of the usual speed to turn round goes with the speed.
+        takes half of the usual speed to turn round goes with the speed; what fades more slowly than
+        a campaign lasts is a line, or a step.
 
         Args:
             spans: Channel to the widest range that a run covers, and speeds to the usual fast one.
@@ -132,9 +133,11 @@ class Candidate:
         if "order" in shape:
             angle = next(channels[role] for role in ANGLE_ROLES if role in channels)
             return shape["order"] * spans[angle] >= 2 * math.pi
-        if "width" in shape and "speed" in channels:
-            return shape["width"] <= SLOW_TURN * spans[channels["speed"]]
-        return True
+        slow = "width" in shape and "speed" in channels
+        if slow and shape["width"] > SLOW_TURN * spans[channels["speed"]]:
+            return False
+        clock = channels.get("campaign_clock")
+        return clock is None or "time" not in shape or shape["time"] <= spans[clock]
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""

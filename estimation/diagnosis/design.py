@@ -155,17 +155,20 @@ def covered(wanted: Sequence[Candidate], runs: Sequence[Run]) -> list[Candidate]
 def spans_of(wanted: Sequence[Candidate], runs: Sequence[Run]) -> dict[str, float]:
     """Return the widest range that a run covers of each channel that candidates read.
 
-    Of a speed it is the median over the runs of the 95th percentile of its size.
+    Of a speed it is the median over the runs of the 95th percentile of its size, of the campaign's
+    clock the campaign's length.
     """
     of_role = {channel: role for c in wanted for role, channel in c.channels}
-    return {
-        channel: float(
-            np.median([np.percentile(np.abs(run.channels[channel][run.valid]), 95) for run in runs])
-            if role == "speed"
-            else max(np.ptp(run.channels[channel]) for run in runs)
-        )
-        for channel, role in of_role.items()
-    }
+    return {channel: _span(channel, role, runs) for channel, role in of_role.items()}
+
+
+def _span(channel: str, role: str, runs: Sequence[Run]) -> float:
+    if role == "speed":
+        usual = [np.percentile(np.abs(run.channels[channel][run.valid]), 95) for run in runs]
+        return float(np.median(usual))
+    if role == "campaign_clock":
+        return float(max(run.channels[channel].max() for run in runs))
+    return float(max(np.ptp(run.channels[channel]) for run in runs))
 
 
 def tables(

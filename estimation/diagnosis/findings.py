@@ -28,7 +28,7 @@ SAME_CAUSE = 0.9
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
 
-ECHO, LARGER = 0.15, 3.0
+ECHO, LARGER = 0.3, 3.0
 """A claim that removes less than this share of its balance's squared error is not told from the
 echo of a cause in another balance that removes so many times its share there."""
 
@@ -60,12 +60,14 @@ class Told:
         added: What it changes in the estimate.
         story: The story of its balance.
         place: Place of its claim there.
+        share: Share of the squared error in motion that it removes on the confirm runs.
     """
 
     finding: Finding
     added: Added
     story: Story
     place: int
+    share: float
 
     def is_cause_of(self, other: "Told") -> bool:
         """Say whether a finding of another balance is told by this one already."""
@@ -109,6 +111,7 @@ def _findings(story: Story) -> list[Told]:
                 _added(last, now, story.balance.runs),
                 story,
                 k,
+                1.0 - squares(now, story.confirm).sum() / squares(last, story.confirm).sum(),
             )
         )
         last = now
@@ -155,15 +158,9 @@ def echoes(stories: Mapping[str, Story]) -> dict[str, set[int]]:
     small: dict[str, set[int]] = {}
     for told in causes:
         larger = (c for c in causes if c.finding.balance != told.finding.balance)
-        share = _share(told.finding)
-        if share < ECHO and any(_share(c.finding) > LARGER * share for c in larger):
+        if told.share < ECHO and any(c.share > LARGER * told.share for c in larger):
             small.setdefault(told.finding.balance, set()).add(told.place)
     return small
-
-
-def _share(finding: Finding) -> float:
-    """Return the share of the squared error on the confirm runs that a finding removes."""
-    return 1.0 - (finding.rmse_after / max(finding.rmse_before, 1e-300)) ** 2
 
 
 def _causes(stories: Mapping[str, Story]) -> list[Told]:

@@ -44,6 +44,14 @@ def test_a_sign_that_turns_round_over_half_of_the_usual_speed_is_none(width_rad_
     assert bool(covered([friction], [swept(0.1), swept(0.1), swept(0.1, 30.0)])) is shown
 
 
+@pytest.mark.parametrize(("time_s", "shown"), [(300.0, True), (500.0, False)])
+def test_what_fades_more_slowly_than_the_campaign_lasts_is_no_warm_up(time_s, shown):
+    warming = Candidate.of(Term(effect("friction.warmup.campaign")), [time_s, 1.0])
+    run = swept(0.1)
+    late = {**run.channels, "campaign_time_s": np.linspace(380.0, 400.0, 100)}
+    assert bool(covered([warming], [replace(run, channels=late)])) is shown
+
+
 @pytest.mark.parametrize(("place", "limit"), [(0.5, False), (0.8, False), (1.0, True)])
 def test_presliding_over_the_longest_way_is_a_spring(place, limit):
     kind = effect("hysteresis.presliding")

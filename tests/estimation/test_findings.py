@@ -1,7 +1,5 @@
 """When two balances show one fault."""
 
-from dataclasses import replace
-
 import pytest
 
 from estimation.diagnosis import findings
@@ -54,13 +52,13 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
     assert same_fault(gear, motor)
 
 
-@pytest.mark.parametrize(("before", "small"), [(1.02, {"gearbox": {0}}), (1.5, {})])
+@pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.4, {})])
 def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(
-    monkeypatch, before, small
+    monkeypatch, share, small
 ):
-    ripple = finding("motor", "ripple.motor")
-    inertia = replace(finding("gearbox", "inertia.missing"), rmse_before=before)
-    told = [Told(f, {}, None, 0) for f in (ripple, inertia)]
+    ripple = Told(finding("motor", "ripple.motor"), {}, None, 0, 0.9)
+    inertia = Told(finding("gearbox", "inertia.missing"), {}, None, 0, share)
+    told = [ripple, inertia]
     monkeypatch.setattr(findings, "_causes", lambda stories: told)
     assert echoes({}) == small
 
@@ -68,9 +66,9 @@ def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(
 def test_findings_come_in_the_order_found_however_much_each_explains(monkeypatch):
     small, large = finding("motor", "friction.drag"), finding("motor", "ripple.motor")
     told = [  # in the order of what each explains
-        findings.Told(finding("gearbox", "sensor.creep"), {}, None, 0),
-        findings.Told(replace(large, rmse_after=0.1), {}, None, 1),
-        findings.Told(small, {}, None, 0),
+        Told(finding("gearbox", "sensor.creep"), {}, None, 0, 0.9),
+        Told(large, {}, None, 1, 0.8),
+        Told(small, {}, None, 0, 0.1),
     ]
     monkeypatch.setattr(findings, "_causes", lambda _: told)
     listed = findings.one_cause_one_finding({"motor": None, "gearbox": None})
