@@ -68,9 +68,10 @@ def _percent(values: tuple[float, ...] | np.ndarray) -> list[str]:
 def _errors(study: Study) -> TextTable:
     joints = [f"J{k + 1}" for k in range(len(study.thesis))]
     rows = [["thesis, table 3.2 (another robot)", "", *_percent(study.thesis)]]
-    for model in dict.fromkeys(row.model for row in study.rows):
-        for row in study.rows:
-            if row.model == model and row.tested_on in study.paths:
+    on_paths = [row for row in study.rows if row.tested_on in study.paths]
+    for model in dict.fromkeys(row.model for row in on_paths):
+        for row in on_paths:
+            if row.model == model:
                 rows.append([_way(row), str(row.parameters), *_percent(row.nrmsd_percent)])
         rows.append([f"{model}, mean of both", "", *_percent(_mean(study, model))])
     return TextTable(
@@ -80,12 +81,16 @@ def _errors(study: Study) -> TextTable:
 
 def _others(study: Study) -> TextTable:
     joints = [f"J{k + 1}" for k in range(len(study.thesis))]
-    rows = [
-        [_way(row), *_percent(row.nrmsd_percent)]
-        for row in study.rows
-        if row.tested_on not in study.paths
-    ]
-    note = "Nothing was chosen on these runs."
+    rows = []
+    for row in study.rows:
+        if row.tested_on not in study.paths:
+            rows.append([_way(row), *_percent(row.nrmsd_percent)])
+            if row.without_offset_percent is not None:
+                rows.append(["the same, offsets removed", *_percent(row.without_offset_percent)])
+    note = (
+        "Nothing was chosen on these runs. Offsets removed: each joint's mean error, which a zero"
+        " of its current or a spring leaves after a restart."
+    )
     return TextTable("NRMSD on further runs, %", ["model", *joints], rows, note)
 
 
