@@ -1,10 +1,14 @@
 """The study of Piqué 2018 as tables for any medium, and as Markdown."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
+from rig.reports.figures import paired_bars, write_svgs
 from rig.reports.table import TextTable, to_markdown
 from rig.studies.arm_search import DAMPING, LEAST_GAIN
-from rig.studies.pique import EFFECTS, Row, Study
+from rig.studies.pique import EFFECTS, THESIS, Row, Study
 
 TITLE = "Joint torques of a patient-side manipulator: table 3.2 of Piqué 2018, made again"
 
@@ -42,11 +46,26 @@ def tables(study: Study) -> list[TextTable]:
     return [_errors(study), *others, _kept(study), _dropped(study), _parameters(study)]
 
 
-def markdown(study: Study) -> str:
-    """Return the study as a Markdown page."""
+def markdown(study: Study, figures: Sequence[str] = ()) -> str:
+    """Return the study as a Markdown page.
+
+    Args:
+        study: The study.
+        figures: Places of its figures, from where the page will be.
+    """
     parts = [f"# {TITLE}", lead(study), f"Arm: {study.arm}.", *notes(study)]
     parts += [to_markdown(table).rstrip() for table in tables(study)]
+    parts += [f"![]({name})" for name in figures]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+
+
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Write the errors of each joint by the thesis' model and with effects, mean of both ways."""
+    before, after = _mean(study, THESIS), _mean(study, EFFECTS)
+    pairs = {f"J{k + 1}": (before[k], after[k]) for k in range(len(before))}
+    caption = "NRMSD on the path that was not fitted, mean of both directions"
+    bars = paired_bars(pairs, ("thesis' model", "with the effects kept"), "NRMSD, %", caption)
+    return write_svgs(folder, {"pique-joints": bars})
 
 
 def _mean(study: Study, model: str) -> np.ndarray:
