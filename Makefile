@@ -37,6 +37,7 @@ site: $(VENV)/.developing
 
 bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
+	$(BIN)/python docs/figures/diagnosis_cost.py
 
 # resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster,
 # BLIND=--baselines for textbook methods beside it (minutes a case)
@@ -44,8 +45,8 @@ BLIND ?=
 blind: $(VENV)/.developing
 	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md $(BLIND)
 
-# an hour of virtual time, ten minutes on a pty, injected faults, killed recorders; SOAK="soak --virtual 60"
-# for one part or less of it
+# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders;
+# SOAK="soak --virtual 60" for one part or less of it
 SOAK ?=
 soak: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.reliability $(SOAK)

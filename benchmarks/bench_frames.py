@@ -23,7 +23,7 @@ def measure() -> list[Ratio]:
     package, C), `binascii.crc_hqx` (C) and `struct.Struct.unpack` a frame, and one `numpy.array` of
     the tuples at the end.
     """
-    stream = _stream()
+    stream = device_stream()
     if not np.array_equal(_by_loop(stream), _in_bulk(stream)):
         raise AssertionError("the two ways decode different samples")
     loop_s = best_of(lambda: _by_loop(stream))
@@ -32,7 +32,7 @@ def measure() -> list[Ratio]:
     return [Ratio("bulk frame decode over a cobs loop", loop_s / bulk_s, 20.0, detail=detail)]
 
 
-def _stream() -> bytes:
+def device_stream() -> bytes:
     """Return a minute of samples that look like the rig's: many counters, small torques."""
     ticks = np.arange(FRAMES)
     random = np.random.default_rng(1)

@@ -3,22 +3,23 @@
 A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
 and second derivative of `X_angle_rad`, and so in metres of `X_position_m`; `X_rate_n_m_s` is the
 first of `X_n_m`; `X_travel_rad` is how far that angle has come since its lowest value of the last
-`TRAVEL_WINDOW_S`, the state of
-hysteresis after a reversal; `X_fall_a` is how far the channel `X_a` (any unit) is below its highest
-value of that window; `gearbox_differential_rad` is the motor's angle behind the gear ratio less the
+`TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` how long ago that
+value was; `X_rise_a` is what the channel `X_a` (any unit) has gained since the motor's angle was
+lowest, and `X_fall_a` how far it is below its highest value of that window; `X_20ms_ago_a` is its
+value that long ago; `gearbox_differential_rad` is the motor's angle behind the gear ratio less the
 spindle's; `motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is
 the time since the campaign's first run began, put beside the measured channels by `Campaign.timed`,
-and live the time since the first sample. Offline they come from a
-zero-phase filter and a noise-robust derivative, live from a causal filter and backward differences:
-the same names, two sources.
+and live the time since the first sample. Offline they come from a zero-phase filter and a
+noise-robust derivative, live from a causal filter and backward differences: the same names, two
+sources.
 """
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from estimation.channels import UNIT_BY_SUFFIX
 from estimation.filters import (
@@ -32,6 +33,7 @@ from estimation.filters import (
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
+from estimation.window import lowest, since_lowest
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -54,8 +56,12 @@ SLIDES = {"_velocity_m_s": 1, "_acceleration_m_s2": 2}
 """Derivatives of a sliding joint's `_position_m`, and how many times."""
 
 VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
-FALL = "_fall_"
+TURNED, FALL, RISE = "_turned_s", "_fall_", "_rise_"
+AGO = re.compile(r"^(?P<name>.+)_(?P<ms>\d+)ms_ago(?P<unit>_.+)$")
 RATE = "_rate_n_m_s"
+
+TURNING = "motor_angle_rad"
+"""The angle whose lowest value is where the drive last turned."""
 
 TRAVEL_WINDOW_S = 0.5
 """How far back a travel looks, s. Longer memory could tell which run it is in."""
@@ -71,10 +77,14 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
     for name in names:
         if name == GEARBOX:
             needed |= {"motor_angle_rad", "spindle_angle_rad"}
-        elif name.endswith(TRAVEL):
-            needed.add(_travelled(name))
+        elif name.endswith((TRAVEL, TURNED)):
+            needed.add(_turning(name))
         elif FALL in name:
-            needed.add(_fallen(name))
+            needed.add(_plain(name))
+        elif RISE in name:
+            needed |= {_plain(name), TURNING}
+        elif (ago := AGO.match(name)) is not None:
+            needed.add(ago["name"] + ago["unit"])
         elif name == MOTOR_LOAD:
             needed |= {"motor_current_a", "motor_angle_rad"}
         elif name != "time_s":
@@ -82,18 +92,32 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(needed))
 
 
-def _travelled(name: str) -> str:
-    return name.removesuffix(TRAVEL) + "_angle_rad"
+def _turning(name: str) -> str:
+    return name.removesuffix(TRAVEL).removesuffix(TURNED) + "_angle_rad"
 
 
 def fall_of(channel: str) -> str:
     """Return the name of a measured channel's fall: `motor_current_fall_a`."""
+    return FALL.join(_parted(channel))
+
+
+def rise_of(channel: str) -> str:
+    """Return the name of a measured channel's rise: `motor_current_rise_a`."""
+    return RISE.join(_parted(channel))
+
+
+def ago_of(channel: str, ms: int) -> str:
+    """Return the name of a measured channel's value some time ago: `motor_current_20ms_ago_a`."""
+    return f"_{ms}ms_ago_".join(_parted(channel))
+
+
+def _parted(channel: str) -> tuple[str, str]:
     suffix = next(s for s in UNIT_BY_SUFFIX if channel.endswith(f"_{s}"))
-    return channel.removesuffix(f"_{suffix}") + FALL + suffix
+    return channel.removesuffix(f"_{suffix}"), suffix
 
 
-def _fallen(name: str) -> str:
-    return name.replace(FALL, "_")
+def _plain(name: str) -> str:
+    return name.replace(FALL, "_").replace(RISE, "_")
 
 
 def _differentiated(name: str) -> tuple[str, int]:
@@ -112,42 +136,42 @@ def _differentiated(name: str) -> tuple[str, int]:
 def _derive(
     filtered: Mapping[str, FloatArray],
     names: Iterable[str],
+    sample_rate_hz: float,
     derivative: Operator,
-    travel: Operator,
 ) -> dict[str, FloatArray]:
+    """Return the named channels, from filtered ones without gaps."""
+    window = _window(sample_rate_hz)
     channels: dict[str, FloatArray] = {}
     for name in names:
         if name == GEARBOX:
             channels[name] = (
                 filtered["motor_angle_rad"] / GEAR_RATIO - filtered["spindle_angle_rad"]
             )
-            continue
-        if name.endswith(TRAVEL):
-            channels[name] = travel(filtered[_travelled(name)])
-            continue
-        if FALL in name:
-            channels[name] = travel(-filtered[_fallen(name)])
-            continue
-        if name == MOTOR_LOAD:
+        elif name.endswith(TRAVEL):
+            channels[name] = since_lowest(filtered[_turning(name)], window)
+        elif name.endswith(TURNED):
+            angle = filtered[_turning(name)]
+            channels[name] = (np.arange(len(angle)) - lowest(angle, window)) / sample_rate_hz
+        elif FALL in name:
+            channels[name] = since_lowest(-filtered[_plain(name)], window)
+        elif RISE in name:
+            channel = filtered[_plain(name)]
+            channels[name] = channel - channel[lowest(filtered[TURNING], window)]
+        elif (ago := AGO.match(name)) is not None:
+            channel = filtered[ago["name"] + ago["unit"]]
+            back = round(1e-3 * int(ago["ms"]) * sample_rate_hz)
+            channels[name] = channel[np.maximum(np.arange(len(channel)) - back, 0)]
+        elif name == MOTOR_LOAD:
             direction = np.tanh(derivative(filtered["motor_angle_rad"]) / LOAD_WIDTH_RAD_S)
             channels[name] = (
                 LOAD_N_M_A * filtered["motor_current_a"] - LOAD_FRICTION_N_M * direction
             )
-            continue
-        source, times = _differentiated(name)
-        channels[name] = filtered[source]
-        for _ in range(times):
-            channels[name] = derivative(channels[name])
+        else:
+            source, times = _differentiated(name)
+            channels[name] = filtered[source]
+            for _ in range(times):
+                channels[name] = derivative(channels[name])
     return channels
-
-
-def _travel(values: FloatArray, window: int) -> FloatArray:
-    """Return each value less the lowest of itself and the `window - 1` before it."""
-    lowest: FloatArray = ndimage.minimum_filter1d(
-        values, window, mode="nearest", origin=(window - 1) // 2
-    )
-    travelled: FloatArray = np.subtract(values, lowest)
-    return travelled
 
 
 def settled_places(
@@ -197,21 +221,28 @@ def zero_phase_channels(
     filtered = filter_recording(replace(recording, columns=measured), low_pass)
     period_s = 1.0 / recording.sample_rate_hz
     ticks = np.rint((recording.time_s - recording.time_s[0]) / period_s).astype(np.int64)
-
-    def filled(values: FloatArray) -> FloatArray:
-        return np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
-
-    def derivative(values: FloatArray) -> FloatArray:
-        return np.asarray(holoborodko_derivative(filled(values), period_s)[ticks])
-
-    def travel(values: FloatArray) -> FloatArray:
-        window = _window(recording.sample_rate_hz)
-        return np.asarray(_travel(filled(values), window)[ticks])
-
-    columns = _derive(filtered.columns, wanted, derivative, travel)
+    whole = {
+        name: np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
+        for name, values in filtered.columns.items()
+    }
+    derived = _derive(
+        whole,
+        wanted,
+        recording.sample_rate_hz,
+        lambda values: np.asarray(holoborodko_derivative(values, period_s)),
+    )
+    columns = {name: values[ticks] for name, values in derived.items()}
     if CAMPAIGN_TIME in names:
         columns[CAMPAIGN_TIME] = recording[CAMPAIGN_TIME]
     return replace(filtered, columns=columns)
+
+
+def looks_back(names: Iterable[str]) -> bool:
+    """Say whether a channel needs the samples of the last `TRAVEL_WINDOW_S`."""
+    return any(
+        name.endswith((TRAVEL, TURNED)) or FALL in name or RISE in name or AGO.match(name)
+        for name in names
+    )
 
 
 def _window(sample_rate_hz: float) -> int:
@@ -247,8 +278,7 @@ class CausalChannels:
         self._first_time_s: float | None = None
         self._last_time_s: float | None = None
         self._last_row: FloatArray = np.empty(0)
-        travels = any(name.endswith(TRAVEL) or FALL in name for name in self.names)
-        self._kept = max(2, _window(sample_rate_hz) if travels else 0)
+        self._kept = max(2, _window(sample_rate_hz) if looks_back(self.names) else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
         derived = {name: _differentiated(name) for name in self.names if tracked}
         self._tracked = {
@@ -316,8 +346,8 @@ class CausalChannels:
         derived = _derive(
             dict(zip(self.measured, lined.T, strict=True)),
             [name for name in self.names if name not in CLOCKS and name not in self._tracked],
+            self._rate_hz,
             self._backward,
-            lambda values: _travel(values, _window(self._rate_hz)),
         )
         at = ticks[1:] + self._kept - 1  # tick 1 is the first row after the history
         channels = {name: values[at] for name, values in derived.items()}

@@ -4,6 +4,9 @@ The drive knows torque and position; guards, position loop, queue of setpoints a
 logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to a
 logger like any other. What a board does better: a pause of this computer is a pause of the position
 loop; the drive then keeps its last torque until its own watch on this computer's heartbeat ends it.
+
+In virtual time a tick is run whenever somebody reads. In real time the ticks have a process of
+their own (`rig.canopen_process`), so that they wait for nobody.
 """
 
 import numpy as np
@@ -11,19 +14,21 @@ from numpy.typing import NDArray
 
 from drivers.epos4.driver import Epos4
 from drivers.errors import LinkLostError
+from drivers.teensy.control import PREVIOUS_MOTOR_COUNT
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.guard import (
     COLUMNS,
     COMMAND_E4,
     CURRENT,
     MOTOR,
+    MOTOR_WATCH,
     SPINDLE,
     Drive,
     drive_tick,
 )
 from drivers.teensy.protocol import MISSING
 from drivers.teensy.reference import TICK_US
-from drivers.teensy.watches import STATE, is_in_force
+from drivers.teensy.watches import LAST_MOTOR, PRIMED, STATE, is_in_force, judge_by_time
 from drivers.transport.can_bus import CanBus
 
 SERIAL_PREFIX = "EPOS4-"
@@ -52,6 +57,8 @@ class Epos4Bench:
         self._missed = 0
         self._powered = False
         self._lost = 0
+        self._measured_s: float | None = None
+        self._ticks_since = 1.0
 
     def advance(
         self,
@@ -67,6 +74,8 @@ class Epos4Bench:
             missing = self._missed >= MOST_MISSED
             row[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
             row[CURRENT] = self._current_ma
+            if not missing:
+                self._judge_by_time(drive)
             drive_tick(row, target[k], load_ma[k], *drive.arrays)
             self._command(int(row[COMMAND_E4]), is_in_force(drive.guard[STATE]))
         return rows
@@ -89,6 +98,13 @@ class Epos4Bench:
         self._device.disarm()
         self._powered = False
 
+    def _judge_by_time(self, drive: Drive) -> None:
+        """Let guard and controller see the way of one tick where more time than that has passed."""
+        if drive.guard[PRIMED]:
+            watch = drive.guard[MOTOR_WATCH:]
+            judge_by_time(watch, self._position_count, self._ticks_since)
+            drive.control_state[PREVIOUS_MOTOR_COUNT] = watch[LAST_MOTOR]
+
     def _measure(self) -> None:
         """Wait for the next SYNC and take the drive's answer, if there is one."""
         batch = self._device.read(ANSWER_S)
@@ -99,6 +115,10 @@ class Epos4Bench:
             self._missed = 0
             self._position_count = int(batch.columns["position_count"][-1])
             self._current_ma = round(1000 * float(batch.columns["motor_current_a"][-1]))
+            now_s = float(batch.time_s[-1])
+            since_s = 0.0 if self._measured_s is None else now_s - self._measured_s
+            self._measured_s = now_s
+            self._ticks_since = since_s * 1e6 / TICK_US
         else:
             self._missed += 1
 
@@ -115,9 +135,10 @@ class CanopenLogger:
     Args:
         device: The drive; identified and started here, closed with this.
         bus: The bus it is on, for its clock.
+        late_s: How late a tick may be and still be run, as its drive's `late_s`.
     """
 
-    def __init__(self, device: Epos4, bus: CanBus) -> None:
+    def __init__(self, device: Epos4, bus: CanBus, late_s: float = 0.0) -> None:
         self._device = device
         self._bus = bus
         self._closed = False
@@ -127,7 +148,9 @@ class CanopenLogger:
         self.bench.release()  # an earlier program may have left it in force
         self._board = TeensyFake(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
         self._began_s = bus.now_s
+        self._late = round(late_s * 1e6) // TICK_US
         self._ticks = 0
+        self._newest_us = 0
 
     @property
     def url(self) -> str:
@@ -165,6 +188,21 @@ class CanopenLogger:
             self.bench.follow(after)
             self._missed_while_busy()
 
+    def take(self) -> bytes:
+        """Give the bytes that wait for the host."""
+        return self._board.transmit()
+
+    def run(self, duration_s: float) -> None:
+        """Run the ticks that are due in this time.
+
+        Raises:
+            DriverError: The drive has a fault, is silent, or its bus is gone.
+        """
+        self._require_link()
+        end_s = self._bus.now_s + duration_s
+        while self._bus.now_s < end_s:
+            self._tick()
+
     def close(self) -> None:
         """Disarm where the drive may be armed, and let go of the bus.
 
@@ -177,15 +215,21 @@ class CanopenLogger:
 
     def _tick(self) -> None:
         self._missed_while_busy()
-        self._board.advance(1)
+        self._device.idle(self._device.wait_s)
+        # each sample has the time it was really asked for, however late that was
+        now_us = round(self._bus.now_s * 1e6)
+        self._newest_us = max(now_us, self._newest_us + 1)
+        self._board.set_clock(self._newest_us)
         self._ticks += 1
+        self._board.advance(1)
 
     def _missed_while_busy(self) -> None:
-        """Let the logic's clock follow the bus's: ticks nobody ran are lost, and numbered."""
+        """Number the ticks that are too late to be run; they are lost."""
         due = round((self._bus.now_s - self._began_s) * 1e6) // TICK_US
-        if due > self._ticks + 1:
-            self._board.skip(due - self._ticks - 1)
-            self._ticks = due - 1
+        missed = due - self._late - self._ticks - 1
+        if missed > 0:
+            self._board.skip(missed)
+            self._ticks += missed
 
     def _require_link(self) -> None:
         if self._closed:

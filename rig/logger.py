@@ -5,6 +5,13 @@ from rig.config import Config
 
 PTY_URL = "sim://pty"
 """The firmware as a process, in real time."""
+VIRTUAL_CAN_URL = "sim://virtual-can"
+"""The fake of an EPOS4 on a virtual bus of python-can, in real time."""
+
+
+def is_real_time(config: Config) -> bool:
+    """Say whether the logger samples by itself, as time passes."""
+    return not config.is_simulated or config.logger.url in (PTY_URL, VIRTUAL_CAN_URL)
 
 
 def open_logger(
@@ -48,17 +55,10 @@ def open_logger(
 
 def _open_canopen_logger(config: Config) -> Transport:
     """Return the link to a logger's logic on an EPOS4."""
-    if config.is_simulated:
+    if config.is_simulated and config.logger.url != VIRTUAL_CAN_URL:
         from rig.simulation.canopen import open_simulated_canopen
 
         return open_simulated_canopen(config)
-    from drivers.epos4.driver import Epos4
-    from drivers.transport.python_can import open_can
-    from rig.canopen_logger import CanopenLogger
+    from rig.canopen_process import CanopenProcess
 
-    bus = open_can(config.logger.url)
-    try:
-        return CanopenLogger(Epos4(bus, **config.logger.options), bus)
-    except BaseException:
-        bus.close()
-        raise
+    return CanopenProcess(config)

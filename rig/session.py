@@ -23,9 +23,9 @@ from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.companions import Companion, open_companions
 from rig.config import Config
-from rig.errors import RigError, SafetyTripError
+from rig.errors import RigError, SafetyTripError, UsageError
 from rig.interrupts import leaving_safely
-from rig.logger import PTY_URL
+from rig.logger import is_real_time
 from rig.machines.choose import machine_of
 from rig.reading import Reading, reading_of, with_setpoints
 from rig.safety import check_samples
@@ -74,9 +74,7 @@ class Session:
         self.here: tuple[float, ...] = ()
         """Where it stood in the newest sample: what its setpoints ask for, rad."""
         self._watch: HostWatch | None = None
-        self._gathers = config.logger.url == PTY_URL or not (
-            config.is_simulated or config.logger.driver == "epos4"
-        )
+        self._gathers = is_real_time(config)
         self._read_s = self._clock_due_s = -np.inf
         self.newest_tick_us = 0
         self.companions: list[Companion] = []
@@ -159,9 +157,16 @@ class Session:
                 of yaw, jaw 1 and jaw 2, rad.
 
         Raises:
+            UsageError: The motion is for another kind of rig.
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
+        if len(setpoints) != len(self.machine.setpoint_channels):
+            raise UsageError(
+                f"{self.config.name} takes {', '.join(self.machine.setpoint_channels)}.",
+                f"The motion has {len(setpoints)} of them: it is for another kind of rig.",
+                "Choose a configuration with another [logger] profile.",
+            )
         self.machine.check_setpoints(self.config, setpoints)
         most = self.machine.profile.max_setpoints
         blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]
@@ -184,6 +189,7 @@ class Session:
         lead = round(LEAD_S * self.machine.profile.rate_hz)
         board = self.machine.board_limits(self.config, self.calibrations)
         self._watch = HostWatch(board, self.machine)
+        self._watch.prepare()
         self._logger.arm(self.machine.gains(self.config), board)
         queued = played = 0
         is_over = False

@@ -1,6 +1,7 @@
 """What tripped, in words: what happened, how late, how to clear it; and the host's own watch."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.teensy.profile import ArmLimits
@@ -128,6 +129,12 @@ class HostWatch:
         self._limits = limits.as_array()
         self._machine = machine
         self._guard = machine.guard().guard
+        self._newest_us: int | None = None
+
+    def prepare(self) -> None:
+        """Compile what `check` runs: the first time that takes longer than a board waits."""
+        no_rows = np.empty((0, len(self._machine.profile.input_names)), np.int32)
+        self._machine.first_crossing(no_rows, np.empty(0), self._guard, self._limits)
 
     def check(self, reading: Reading) -> TripReport | None:
         """Return the first crossing in the armed samples, None when there is none."""
@@ -138,9 +145,18 @@ class HostWatch:
         names = self._machine.profile.input_names
         rows = np.stack([samples[name].astype(np.int32) for name in names], axis=1)
         row, code, channel, value, limit, late_us = self._machine.first_crossing(
-            rows, self._guard, self._limits
+            rows, self._ticks(samples["tick_us"]), self._guard, self._limits
         )
         if code == Trip.NONE:
             return None
         tick_us = int(samples["tick_us"][row])
         return TripReport(Trip(code), names[channel], value, limit, tick_us, late_us)
+
+    def _ticks(self, tick_us: NDArray[np.uint32]) -> NDArray[np.float64]:
+        """Return the ticks between each sample and the one before it, by the board's clock."""
+        before = int(tick_us[0]) if self._newest_us is None else self._newest_us
+        self._newest_us = int(tick_us[-1])
+        clock = np.concatenate(([before], tick_us)).astype(np.uint32)
+        steps = (clock[1:] - clock[:-1]).astype(np.float64)  # it wraps
+        ticks: NDArray[np.float64] = steps / self._machine.profile.tick_us
+        return ticks

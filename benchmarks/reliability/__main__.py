@@ -1,9 +1,9 @@
 """Measure how reliable the rig is and write the table.
 
-`python -m benchmarks.reliability [soak pty faults kills fuzz] [--virtual S] [--real S]
-[--faults N] [--kills N]`: the parts named, all if none. Each part's figures are kept in
-`build/reliability.json`, and the table is written from all that are there. A part that was not
-measured in this checkout keeps the rows it has in the table; one that never was says so.
+`python -m benchmarks.reliability [soak pty canopen faults kills fuzz] [--virtual S] [--real S]
+[--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's figures are
+kept in `build/reliability.json`, and the table is written from all that are there. A part that was
+not measured in this checkout keeps the rows it has in the table; one that never was says so.
 """
 
 import argparse
@@ -22,15 +22,17 @@ from rig.reports.provenance import Provenance
 
 STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
-PARTS = ("soak", "pty", "faults", "kills", "fuzz")
+PARTS = ("soak", "pty", "canopen", "faults", "kills", "fuzz")
 OF_PART = {
     "soak": r"firmware core, ",
     "pty": r"firmware process ",
+    "canopen": r"EPOS4 fake ",
     "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
     "kills": r"\d+ recorders killed",
     "fuzz": r"fuzzed decoders",
 }
 """How the figures of a part's rows begin."""
+_GOALS_S = {"soak": 3600, "pty": 600, "canopen": 60}
 SAFE_S, WATCHDOG_S = 0.020, 0.052
 
 
@@ -40,6 +42,7 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--virtual", type=float, default=3600.0, help="virtual seconds")
     parser.add_argument("--real", type=float, default=600.0, help="real seconds on a pty")
+    parser.add_argument("--canopen", type=float, default=60.0, help="real seconds on a CAN bus")
     parser.add_argument("--faults", type=int, default=1000, help="faults injected")
     parser.add_argument("--kills", type=int, default=200, help="recorders killed")
     options = parser.parse_intermixed_args()
@@ -102,6 +105,9 @@ def _kills(options: argparse.Namespace) -> dict[str, Any]:
 _MEASURES = {
     "soak": lambda o: asdict(soak.soak("simulated", o.virtual, "firmware core, virtual time")),
     "pty": lambda o: asdict(soak.soak("pty", o.real, "firmware process on a pty, real time")),
+    "canopen": lambda o: asdict(
+        soak.soak("canopen_virtual", o.canopen, "EPOS4 fake on a virtual CAN bus, real time")
+    ),
     "faults": _faults,
     "kills": _kills,
 }
@@ -114,6 +120,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
     parts = {
         "soak": _soak_rows(figures.get("soak"), "soak"),
         "pty": _soak_rows(figures.get("pty"), "pty"),
+        "canopen": _soak_rows(figures.get("canopen"), "canopen"),
         "faults": _fault_rows(figures.get("faults")),
         "kills": _kill_rows(figures.get("kills")),
         "fuzz": _fuzz_rows(tallies),
@@ -168,7 +175,7 @@ def _row(what: str, measured: str, goal: str, met: bool) -> tuple[str, str, str,
 def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str, str]]:
     if s is None:
         return [(part, "not measured", "", "**no**")]
-    goal_s = 3600 if part == "soak" else 600
+    goal_s = _GOALS_S[part]
     rows = [
         _row(
             f"{s['where']}: samples lost",
@@ -178,14 +185,15 @@ def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str,
             s["lost"] == 0 and s["duration_s"] >= 0.99 * goal_s,
         )
     ]
+    speed = s["duration_s"] / s["elapsed_s"]
     if part == "soak":
-        speed = s["duration_s"] / s["elapsed_s"]
         return [*rows, (f"{s['where']}: speed", f"{speed:.0f} times real time", "", "")]
     p50, p99, p999, top = s["latency_ms"]
     told = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
     share = f"{100 * s['processor_ratio']:.1f} % of a core"
     return [
         *rows,
+        _row(f"{s['where']}: pace", f"{speed:.3f} times real time", "1", speed > 0.99),
         (f"{s['where']}: latency p50 / p99 / p99.9 / max", told, "", ""),
         _row(f"{s['where']}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
     ]

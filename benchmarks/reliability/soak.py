@@ -1,4 +1,4 @@
-"""An hour of virtual time with the firmware core in the loop; real time on a pseudo-terminal."""
+"""An hour of virtual time with the firmware in the loop; real time on a pty and on a CAN bus."""
 
 import time
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.config import load_config
-from rig.logger import open_logger
+from rig.logger import is_real_time, open_logger
 from rig.session import Session
 
 PERIOD_S = 4.0
@@ -43,7 +43,8 @@ class Soak:
 def soak(config_name: str, duration_s: float, where: str) -> Soak:
     """Play slow grasps for a while, a block of a minute after another."""
     config = load_config(Path(config_name))
-    real = config_name == "pty"
+    real = is_real_time(config)
+    load_a = min(0.2, config.reference_limits.load_command_a)
     if real:  # what is measured is what gets lost, also when a shared machine is late
         config = config.changed(safety={"watchdog_s": 1.0})
     late_ms: list[np.ndarray] = []
@@ -55,9 +56,8 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
         start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
         phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
         for _ in range(max(1, blocks)):
-            for reading in session.play(
-                start + 0.3 * (1 - np.cos(phase)), np.full(phase.size, 0.2)
-            ):
+            grasps = start + 0.3 * (1 - np.cos(phase))
+            for reading in session.play(grasps, np.full(phase.size, load_a)):
                 samples += len(reading)
                 if real:  # the process stamps by the clock this program reads, in 32 bits
                     now_us = time.monotonic_ns() // 1000

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 FEEDBACK_TIMEOUT_S = 0.01
 """Time for the answer to a SYNC; it takes a fraction of a millisecond on the wire."""
+SPACING = 0.4
+"""Least time between two SYNCs of which one was late, in periods."""
 STATE_TIMEOUT_S = 0.8
 _INSTANT_S = 1e-9
 DRIVE_HEARTBEAT_MS = 100
@@ -49,6 +51,8 @@ class Epos4:
         node_id: The drive's node number.
         rate_hz: How often SYNC is sent.
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
+        late_s: How late a SYNC may be and still be sent; later ones are counted as lost. Late ones
+            follow each other at a higher rate until the schedule is met again.
     """
 
     name = "epos4"
@@ -59,6 +63,7 @@ class Epos4:
         node_id: int = 1,
         rate_hz: float = 1000.0,
         host_timeout_ms: int = 250,
+        late_s: float = 0.0,
     ) -> None:
         if not 1 <= node_id < HOST_NODE:
             raise ValueError(f"a drive's node number lies in 1..{HOST_NODE - 1}, not {node_id}")
@@ -70,6 +75,8 @@ class Epos4:
         self._node_id = node_id
         self._rate_hz = rate_hz
         self._host_timeout_ms = host_timeout_ms
+        self._late_s = late_s
+        self._synced_s = -np.inf
         self._link = _link(bus, node_id)
         self._counters = DeviceCounters()
         self._schedule = PollSchedule(rate_hz, self._counters)
@@ -227,11 +234,11 @@ class Epos4:
             LinkTimeoutError: The drive's heartbeat is missing; every reading says so while it is.
         """
         ratings = self.ratings
-        self._idle(min(self._schedule.wait_s(self._bus.now_s), timeout_s))
+        self._idle(min(self.wait_s, timeout_s))
         now_s = self._bus.now_s
-        if self._schedule.wait_s(now_s) > 0 or not self._started:
+        if self.wait_s > 0 or not self._started:
             return self._batch(ratings, None)
-        self._schedule.skip_missed(now_s)
+        self._schedule.skip_missed(now_s - self._late_s)
         feedback = self._exchange()
         if feedback is None:
             self._schedule.lose()
@@ -242,6 +249,19 @@ class Epos4:
         self._counters.frames += 1
         self._require_operation(feedback)
         return self._batch(ratings, feedback)
+
+    @property
+    def wait_s(self) -> float:
+        """Time until the next SYNC is due, 0 when it is."""
+        return self._schedule.wait_s(self._bus.now_s)
+
+    def idle(self, wait_s: float) -> None:
+        """Serve the bus for a while, the host's heartbeat among it.
+
+        Raises:
+            LinkLostError: The bus is gone.
+        """
+        self._idle(wait_s)
 
     def clear_fault(self) -> None:
         """Reset a fault whose cause is gone; the power stage stays off.
@@ -388,6 +408,9 @@ class Epos4:
         if self._armed:
             command = protocol.encode_command(protocol.ENABLE_OPERATION, self._target)
             self._link.send(0x200 + self._node_id, command)
+        while self._late_s and self._bus.now_s < self._synced_s + SPACING / self._rate_hz:
+            self._link.pump(0.0)  # not asleep: who is late already would wake up later still
+        self._synced_s = self._bus.now_s
         self._link.send(0x80)
         give_up_s = self._bus.now_s + FEEDBACK_TIMEOUT_S
         while True:

@@ -151,6 +151,10 @@ class TeensyFake:
         """Whether the motors are, or may any moment be, given current."""
         return is_in_force(self._state)
 
+    def set_clock(self, tick_us: int) -> None:
+        """Say what the board's clock will show at the next tick, where ticks are not regular."""
+        self._next_tick_us = tick_us % 2**32
+
     def skip(self, ticks: int) -> None:
         """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
         self._queued = self._queued[ticks:]

@@ -40,6 +40,7 @@ from drivers.teensy.watches import (
     STATE,
     TICKS,
     TRIP_CHANNEL,
+    judge_by_time,
     motor_crossing,
     note_trip,
     sensor_crossing,
@@ -217,10 +218,16 @@ def _prime(guard, row):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def first_crossing(
-    rows: NDArray[np.int32], guard: NDArray[np.int64], limits: NDArray[np.int64]
+    rows: NDArray[np.int32],
+    ticks: NDArray[np.float64],
+    guard: NDArray[np.int64],
+    limits: NDArray[np.int64],
 ) -> tuple[int, int, int, int, int, int]:
     """Hold the limits against rows of inputs; see `drivers.teensy.guard.first_crossing`."""
     for k in range(len(rows)):
+        for motor in range(MOTORS if guard[PRIMED] else 0):
+            watch = guard[MOTOR_WATCH + MOTOR_PLACES * motor :]
+            judge_by_time(watch, np.int64(rows[k, MOTOR + motor]), ticks[k])
         code, channel, value, limit, late_us = _check(guard, limits, rows[k])
         if code != NONE:
             return k, code, channel, value, limit, late_us

@@ -32,6 +32,7 @@ from drivers.teensy.watches import (
     STATE,
     TICKS,
     TRIP_CHANNEL,
+    judge_by_time,
     motor_crossing,
     note_trip,
     sensor_crossing,
@@ -220,12 +221,16 @@ def _check(guard, limits, row):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def first_crossing(
-    rows: NDArray[np.int32], guard: NDArray[np.int64], limits: NDArray[np.int64]
+    rows: NDArray[np.int32],
+    ticks: NDArray[np.float64],
+    guard: NDArray[np.int64],
+    limits: NDArray[np.int64],
 ) -> tuple[int, int, int, int, int, int]:
     """Hold the limits against rows of inputs, for a host that repeats what the board does.
 
     Args:
         rows: Inputs as counts, shape (n, at least 6).
+        ticks: Ticks between each and the one before it, more where samples were lost or late.
         guard: State of the guard, carried from call to call.
         limits: `Limits.as_array`.
 
@@ -234,6 +239,8 @@ def first_crossing(
         when there is none.
     """
     for k in range(len(rows)):
+        if guard[PRIMED]:
+            judge_by_time(guard[MOTOR_WATCH:SENSOR_WATCH], np.int64(rows[k, MOTOR]), ticks[k])
         code, channel, value, limit, late_us = _check(guard, limits, rows[k])
         if code != NONE:
             return k, code, channel, value, limit, late_us

@@ -49,6 +49,8 @@ MAX_STALL, MAX_SATURATED, MAX_STALE, WATCHDOG_US, SAFE_STATE, HOLD_COMMAND = ran
 """Places of a motor's limits, and of the choice every profile's limits end with."""
 
 OVER_SPEED_TICKS = 3
+LONG_TICK = 1.5
+"""Ticks since the last sample from which on a motor's way is judged by the time that has passed."""
 NO_CHANNEL = 255
 NONE = int(Trip.NONE)
 _HOST_SILENT = int(Trip.HOST_SILENT)
@@ -134,6 +136,19 @@ def sensor_crossing(watch, limits, tick_us, counts, first, low, high):  # type: 
         if same >= limits[MAX_STALE]:
             return _SENSOR_STALE, first + k, count, limits[MAX_STALE], same * tick_us
     return NONE, NO_CHANNEL, 0, 0, 0
+
+
+@numba.njit(cache=True)
+def judge_by_time(watch, motor, ticks):  # type: ignore[no-untyped-def]
+    """Let a motor's watch see the way of one tick where more time than that has passed.
+
+    Args:
+        watch: State of this motor's watch, changed in place.
+        motor: Its encoder now.
+        ticks: Ticks since the last sample.
+    """
+    if ticks > LONG_TICK:
+        watch[LAST_MOTOR] = motor - round((motor - watch[LAST_MOTOR]) / ticks)
 
 
 @numba.njit(cache=True)

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from estimation.recording import FloatArray
 
@@ -29,6 +30,10 @@ class Settings:
 
     ridge: float = 1e-4
     offset_share: float = 0.5
+
+
+CHOICES = tuple(Settings(ridge, share) for ridge in (3e-5, 3e-4) for share in (0.0, 0.5))
+"""Settings that `chosen` chooses from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,36 +66,98 @@ class Normal:
         return Normal(self.count, self.gram, self.cross[:, one], self.mean, self.target[one])
 
 
-def spread(runs: Sequence[Normal]) -> FloatArray:
-    """Return the standard deviation of each column over all samples, shape (p,).
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Sums over runs: all that a fit needs of them, so that fits without some runs are cheap.
 
-    It is infinite where a column does not vary, and 1 for the first column, the constant.
+    Attributes:
+        count: Samples.
+        total: Sum of the rows of X, shape (p,).
+        gram: X'X, shape (p, p).
+        cross: X'Y, shape (p, targets).
+        between: The share of `gram` that is the runs' means', shape (p, p).
+        between_cross: The share of `cross` that is the runs' means', shape (p, targets).
     """
-    count = sum(run.count for run in runs)
-    mean = np.sum([run.count * run.mean for run in runs], axis=0) / count
-    variance = np.diag(np.sum([run.gram for run in runs], axis=0)) / count - mean**2
-    found = np.sqrt(np.where(variance > 1e-12 * np.maximum(mean**2, 1.0), variance, np.inf))
-    found[0] = 1.0
-    return np.asarray(found)
+
+    count: int
+    total: FloatArray
+    gram: FloatArray
+    cross: FloatArray
+    between: FloatArray
+    between_cross: FloatArray
+
+    @classmethod
+    def of(cls, runs: Sequence[Normal]) -> "Pool":
+        """Sum over runs, none of them empty."""
+        counts = np.array([run.count for run in runs], dtype=np.float64)
+        means = np.array([run.mean for run in runs])
+        targets = np.array([run.target for run in runs])
+        return cls(
+            sum(run.count for run in runs),
+            counts @ means,
+            np.sum([run.gram for run in runs], axis=0),
+            np.sum([run.cross for run in runs], axis=0),
+            (means.T * counts) @ means,
+            (means.T * counts) @ targets,
+        )
+
+    def without(self, part: "Pool") -> "Pool":
+        """Return the sums over the other runs."""
+        return Pool(
+            self.count - part.count,
+            self.total - part.total,
+            self.gram - part.gram,
+            self.cross - part.cross,
+            self.between - part.between,
+            self.between_cross - part.between_cross,
+        )
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviation of each column over all samples, shape (p,).
+
+        It is infinite where a column does not vary, and 1 for the first column, the constant.
+        """
+        mean = self.total / self.count
+        variance = np.diag(self.gram) / self.count - mean**2
+        found = np.sqrt(np.where(variance > 1e-12 * np.maximum(mean**2, 1.0), variance, np.inf))
+        found[0] = 1.0
+        return np.asarray(found)
 
 
-def solve(runs: Sequence[Normal], settings: Settings) -> FloatArray:
+def solve(pool: Pool, settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
 
     A column that does not vary gets no weight.
 
     Args:
-        runs: The runs to fit, none of them empty.
+        pool: The runs to fit.
         settings: How.
     """
-    share = settings.offset_share
-    gram = np.sum([r.gram - share * r.count * np.outer(r.mean, r.mean) for r in runs], axis=0)
-    cross = np.sum([r.cross - share * r.count * np.outer(r.mean, r.target) for r in runs], axis=0)
-    scale = spread(runs)
-    penalty = np.full(len(scale), settings.ridge * sum(run.count for run in runs))
+    share, scale = settings.offset_share, pool.spread
+    penalty = np.full(len(scale), settings.ridge * pool.count)
     penalty[0] = 0.0
-    scaled = gram / np.outer(scale, scale) + np.diag(penalty)
-    return np.asarray(np.linalg.solve(scaled, cross / scale[:, None]) / scale[:, None])
+    gram = (pool.gram - share * pool.between) / np.outer(scale, scale) + np.diag(penalty)
+    cross = (pool.cross - share * pool.between_cross) / scale[:, None]
+    return np.asarray(linalg.solve(gram, cross, assume_a="pos") / scale[:, None])
+
+
+def chosen(whole: Pool, folds: Sequence[Pool]) -> Settings:
+    """Return the settings of the least error on runs left out of the fit in turn.
+
+    Args:
+        whole: The runs to fit, of one target; nothing else is looked at.
+        folds: The same runs in parts.
+    """
+
+    def loss(settings: Settings) -> float:
+        total = 0.0
+        for part in folds:  # the squared error, but for the target's own square
+            weights = solve(whole.without(part), settings)[:, 0]
+            total += float(weights @ part.gram @ weights - 2 * weights @ part.cross[:, 0])
+        return total
+
+    return min(CHOICES, key=loss)
 
 
 def pull(

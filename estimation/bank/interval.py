@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.bank.fitting import Normal, Settings, solve
+from estimation.bank.fitting import Normal, Pool, Settings, solve
 from estimation.bank.states import Bank, Product
 from estimation.recording import FloatArray
 
@@ -73,6 +73,26 @@ class Interval:
         )
 
 
+def rescaled(
+    source: Interval,
+    designs: Sequence[FloatArray],
+    residuals: Sequence[FloatArray],
+    coverage: float = COVERAGE,
+) -> Interval:
+    """Return an interval of the same shape that covers a few runs' errors; never a narrower one.
+
+    Args:
+        source: The interval before.
+        designs: Design of each run, shape (n, size).
+        residuals: Error of each run, shape (n,).
+        coverage: The share, raised for few runs as in `calibrate`: up to 19 runs, all of them.
+    """
+    widths = np.concatenate([source.half_width(design) for design in designs])
+    level = min(coverage * (1 + 1 / len(designs)), 1.0)
+    factor = max(float(np.quantile(np.abs(np.concatenate(residuals)) / widths, level)), 1.0)
+    return Interval(source.columns, factor * source.weights, factor * source.least)
+
+
 def calibrate(
     bank: Bank,
     designs: Sequence[FloatArray],
@@ -91,7 +111,7 @@ def calibrate(
     sizes = [np.abs(residual) for residual in residuals]
     parts = [design[:, columns] for design in designs]
     runs = [Normal.of(part, size[:, None]) for part, size in zip(parts, sizes, strict=True)]
-    weights = solve(runs, Settings(offset_share=0.0))[:, 0]
+    weights = solve(Pool.of(runs), Settings(offset_share=0.0))[:, 0]
     size = np.concatenate(sizes)
     least = NARROWEST * float(size.mean())
     width = np.maximum(np.concatenate(parts) @ weights, least)

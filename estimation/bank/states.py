@@ -9,9 +9,15 @@ States, t the motor's travel since the lowest angle of that window:
 
 - `q` spindle angle, `c` surrogate of the load, `v` speed, `a` acceleration, `i` inverse speed, `d`
   how far the surrogate is below its highest value of the window;
+- `l5` to `l480`: the load so many ms ago. Friction that comes and goes with teeth and balls is in
+  the load now, and less in what it was on other teeth;
 - `k1` to `k4`: min(t, r) / r, r = 1 to 4 rad, and `n1` to `n3`: the same with r in proportion to
   the load. Both are Prandtl's stop operators after a reversal, the elements of a Maxwell-slip model
-  of presliding friction; the second ones for friction that grows with the cable's tension;
+  of presliding friction; the second ones for friction that grows with the cable's tension. A drive
+  that has not turned within the window has slid, however slowly it went, so t grows as the turning
+  point leaves the window;
+- `h2`, `h4`: what the load has risen since the motor turned, while t is below 2 and 4 rad: a jaw
+  that sticks takes up the drive's changes;
 - `p` pose of the wrist, where there is one.
 
 Sources: F. Al-Bender, V. Lampaert, J. Swevers, "The generalized Maxwell-slip model", IEEE
@@ -27,10 +33,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimation.derived import GEAR_RATIO, fall_of
+from estimation.derived import GEAR_RATIO, TRAVEL_WINDOW_S, ago_of, fall_of, rise_of
 from estimation.recording import FloatArray
 
-STATES = ("q", "c", "v", "a", "i", "d", "k1", "k2", "k3", "k4", "n1", "n2", "n3", "p")
+LAGS_MS = (5, 10, 20, 40, 80, 150, 300, 480)
+LAGS = tuple(f"l{ms}" for ms in LAGS_MS)
+RISES = ("h2", "h4")
+STATES = (
+    "q", "c", "v", "a", "i", "d", "k1", "k2", "k3", "k4", "n1", "n2", "n3", "p", *RISES, *LAGS,
+)  # fmt: skip
 CLIPS = ("k1", "k2", "k3", "k4", "n1", "n2", "n3")
 
 LOAD_SCALES = {"motor_command_ratio": 0.1, "motor_current_a": 0.21, "proximal_torque_n_m": 0.1}
@@ -41,6 +52,12 @@ ACCELERATION_SCALE_RAD_S2 = 1000.0
 SLOWEST_RAD_S = 0.2
 LIGHTEST = 0.2
 """Load below which the travel of a load-proportional state shrinks no further."""
+
+LEAVING_S, SLID_RAD = 0.1, 20.0
+"""Over the last part of the window the travel since a turn grows by so much: the drive has slid."""
+
+JUDGED = 4
+"""Channels, the first ones and the pose, whose range an estimate is valid in; the others follow."""
 
 ORDERS = 29
 RIPPLE_STEP = 0.17
@@ -59,6 +76,9 @@ NEUTRAL: list[Product] = [
     ("v",), ("v", "v"), ("c", "v"), ("q", "v"), ("i",), ("c", "i"),
     ("a",), ("q", "a"), ("v", "a"),
     ("d",), ("q", "d"), ("d", "d"),
+    *[(lag,) for lag in LAGS],
+    *[(lag, state) for lag in ("l20", "l80", "l300") for state in ("q", "v")],
+    *[(rise, *rest) for rise in RISES for rest in [(), ("q",), ("c",), (rise,)]],
     *[
         product
         for clip in CLIPS
@@ -85,7 +105,9 @@ RIPPLE = "ripple"
 EFFECTS: dict[str, tuple[str, ...]] = {
     "speed": ("v", "i"),
     "acceleration": ("a",),
+    "load of the last 0.5 s": LAGS,
     "fall of the load": ("d",),
+    "rise of the load after a reversal": RISES,
     "hysteresis": CLIPS,
     RIPPLE: (),
 }
@@ -108,10 +130,17 @@ class Bank:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of a row, measured or derived."""
-        drive = ("motor_velocity_rad_s", "motor_acceleration_rad_s2", "motor_travel_rad")
-        own = ("spindle_angle_rad", self.surrogate, *drive, fall_of(self.surrogate))
-        return (*own, self.pose) if self.pose else own
+        """Channels of a row, measured or derived; the judged ones first."""
+        load = self.surrogate
+        now = ("spindle_angle_rad", load, "motor_velocity_rad_s", "motor_acceleration_rad_s2")
+        turn = ("motor_travel_rad", "motor_turned_s", fall_of(load), rise_of(load))
+        past = tuple(ago_of(load, ms) for ms in LAGS_MS)
+        return (*now, *((self.pose,) if self.pose else ()), *turn, *past)
+
+    @property
+    def judged(self) -> int:
+        """Number of channels, from the first, in whose range an estimate is valid."""
+        return JUDGED + bool(self.pose)
 
     @cached_property
     def products(self) -> tuple[Product, ...]:
@@ -166,24 +195,33 @@ def fill(
     design: FloatArray,
 ) -> None:
     """Write the products and the ripple of each row of channels."""
-    state = np.zeros(14)
+    state = np.zeros(16 + len(LAGS_MS))
+    posed = rows.shape[1] - (JUDGED + 4 + len(LAGS_MS))
+    since = JUDGED + posed  # the first channel of the turn and the past
     count = len(parents)
     orders = (design.shape[1] - count) // 6
     for n in range(len(rows)):
         angle, surrogate, speed = rows[n, 0], rows[n, 1], rows[n, 2] / GEAR_RATIO
-        travel, load = rows[n, 4], surrogate / load_scale
+        load = surrogate / load_scale
+        left = (rows[n, since + 1] - TRAVEL_WINDOW_S + LEAVING_S) / LEAVING_S
+        travel = rows[n, since] + SLID_RAD * max(left, 0.0)
         state[0] = (angle - POSITION_CENTRE_RAD) / POSITION_SCALE_RAD
         state[1] = load - 1.0
         state[2] = speed - 1.0
         state[3] = rows[n, 3] / ACCELERATION_SCALE_RAD_S2
         state[4] = 1.0 / max(abs(speed), SLOWEST_RAD_S)
-        state[5] = rows[n, 5] / load_scale
+        state[5] = rows[n, since + 2] / load_scale
         for r in range(4):
             state[6 + r] = min(travel / (r + 1.0), 1.0) - 0.5
         for r in range(3):
             state[10 + r] = min(travel / ((r + 1.0) * max(load, LIGHTEST)), 1.0) - 0.5
-        if rows.shape[1] > 6:
-            state[13] = rows[n, 6]
+        if posed:
+            state[13] = rows[n, JUDGED]
+        for r in range(2):
+            sticking = max(1.0 - travel / (2.0 * r + 2.0), 0.0)
+            state[14 + r] = rows[n, since + 3] / load_scale * sticking
+        for lag in range(len(LAGS_MS)):
+            state[16 + lag] = rows[n, since + 4 + lag] / load_scale - 1.0
         out = design[n]
         out[0] = 1.0
         for k in range(1, count):

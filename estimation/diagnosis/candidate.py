@@ -61,6 +61,9 @@ UNKNOWN = "unknown"
 ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
 """Roles that a wave's order counts the turns of."""
 
+SLOW_TURN = 0.5
+"""Share of the usual speed above which a smooth sign of the speed is no sign."""
+
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
 
@@ -115,19 +118,23 @@ class Candidate:
             for p, value in zip(self.effect.shape, self.shape, strict=True)
         )
 
-    def turns(self, spans: Mapping[str, float]) -> float:
-        """Return how many periods of its wave the widest run covers; infinite without a wave.
+    def shows(self, spans: Mapping[str, float]) -> bool:
+        """Say whether runs show it as what it is, and not as something simpler.
 
-        Less than one is no wave: any slow change with the angle would look like it.
+        A wave of which no run covers a period is a slow change with the angle; a direction that
+        takes half of the usual speed to turn round goes with the speed.
 
         Args:
-            spans: Channel to the widest range that a run covers.
+            spans: Channel to the widest range that a run covers, and speeds to the usual fast one.
         """
-        names = [p.name for p in self.effect.shape]
-        if "order" not in names:
-            return math.inf
-        angle = next(channel for role, channel in self.channels if role in ANGLE_ROLES)
-        return self.shape[names.index("order")] * spans[angle] / (2 * math.pi)
+        shape = {p.name: x for p, x in zip(self.effect.shape, self.shape, strict=True)}
+        channels = dict(self.channels)
+        if "order" in shape:
+            angle = next(channels[role] for role in ANGLE_ROLES if role in channels)
+            return shape["order"] * spans[angle] >= 2 * math.pi
+        if "width" in shape and "speed" in channels:
+            return shape["width"] <= SLOW_TURN * spans[channels["speed"]]
+        return True
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import ANGLE_ROLES, Candidate
+from estimation.diagnosis.candidate import Candidate
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -147,10 +147,25 @@ def columns_at(run: Run, candidate: Candidate) -> FloatArray:
 
 
 def covered(wanted: Sequence[Candidate], runs: Sequence[Run]) -> list[Candidate]:
-    """Return the candidates but waves of which no run covers a whole period."""
-    angles = {channel for c in wanted for role, channel in c.channels if role in ANGLE_ROLES}
-    spans = {angle: max(float(np.ptp(run.channels[angle])) for run in runs) for angle in angles}
-    return [c for c in wanted if c.turns(spans) >= 1.0]
+    """Return the candidates but those that the runs cannot show as what they are."""
+    spans = spans_of(wanted, runs)
+    return [c for c in wanted if c.shows(spans)]
+
+
+def spans_of(wanted: Sequence[Candidate], runs: Sequence[Run]) -> dict[str, float]:
+    """Return the widest range that a run covers of each channel that candidates read.
+
+    Of a speed it is the median over the runs of the 95th percentile of its size.
+    """
+    of_role = {channel: role for c in wanted for role, channel in c.channels}
+    return {
+        channel: float(
+            np.median([np.percentile(np.abs(run.channels[channel][run.valid]), 95) for run in runs])
+            if role == "speed"
+            else max(np.ptp(run.channels[channel]) for run in runs)
+        )
+        for channel, role in of_role.items()
+    }
 
 
 def tables(

@@ -140,7 +140,8 @@ def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
 def one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
     """Report a cause seen in several balances once, where it explains the largest share."""
     order = list(stories)
-    ranked = sorted(_causes(stories), key=lambda told: order.index(told.finding.balance))
+    causes = _causes(stories)
+    ranked = sorted(causes, key=lambda told: (order.index(told.finding.balance), told.place))
     return [told.finding for told in ranked]
 
 

@@ -29,6 +29,9 @@ from estimation.diagnosis.maps import SIMPLER, Map
 from estimation.effects.unknown_product import Product
 from estimation.recording import FloatArray
 
+FACTORS = 2
+"""Factors of a product."""
+
 MOST_TERMS = 4
 NEAR_EQUAL = 5
 """Formulas kept at each length, and returned at most."""
@@ -222,15 +225,17 @@ def formulas(balance: Balance, terms: Sequence[Candidate], found: Map) -> tuple[
         found: The map; no other variables are used.
 
     Returns:
-        At most `NEAR_EQUAL`; none where a variable has no channel that a model can read live, or
-        where no formula predicts a run left out.
+        At most `NEAR_EQUAL`; none where a variable has no channel that a model can read live, where
+        there are more variables than a product has factors, or where no formula predicts a run left
+        out.
     """
     channels = {basis.variable: live_channel(balance, basis) for basis in found.bases}
-    if None in channels.values():
+    if None in channels.values() or len(channels) > FACTORS:
         return ()
     libraries = [library(basis, str(channels[basis.variable])) for basis in found.bases]
     constant = [Unary(None, "")]
-    pair = [[*constant, *functions] for functions in libraries] + [constant] * (2 - len(libraries))
+    pair = [[*constant, *functions] for functions in libraries]
+    pair += [constant] * (FACTORS - len(libraries))
     pursuit = _Pursuit(balance, terms, pair)
     kept = [pursuit.start()]
     every: list[_Partial] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.maps import LOAD, ORDERS, PLAYS, PROJECTED_LOAD, Basis
+from estimation.diagnosis.maps import ORDERS, PLAYS, PROJECTED, Basis
 from estimation.effects.roles import CHANNELS as PLAYED_BY
 from estimation.effects.unknown_product import product, product_id
 from estimation.recording import FloatArray
@@ -26,12 +26,12 @@ class Unary:
 
 def live_channel(balance: Balance, basis: Basis) -> str | None:
     """Return the channel that a model reads for a variable, or None where it has none."""
-    channel = basis.channel
-    if channel == PROJECTED_LOAD:
-        channel = LOAD
-        if balance.model.target == LOAD:
-            # the balance's own sensor is what is estimated: another tells the load
-            (channel, *_) = PLAYED_BY.get(balance.model.balance, {}).get("load", ("",))
+    measured = {made: own for own, made in PROJECTED.items()}
+    channel = measured.get(basis.channel, basis.channel)
+    if channel == balance.model.target:
+        # the balance's own sensor is what is estimated: another tells it
+        role = "load" if basis.variable == "load" else "position"
+        (channel, *_) = PLAYED_BY.get(balance.model.balance, {}).get(role, ("",))
     return channel if all(channel in run.channels for run in balance.runs) else None
 
 

@@ -1,4 +1,4 @@
-"""Maps without a formula: the residual as a smooth function of one or two variables.
+"""Maps without a formula: the residual as a smooth function of one to three variables.
 
 They compete with the catalogue. A map that predicts runs left out clearly better than a named
 effect withdraws the name; where nothing in the catalogue fits, the map is the effect, and its
@@ -23,7 +23,7 @@ CHANNELS = {
     "velocity_sign": "motor_velocity_rad_s",
     "velocity": "motor_velocity_rad_s",
     "spindle_angle": "spindle_angle_rad",
-    "jaw_angle": "jaw_angle_rad",
+    "jaw_angle": "projected_jaw_angle_rad",
     "load": "projected_load_n_m",
     "current": "motor_current_a",
     "acceleration": "motor_acceleration_rad_s2",
@@ -39,13 +39,19 @@ CHANNELS = {
 
 ARM_JOINTS = range(1, 8)
 
-LOAD, PROJECTED_LOAD = "proximal_torque_n_m", "projected_load_n_m"
+PROJECTED = {
+    "proximal_torque_n_m": "projected_load_n_m",
+    "jaw_angle_rad": "projected_jaw_angle_rad",
+}
+"""Measured channels, and what maps see of each: where it is the balance's own target, the declared
+model's estimate stands in, since a sensor held against its own residual finds its own noise."""
 
 SPEEDS = ("spindle_velocity_rad_s", "jaw_velocity_rad_s")
-LOADS = (LOAD, "distal_torque_n_m", "motor_load_n_m")
+LOADS = ("proximal_torque_n_m", "distal_torque_n_m", "motor_load_n_m")
 
-BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",)}
-"""Variables that reach a balance only through its load, and would stand for that load."""
+BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",), "cable": ("current",)}
+"""Variables that reach a balance only through its load, and would stand for that load; and the
+current in the cable's, where it tells the target: whatever the cable lacks is in it."""
 
 ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
 """Angles of one rig move together."""
@@ -101,7 +107,7 @@ class Basis:
 
 @dataclass(frozen=True)
 class Map:
-    """A map of one or two variables and the evidence for it.
+    """A map of one or two variables, with the direction of motion or not, and the evidence for it.
 
     Attributes:
         bases: The variables.
@@ -128,8 +134,7 @@ class Map:
 
     def columns(self, run: Run) -> FloatArray:
         """Return the map's columns on one whole run, shape (n, k)."""
-        parts = [basis.columns(run) for basis in self.bases]
-        return parts[0] if len(parts) == 1 else _products(*parts)
+        return _products([basis.columns(run) for basis in self.bases])
 
 
 def variables_of(effect: Candidate, balance: Balance) -> tuple[str, ...]:
@@ -138,6 +143,7 @@ def variables_of(effect: Candidate, balance: Balance) -> tuple[str, ...]:
     # of two on one channel the last but history
     by_channel = {channel: name for name, channel in known.items() if name != "history"}
     by_channel |= dict.fromkeys(SPEEDS, "velocity") | dict.fromkeys(LOADS, "load")
+    by_channel["jaw_angle_rad"] = "jaw_angle"
     for _, channel in effect.channels:
         if "_drive_" in channel:  # a motor behind the coupling of an arm's wrist
             by_channel[channel] = "motor_angle" if channel.endswith("_angle_rad") else "velocity"
@@ -172,26 +178,22 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
     drawn = surrogates(left, count, seed)
     aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
     singles = {basis: _thinned(balance, basis) for basis in offered}
-    found: list[Map] = []
-    null = np.full(count, -np.inf)
-    for subset in [*((b,) for b in offered), *itertools.combinations(offered, 2)]:
-        columns = [
-            _centred(p[0] if len(p) == 1 else _products(*p), balance.demean)
-            for p in zip(*(singles[basis] for basis in subset), strict=True)
-        ]
+
+    def tried(subset: tuple[Basis, ...]) -> tuple[Map, FloatArray]:
+        parts = zip(*(singles[basis] for basis in subset), strict=True)
+        columns = [_centred(_products(p), balance.demean) for p in parts]
         losses = leave_one_run_out(base, folds(columns), [columns[0].shape[1]], aims, RIDGE)
-        null = np.maximum(null, losses.gain[0, 1:])
-        ratio = losses.joint[:, 0, 0] / np.maximum(losses.base[:, 0], np.finfo(float).tiny)
-        found.append(
-            Map(
-                subset,
-                float(losses.gain[0, 0]),
-                float(1 - np.median(ratio)),
-                losses.joint[:, 0, 0],
-                losses.base[:, 0],
-                agree=runs_agree(losses.base[:, 0], losses.joint[:, 0, 0]),
-            )
-        )
+        joint, alone = losses.joint[:, 0, 0], losses.base[:, 0]
+        ratio = joint / np.maximum(alone, np.finfo(float).tiny)
+        gain, median = float(losses.gain[0, 0]), float(1 - np.median(ratio))
+        made = Map(subset, gain, median, joint, alone, agree=runs_agree(alone, joint))
+        return made, losses.gain[0, 1:]
+
+    subsets = [*((b,) for b in offered), *itertools.combinations(offered, 2)]
+    results = [tried(subset) for subset in subsets]
+    results += [tried(subset) for subset in _with_direction(results, offered)]
+    found = [made for made, _ in results]
+    null = np.max([np.full(count, -np.inf), *(gains for _, gains in results)], axis=0)
     if not found or max(m.gain for m in found) <= 0:
         return None
     chosen = _simplest(found)
@@ -229,22 +231,15 @@ def play(x: FloatArray, width: float) -> FloatArray:
 
 
 def projection(balance: Balance) -> Callable[[Run], Run]:
-    """Return what adds the load of maps to a run's channels.
-
-    Where the load is the balance's own target, the declared model's estimate stands in: a sensor
-    held against its own residual finds its own noise.
-    """
+    """Return what adds to a run's channels those that maps see in place of measured ones."""
     weights = balance.solve(balance.terms)
 
     def added(run: Run) -> Run:
-        if balance.model.target == LOAD:
+        seen = {made: run.channels[own] for own, made in PROJECTED.items() if own in run.channels}
+        if balance.model.target in PROJECTED:
             columns = np.column_stack([term.columns(run.channels) for term in balance.terms])
-            load = columns @ weights
-        elif LOAD in run.channels:
-            load = run.channels[LOAD]
-        else:
-            return run
-        return replace(run, channels={**run.channels, PROJECTED_LOAD: load})
+            seen[PROJECTED[balance.model.target]] = columns @ weights
+        return replace(run, channels={**run.channels, **seen})
 
     return added
 
@@ -278,7 +273,7 @@ def channels_of(balance: str, there: Collection[str]) -> Mapping[str, str]:
 def needed_channels(balance: str, measured: Sequence[str]) -> list[str]:
     """Return the channels of the variables that runs with these measured channels have."""
     variables = channels_of(balance, measured)
-    wanted = [LOAD, *(c for c in variables.values() if c != PROJECTED_LOAD)]
+    wanted = [*PROJECTED, *(c for c in variables.values() if c not in PROJECTED.values())]
     return [c for c in wanted if set(measured_channels([c])) <= set(measured)]
 
 
@@ -304,8 +299,25 @@ def _thinned(balance: Balance, basis: Basis) -> list[FloatArray]:
     return [run.thin(basis.columns(run))[::THIN] for run in balance.runs]
 
 
-def _products(first: FloatArray, second: FloatArray) -> FloatArray:
-    return np.asarray((first[:, :, None] * second[:, None, :]).reshape(len(first), -1))
+def _with_direction(
+    results: Sequence[tuple[Map, FloatArray]], offered: Sequence[Basis]
+) -> list[tuple[Basis, ...]]:
+    """Return the best pair of variables with the direction beside it, where it lacks one."""
+    sign = next((basis for basis in offered if basis.variable == "velocity_sign"), None)
+    best = max((made for made, _ in results), key=lambda made: made.gain, default=None)
+    if sign is None or best is None or len(best.bases) < 2:
+        return []
+    if {"velocity_sign", "velocity", "history"} & set(best.variables):
+        return []
+    return [(sign, *best.bases)]
+
+
+def _products(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the products of one column of each part, shape (n, columns)."""
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = np.asarray((whole[:, :, None] * part[:, None, :]).reshape(len(whole), -1))
+    return whole
 
 
 def _centred(columns: FloatArray, demean: bool) -> FloatArray:

@@ -202,6 +202,10 @@ ORDER = [
 
 def _finding(finding: Finding) -> dict[str, Any]:
     fields = asdict(finding)
+    for known in fields["parameters"].values():
+        # an interval with an end that is not known is none
+        if known["ci95"] is not None and not all(map(math.isfinite, known["ci95"])):
+            known["ci95"] = None
     optional = ["formulas"] if finding.formulas else []
     return {name: fields[name] for name in [*ORDER, *optional]}
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, related
-from estimation.diagnosis.design import tables
+from estimation.diagnosis.design import spans_of, tables
 from estimation.diagnosis.endogeneity import kept_share
 from estimation.diagnosis.evidence import (
     Losses,
@@ -125,8 +125,14 @@ class Search:
             trials += [trial] * len(trial.candidates)
             terms = self.balance.refined([*self.balance.terms, *found])
             self.balance = replace(self.balance, terms=terms[: -len(found)])
-            found = terms[-len(found) :]
+            moved = zip(found, terms[-len(found) :], strict=True)
+            found = [new if self._shows(new) else old for old, new in moved]
         return found, trials, steps, ranking
+
+    def _shows(self, candidate: Candidate) -> bool:
+        """Say whether a refined effect still is what its name says."""
+        spans = spans_of([candidate], self.balance.runs)
+        return candidate.shows(spans) and not candidate.is_limit
 
     def _best(self, ranked: Sequence[Trial], found: Sequence[Candidate]) -> Trial | None:
         """Return the best trial, but those that would pass and are made of a regressor's noise."""

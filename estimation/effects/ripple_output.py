@@ -29,7 +29,7 @@ class OutputRipple(Pointwise):
         "joint": 1,
     }
     roles: ClassVar = {"output_angle": "spindle_angle_rad"}
-    amplitudes = (
+    amplitudes: ClassVar[tuple[Parameter, ...]] = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )

@@ -23,7 +23,7 @@ class EncoderNonlinearity(Pointwise):
     id = "sensor.encoder_inl"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     roles: ClassVar = {"encoder": "motor_angle_rad"}
-    amplitudes = (
+    amplitudes: ClassVar[tuple[Parameter, ...]] = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )

@@ -17,9 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.bank.fitting import Normal, Settings, pull, spread
-from estimation.bank.states import Bank
+from estimation.bank.fitting import Normal, Pool, pull
+from estimation.bank.interval import rescaled
+from estimation.bank.states import LAGS, Bank
 from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
 from estimation.estimators.network import NetworkEstimator
 from estimation.networks import training
@@ -67,6 +69,13 @@ class Evidence:
             return estimator.of_rows(self.rows).value
         return estimator.network(self.rows)[:, 0]
 
+    def covered(self, estimator: Adaptable) -> NDArray[np.bool_] | None:
+        """Say of which samples the interval holds the truth, shape (n,); None without interval."""
+        if not isinstance(estimator, BankEstimator) or estimator.interval is None:
+            return None
+        found = estimator.of_rows(self.rows)
+        return np.asarray(np.abs(found.value - self.truth) <= found.half_width)
+
 
 def _channels(estimator: Adaptable) -> tuple[str, ...]:
     if isinstance(estimator, BankEstimator):
@@ -92,7 +101,8 @@ def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
 def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     """Return the source's estimator adapted to the runs of another instrument.
 
-    Its interval is not known: a few runs do not show how runs differ.
+    Its interval is the source's, widened so that it covers the runs, each by weights adapted with
+    the others where there are several; a network has none.
 
     Args:
         source: Fitted on another instrument.
@@ -115,7 +125,7 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
         NetworkError: There is no run, or torch is missing.
     """
     if isinstance(like, BankEstimator):
-        return fit_runs(_reduced(like, runs), like.bank, like.target, Settings())
+        return fit_runs(_reduced(like, runs), like.bank, like.target)
     rows, truth = (np.concatenate(part) for part in zip(*(r.fitted for r in runs), strict=True))
     nodes = len(like.network.hidden)
     names = (like.network.inputs, like.network.outputs)
@@ -134,12 +144,22 @@ def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidenc
 
 
 def _adapted_bank(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
-    normals = [run.normal for run in runs]
-    weights = pull(normals, source.weights, source.scale, stiffness(source.bank))
+    stiff = stiffness(source.bank)
+
+    def pulled(part: Sequence[RunEvidence]) -> FloatArray:
+        return pull([run.normal for run in part], source.weights, source.scale, stiff)
+
+    weights, interval = pulled(runs), None
+    if source.interval is not None:
+        others = [[other for other in runs if other is not run] or [run] for run in runs]
+        residuals = [
+            run.design @ pulled(part) - run.truth for run, part in zip(runs, others, strict=True)
+        ]
+        interval = rescaled(source.interval, [run.design for run in runs], residuals)
     lowest = np.min([source.ranges[0], *(run.ranges[0] for run in runs)], axis=0)
     highest = np.max([source.ranges[1], *(run.ranges[1] for run in runs)], axis=0)
     ranges = np.array([lowest, highest])
-    return replace(source, weights=weights, interval=None, ranges=ranges, instrument="")
+    return replace(source, weights=weights, interval=interval, ranges=ranges, instrument="")
 
 
 def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> NetworkEstimator:
@@ -152,8 +172,8 @@ def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> Netw
     prior = np.roll(network.output[0], 1)  # the bias first
     stiff = np.full(len(prior), OUTPUT)
     stiff[0] = 0.0
-    moved = np.roll(pull(normals, prior, spread(normals), stiff), -1)
-    return replace(source, network=replace(network, output=moved[None]))
+    moved = np.roll(pull(normals, prior, Pool.of(normals).spread, stiff), -1)
+    return replace(source, network=replace(network, output=moved[None]), instrument="")
 
 
 def stiffness(bank: Bank) -> FloatArray:
@@ -162,7 +182,7 @@ def stiffness(bank: Bank) -> FloatArray:
     for k, product in enumerate(bank.products):
         if set(product) == {"q"}:
             found[k] = POSITION
-        elif set(product) in ({"q", "c"}, {"c"}):
+        elif set(product) <= {"q", "c", *LAGS}:
             found[k] = LOAD
     found[0] = 0.0  # the zero is free
     return found

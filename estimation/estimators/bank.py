@@ -1,6 +1,6 @@
 """Products of physical states as an estimator, with an interval and a range of validity."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.bank.fitting import Normal, Settings, solve, spread
+from estimation.bank.fitting import Normal, Pool, Settings, chosen, solve
 from estimation.bank.interval import COVERAGE, Interval, calibrate
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
-from estimation.errors import EstimationError
+from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.oneill import is_closing, processed
@@ -23,10 +23,6 @@ from estimation.scores import Score, score
 INNER_FOLDS = 5
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
-
-
-class InstrumentError(EstimationError):
-    """An estimator is asked about an instrument it was not fitted on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +49,13 @@ class BankEstimator:
         target: Channel that is estimated.
         weights: Weight of each product, shape (size,).
         interval: What is known of the error; None where too few runs were fitted to know it.
-        ranges: Lowest and highest value of each channel fitted on, shape (2, channels).
+        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
     """
 
-    SCHEMA: ClassVar[str] = "rig.bank/1"
+    SCHEMA: ClassVar[str] = "rig.bank/2"
 
     bank: Bank
     target: str
@@ -74,7 +70,7 @@ class BankEstimator:
         for name, shape in {
             "weights": (self.bank.size,),
             "scale": (self.bank.size,),
-            "ranges": (2, len(self.bank.channels)),
+            "ranges": (2, self.bank.judged),
         }.items():
             values = read_only(getattr(self, name))
             if values.shape != shape or np.isnan(values).any():
@@ -100,7 +96,7 @@ class BankEstimator:
         Raises:
             InstrumentError: The recording is of another instrument.
         """
-        self._require_own(instrument_of(recording))
+        require_own(self.instrument, recording)
         names = self.bank.channels
         if causal:
             channels = causal_channels(recording, names, self.low_pass, tracked=True)
@@ -110,24 +106,20 @@ class BankEstimator:
 
     def of_rows(self, rows: FloatArray) -> Estimates:
         """Return the estimates for rows of filtered channels, shape (n, channels)."""
-        design = self.bank.design(rows)
+        return self.of_design(self.bank.design(rows), rows)
+
+    def of_design(self, design: FloatArray, rows: FloatArray) -> Estimates:
+        """Return the estimates for a design of the bank and the rows it was made of."""
         width = np.full(len(rows), np.nan)
         if self.interval is not None:
             width = self.interval.half_width(design)
-        within = (rows >= self.ranges[0]) & (rows <= self.ranges[1])
+        judged = rows[:, : self.bank.judged]
+        within = (judged >= self.ranges[0]) & (judged <= self.ranges[1])
         return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
 
     def for_any_instrument(self) -> "BankEstimator":
         """Return the estimator for use on instruments it was not fitted on."""
         return replace(self, instrument="")
-
-    def _require_own(self, instrument: str) -> None:
-        if self.instrument and instrument and instrument != self.instrument:
-            raise InstrumentError(
-                f"The estimator was fitted on {self.instrument}, the recording is of {instrument}.",
-                "Another instrument has other friction and another zero.",
-                "Adapt it: rig adapt MODEL PATH --runs NAMES.",
-            )
 
     def stepper(self, sample_rate_hz: float) -> "BankStepper":
         """Return the estimator as it runs live."""
@@ -220,7 +212,7 @@ class RunEvidence:
         design: The bank's products, shape (n, size).
         truth: The target without lag, shape (n,).
         normal: The run's share in the normal equations.
-        ranges: Lowest and highest value of each channel, shape (2, channels).
+        ranges: Lowest and highest value of each judged channel, shape (2, judged).
     """
 
     design: FloatArray
@@ -238,7 +230,8 @@ class RunEvidence:
             truths: The targets, shape (n, targets).
         """
         design = bank.design(rows)
-        ranges = np.array([rows.min(axis=0), rows.max(axis=0)])
+        judged = rows[:, : bank.judged]
+        ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
         whole = Normal.of(design, truths)
         return [
             cls(design, truth, whole.only(k), ranges)
@@ -250,7 +243,7 @@ def fit_runs(
     runs: Sequence[RunEvidence],
     bank: Bank,
     target: str,
-    settings: Settings,
+    settings: Settings | None = None,
     coverage: float = COVERAGE,
 ) -> BankEstimator:
     """Fit weights and, from runs left out in turn, the interval.
@@ -259,7 +252,7 @@ def fit_runs(
         runs: The runs.
         bank: The bank they were reduced with.
         target: Channel that is estimated.
-        settings: How weights are found.
+        settings: How weights are found; chosen on runs left out in turn if None.
         coverage: Share of the samples of unseen runs that the interval covers.
 
     Raises:
@@ -267,24 +260,20 @@ def fit_runs(
     """
     if not runs:
         raise NetworkError("There is no closing sample to fit a state estimator on.")
-
-    def weights(part: Iterable[RunEvidence]) -> FloatArray:
-        return solve([run.normal for run in part], settings)[:, 0]
-
+    whole = Pool.of([run.normal for run in runs])
     interval = None
     if len(runs) >= INNER_FOLDS:
-        held_out = [
-            weights(run for k, run in enumerate(runs) if k % INNER_FOLDS != fold)
-            for fold in range(INNER_FOLDS)
-        ]
+        folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
+        settings = settings or chosen(whole, folds)
+        held_out = [solve(whole.without(part), settings)[:, 0] for part in folds]
         residuals = [
             run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
         ]
         interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
-    ranges, scale = np.array([lowest, highest]), spread([run.normal for run in runs])
-    return BankEstimator(bank, target, weights(runs), interval, ranges, scale)
+    weights = solve(whole, settings or Settings())[:, 0]
+    return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
 
 
 @dataclass(frozen=True)
@@ -294,7 +283,7 @@ class BankRecipe:
     Attributes:
         target: Channel to estimate.
         bank: The states and products.
-        settings: How weights are found.
+        settings: How weights are found; chosen on runs left out in turn if None.
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
         low_pass: Filter of every channel.
         coverage: Share of the samples of unseen runs that the interval covers.
@@ -302,7 +291,7 @@ class BankRecipe:
 
     target: str
     bank: Bank = field(default_factory=Bank)
-    settings: Settings = field(default_factory=Settings)
+    settings: Settings | None = None
     causal: bool = False
     low_pass: LowPass = PAPER
     coverage: float = COVERAGE
@@ -321,8 +310,7 @@ class BankRecipe:
                 runs.append(run)
             instruments.add(instrument_of(recording))
         fitted = fit_runs(runs, self.bank, self.target, self.settings, self.coverage)
-        known = instruments.pop() if len(instruments) == 1 else ""
-        return replace(fitted, instrument=known, low_pass=self.low_pass)
+        return replace(fitted, instrument=only_one(instruments), low_pass=self.low_pass)
 
     def evidence_of(self, recording: Recording) -> RunEvidence | None:
         """Reduce a raw run; None where it has no valid closing sample.
@@ -367,9 +355,3 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
         estimates += [runs[k].design @ weights for k in held_out]
         truths += [runs[k].truth for k in held_out]
     return score(np.concatenate(estimates), np.concatenate(truths))
-
-
-def instrument_of(recording: Recording) -> str:
-    """Return the model and serial number of a recording's instrument, empty if not known."""
-    own = recording.instrument
-    return " ".join(part for part in (own.model, own.serial) if part)

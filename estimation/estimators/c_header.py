@@ -13,11 +13,15 @@ import numpy as np
 from estimation.bank import states
 from estimation.derived import (
     ACCELERATION,
+    AGO,
     FALL,
     GEAR_RATIO,
     GEARBOX,
+    RISE,
     TRAVEL,
     TRAVEL_WINDOW_S,
+    TURNED,
+    TURNING,
     VELOCITY,
     measured_channels,
 )
@@ -27,6 +31,10 @@ from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
+
+TURNING_TRAVEL, TURNING_TURNED = (
+    TURNING.replace("_angle_rad", suffix) for suffix in (TRAVEL, TURNED)
+)
 
 
 class ExportError(EstimationError):
@@ -58,6 +66,7 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
     measured = measured_channels(channels)
     sections = estimator.low_pass.sections(sample_rate_hz)
     windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
+    pasts = _pasts(channels)
     text = HEADER
     for mark, value in {
         "MOTION": motion,
@@ -70,7 +79,11 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         "SECTIONS": _double_rows(np.delete(sections, 3, axis=1)),
         "WINDOWS": str(max(len(windows), 1)),
         "WINDOW": str(max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))),
-        "FILL": "\n".join(_channel(k, c, measured, windows) for k, c in enumerate(channels)),
+        "PASTS": str(max(len(pasts), 1)),
+        "KEEP": _keep(pasts, measured),
+        "FILL": "\n".join(
+            _channel(k, c, measured, windows, pasts, sample_rate_hz) for k, c in enumerate(channels)
+        ),
         "MODEL": model,
     }.items():
         text = text.replace(f"@{mark}@", value)
@@ -93,11 +106,38 @@ def _ints(values: Sequence[int] | np.ndarray) -> str:
     return ", ".join(str(int(v)) for v in values)
 
 
-def _channel(k: int, channel: str, measured: Sequence[str], windows: Sequence[str]) -> str:
+def _pasts(channels: Sequence[str]) -> list[str]:
+    """Return the measured channels whose last values are kept."""
+    found = [m["name"] + m["unit"] for m in map(AGO.match, channels) if m is not None]
+    found += [channel.replace(RISE, "_") for channel in channels if RISE in channel]
+    return list(dict.fromkeys(found))
+
+
+def _keep(pasts: Sequence[str], measured: Sequence[str]) -> str:
+    return "\n".join(
+        f"    name_keep(&s->past[{k}], s->tick, value[{measured.index(name)}]);"
+        for k, name in enumerate(pasts)
+    )
+
+
+def _channel(
+    k: int,
+    channel: str,
+    measured: Sequence[str],
+    windows: Sequence[str],
+    pasts: Sequence[str],
+    sample_rate_hz: float,
+) -> str:
     """Return the statement that computes one channel of a row."""
 
     def place(name: str) -> int:
         return measured.index(name)
+
+    def ago(name: str, ticks: str) -> str:
+        return f"name_ago(&s->past[{pasts.index(name)}], s->tick, {ticks})"
+
+    def turned() -> str:
+        return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
     if channel in measured:
         value = f"value[{place(channel)}]"
@@ -110,6 +150,14 @@ def _channel(k: int, channel: str, measured: Sequence[str], windows: Sequence[st
         sign = "" if rises else "-"
         slot = windows.index(channel)
         value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
+    elif channel == TURNING_TURNED and TURNING_TRAVEL in windows:
+        value = f"{turned()} / {sample_rate_hz!r}"
+    elif RISE in channel and TURNING_TRAVEL in windows:
+        source = channel.replace(RISE, "_")
+        value = f"value[{place(source)}] - {ago(source, turned())}"
+    elif (past := AGO.match(channel)) is not None:
+        ticks = round(1e-3 * int(past["ms"]) * sample_rate_hz)
+        value = ago(past["name"] + past["unit"], str(ticks))
     elif channel.endswith(VELOCITY):
         value = f"speed[{place(channel.replace(VELOCITY, '_angle_rad'))}]"
     elif channel.endswith(ACCELERATION):
@@ -154,7 +202,13 @@ def _bank(estimator: BankEstimator) -> str:
         "LIGHTEST": f"{states.LIGHTEST}f",
         "GEAR": f"{GEAR_RATIO}f",
         "TURN": f"{GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
-        "POSE": "state[13] = row[6];" if bank.pose else "state[13] = 0.0f;",
+        "POSE": f"row[{states.JUDGED}]" if bank.pose else "0.0f",
+        "STATES": str(len(states.STATES)),
+        "LAGS": str(len(states.LAGS)),
+        "JUDGED": str(bank.judged),
+        "SLID": f"{states.SLID_RAD}f",
+        "LEAVING": f"{states.LEAVING_S}f",
+        "LEAVES": f"{TRAVEL_WINDOW_S - states.LEAVING_S}f",
     }.items():
         text = text.replace(f"@{mark}@", value)
     return text

@@ -14,7 +14,7 @@ HEADER = """\
 
 enum {
     NAME_MEASURED = @MEASURED@, NAME_ROW = @ROW@, NAME_SECTIONS = @SECTION_COUNT@,
-    NAME_WINDOWS = @WINDOWS@, NAME_WINDOW = @WINDOW@
+    NAME_WINDOWS = @WINDOWS@, NAME_WINDOW = @WINDOW@, NAME_PASTS = @PASTS@
 };
 
 typedef struct { float value, half_width; int valid; } name_estimate;
@@ -26,11 +26,15 @@ typedef struct {
     int first, count;
 } name_queue;
 
+/* the last NAME_WINDOW values */
+typedef struct { double value[NAME_WINDOW]; } name_past;
+
 typedef struct {
     uint32_t tick;
     double filter[NAME_SECTIONS][NAME_MEASURED][2];
     double angle[NAME_MEASURED], speed[NAME_MEASURED], acceleration[NAME_MEASURED];
     name_queue window[NAME_WINDOWS];
+    name_past past[NAME_PASTS];
 } name_state;
 
 /* b0 b1 b2 a1 a2 of each section */
@@ -50,6 +54,21 @@ static inline double name_travel(name_queue *q, uint32_t tick, double value) {
     q->tick[end] = tick;
     q->count++;
     return value - q->value[q->first];
+}
+
+/* how many ticks ago the lowest value was */
+static inline uint32_t name_age(const name_queue *q, uint32_t tick) {
+    return tick - q->tick[q->first];
+}
+
+static inline void name_keep(name_past *p, uint32_t tick, double value) {
+    if (tick == 0) /* as if it had always been at its first value */
+        for (int i = 0; i < NAME_WINDOW; i++) p->value[i] = value;
+    p->value[tick % NAME_WINDOW] = value;
+}
+
+static inline double name_ago(const name_past *p, uint32_t tick, uint32_t ticks) {
+    return p->value[(tick + NAME_WINDOW - ticks) % NAME_WINDOW];
 }
 
 @MODEL@
@@ -75,6 +94,7 @@ static inline name_estimate name_step(name_state *s, const double *measured) {
         value[i] = x;
 @MOTION@
     }
+@KEEP@
 @FILL@
     (void)acceleration;
     if (++s->tick == 0) s->tick = NAME_WINDOW; /* wrapped: never a first sample again */
@@ -89,24 +109,29 @@ enum { NAME_PRODUCTS = @PRODUCTS@, NAME_ORDERS = @ORDERS@, NAME_WIDTHS = @WIDTH_
 static const uint16_t name_parent[NAME_PRODUCTS] = { @PARENTS@ };
 static const uint8_t name_factor[NAME_PRODUCTS] = { @FACTORS@ };
 static const float name_weight[@SIZE@] = { @WEIGHTS@ };
-static const float name_lowest[NAME_ROW] = { @LOWEST@ };
-static const float name_highest[NAME_ROW] = { @HIGHEST@ };
+static const float name_lowest[@JUDGED@] = { @LOWEST@ };
+static const float name_highest[@JUDGED@] = { @HIGHEST@ };
 static const uint16_t name_width_column[NAME_WIDTHS] = { @WIDTH_COLUMNS@ };
 static const float name_width_weight[NAME_WIDTHS] = { @WIDTH_WEIGHTS@ };
 
 static inline name_estimate name_model(const float *row) {
-    float state[14], product[NAME_PRODUCTS];
-    float speed = row[2] / @GEAR@, travel = row[4], load = row[1] / @LOAD@;
+    float state[@STATES@], product[NAME_PRODUCTS];
+    const float *drive = row + @JUDGED@, *past = drive + 4;
+    float speed = row[2] / @GEAR@, load = row[1] / @LOAD@;
+    float travel = drive[0] + @SLID@ * fmaxf((drive[1] - @LEAVES@) / @LEAVING@, 0.0f);
     state[0] = (row[0] - @CENTRE@) / @SCALE@;
     state[1] = load - 1.0f;
     state[2] = speed - 1.0f;
     state[3] = row[3] / @ACCELERATION@;
     state[4] = 1.0f / fmaxf(fabsf(speed), @SLOWEST@);
-    state[5] = row[5] / @LOAD@;
+    state[5] = drive[2] / @LOAD@;
     for (int r = 0; r < 4; r++) state[6 + r] = fminf(travel / (r + 1.0f), 1.0f) - 0.5f;
     for (int r = 0; r < 3; r++)
         state[10 + r] = fminf(travel / ((r + 1.0f) * fmaxf(load, @LIGHTEST@)), 1.0f) - 0.5f;
-    @POSE@
+    state[13] = @POSE@;
+    for (int r = 0; r < 2; r++)
+        state[14 + r] = drive[3] / @LOAD@ * fmaxf(1.0f - travel / (2.0f * r + 2.0f), 0.0f);
+    for (int k = 0; k < @LAGS@; k++) state[16 + k] = past[k] / @LOAD@ - 1.0f;
     product[0] = 1.0f;
     float total = name_weight[0];
     for (int k = 1; k < NAME_PRODUCTS; k++) {
@@ -126,7 +151,7 @@ static inline name_estimate name_model(const float *row) {
     for (int k = 0; k < NAME_WIDTHS; k++)
         width += name_width_weight[k] * product[name_width_column[k]];
     int valid = 1;
-    for (int k = 0; k < NAME_ROW; k++)
+    for (int k = 0; k < @JUDGED@; k++)
         valid &= row[k] >= name_lowest[k] && row[k] <= name_highest[k];
     float least = @LEAST@;
     name_estimate found = { total, isnan(least) ? NAN : fmaxf(width, least), valid };

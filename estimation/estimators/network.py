@@ -1,7 +1,7 @@
 """A network as an estimator: filtered and derived channels in, one channel out."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -10,12 +10,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.campaign import Campaign
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.filters import PAPER, LowPass
 from estimation.networks import network as files
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, train
 from estimation.oneill import closing_samples, processed
 from estimation.recording import FloatArray, Recording
+
+STATE_INPUTS = (
+    "spindle_angle_rad",
+    "spindle_velocity_rad_s",
+    "motor_acceleration_rad_s2",
+    "motor_travel_rad",
+)
+"""Inputs of a network with physical states, beside what stands for the load."""
 
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
@@ -28,12 +37,14 @@ class NetworkEstimator:
     Attributes:
         network: The network; its inputs are channel names, its one output the target.
         low_pass: Filter of every channel.
+        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
     """
 
     SCHEMA: ClassVar[str] = "rig.estimator/1"
 
     network: Network
     low_pass: LowPass = PAPER
+    instrument: str = ""
 
     @property
     def target(self) -> str:
@@ -44,10 +55,16 @@ class NetworkEstimator:
         """Return the estimate for each sample, shape (n,).
 
         Raises:
+            InstrumentError: The recording is of another instrument.
             MissingChannelError: The recording lacks a channel.
             FilterError: The run cannot be filtered.
         """
+        require_own(self.instrument, recording)
         return self.network(self.rows(recording, causal))[:, 0]
+
+    def for_any_instrument(self) -> "NetworkEstimator":
+        """Return the estimator for use on instruments it was not fitted on."""
+        return replace(self, instrument="")
 
     def inside(self, recording: Recording, causal: bool = False) -> NDArray[np.bool_]:
         """Say of each sample whether every input lies in the range trained on, shape (n,)."""
@@ -66,7 +83,8 @@ class NetworkEstimator:
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the estimator as named arrays; `from_arrays` gives it back."""
         processing = np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)])
-        return {"low_pass": processing, **files.to_arrays(self.network)}
+        own = {"low_pass": processing, "instrument": np.array(self.instrument)}
+        return {**own, **files.to_arrays(self.network)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> "NetworkEstimator":
@@ -79,7 +97,8 @@ class NetworkEstimator:
         processing = arrays.get("low_pass", np.empty(0))
         if processing.shape != (2,):
             raise files.NetworkError("The network's file does not state its filter.")
-        return cls(network, LowPass(float(processing[0]), int(processing[1])))
+        instrument = str(arrays.get("instrument", ""))
+        return cls(network, LowPass(float(processing[0]), int(processing[1])), instrument)
 
     def save(self, path: Path) -> None:
         """Write the estimator as NPZ."""
@@ -141,7 +160,9 @@ class NetworkRecipe:
             known: Returns the other estimate for each sample of a recording, shape (n,).
         """
         rows, rest = [], []
+        instruments = set()
         for recording in campaign.evidence:
+            instruments.add(instrument_of(recording))
             run = processed(recording, [*self.inputs, self.target], self.low_pass)
             run = run.with_columns(**{self.target: run[self.target] - known(recording)})
             kept = closing_samples(run, keep_flagged=False)
@@ -151,4 +172,4 @@ class NetworkRecipe:
             raise files.NetworkError("There is no run to train the network on.")
         names = (self.inputs, (self.target,))
         trained = train(np.concatenate(rows), np.concatenate(rest), names, self.settings)
-        return NetworkEstimator(trained.network, self.low_pass)
+        return NetworkEstimator(trained.network, self.low_pass, only_one(instruments))

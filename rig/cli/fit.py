@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from estimation.campaign import Campaign
 
 
+STATE_NODES, THINNED = 12, 24
+"""Hidden nodes of a network with physical states, and every how many-th sample it learns from."""
+
+
 def fit_states(
     campaign: "Campaign",
     target: str,
@@ -48,6 +52,25 @@ def fit_states(
         emit_json({"target": target, "surrogate": surrogate, "held_out": error, "out": out})
 
 
+def fit_network(
+    campaign: "Campaign", target: str, surrogate: str, seed: int, out: Path | None, json_: bool
+) -> None:
+    """Train a network with physical states as inputs."""
+    from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
+    from estimation.networks.training import Settings
+
+    inputs = (*STATE_INPUTS, surrogate)
+    recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
+    estimator = recipe.fit(campaign)
+    screen = console()
+    screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
+    if out is not None:
+        estimator.save(out)
+        screen.print(f"Estimator: {out}", markup=False)
+    if json_:
+        emit_json({"target": target, "inputs": inputs, "nodes": STATE_NODES, "out": out})
+
+
 def fit(
     path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
     model: Annotated[
@@ -55,8 +78,8 @@ def fit(
         typer.Option(
             "--model",
             "-m",
-            help="Declared model: a file, a shipped one by name, or `states` for products of"
-            " physical states.",
+            help="Declared model: a file, a shipped one by name, `states` for products of"
+            " physical states, or `network` for a network with some of them as inputs.",
         ),
     ] = "grip",
     out: Annotated[
@@ -65,10 +88,10 @@ def fit(
     folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     target: Annotated[
-        str, typer.Option(help="Channel to estimate; with --model states.")
+        str, typer.Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
     surrogate: Annotated[
-        str, typer.Option(help="Channel that stands for the load; with --model states.")
+        str, typer.Option(help="Channel that stands for the load; with --model states or network.")
     ] = "motor_current_a",
     live: Annotated[
         bool, typer.Option("--live", help="Fit for use live; with --model states.")
@@ -90,6 +113,9 @@ def fit(
     campaign = open_campaign(path, format_)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
+        return
+    if model == "network":
+        fit_network(campaign, target, surrogate, seed, out, json_)
         return
     declared = model_file.read(Path(model))
     fitted = fit_model(declared, campaign, seed=seed)

@@ -26,6 +26,9 @@ def replay(
     lever_mm: Annotated[
         float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = 12.0,
+    any_instrument: Annotated[
+        bool, typer.Option("--any-instrument", help="Let a model estimate another instrument too.")
+    ] = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of LOG; guessed if not given.")
     ] = None,
@@ -49,7 +52,7 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_campaign(log, format_), run, quiet=json_)
-    estimator = _estimator(model, recording) if model else None
+    estimator = _estimator(model, recording, any_instrument) if model else None
     target = estimator.target_channel if estimator else "distal_torque_n_m"
     options = ShowOptions(
         title=f"rig replay {recording.name}",
@@ -99,8 +102,12 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _estimator(path: Path, recording: "Recording") -> "EstimateStream":
+def _estimator(path: Path, recording: "Recording", any_instrument: bool) -> "EstimateStream":
     """Read a model file and begin a stream of its estimates at the recording's rate."""
+    from estimation.estimators.instrument import require_own
     from rig.live.estimator import ModelEstimator
 
-    return ModelEstimator(path, recording.sample_rate_hz)
+    estimator = ModelEstimator(path, recording.sample_rate_hz)
+    if not any_instrument:
+        require_own(estimator.instrument, recording)
+    return estimator

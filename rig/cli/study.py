@@ -12,6 +12,7 @@ from rig.cli.study_arm import arm_studies
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
+    from rig.studies.oneill_kinds import KindRow
     from rig.studies.oneill_networks import NetworkStudy
     from rig.studies.oneill_states import StateStudy
 
@@ -46,6 +47,13 @@ def oneill(
     states: Annotated[
         bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
     ] = False,
+    kinds: Annotated[
+        bool,
+        typer.Option("--kinds", help="Also fit every kind of estimator on the same folds."),
+    ] = False,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
+    ] = None,
     minutes: Annotated[
         float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
     ] = None,
@@ -70,20 +78,33 @@ def oneill(
         left_out = result.study.left_out
         training = Training(minutes, every, workers, state)
         deep = _train(source, left_out, data, training, seed)
-    physical = _fit_states(source, result.study.left_out, data, seed) if states else None
-    more = shown.More(deep, physical)
+    physical: StateStudy | None = None
+    drawn: list[tuple[str, Path]] = []
+    if states:
+        physical, drawn = _fit_states(source, result.study.left_out, data, seed, figures)
+    every_kind = _fit_kinds(source, result.study.left_out, seed) if kinds else ()
+    more = shown.More(deep, physical, every_kind)
     lines = [
         shown.lead(result.study),
         f"Data: {source.name}.",
         *shown.all_notes(result.study, more),
     ]
     tables = shown.all_tables(result.study, more)
-    show_result(lines, tables, out, lambda: shown.markdown(result.study, more))
+
+    def markdown() -> str:
+        placed = [
+            (caption, os.path.relpath(path, out.parent))
+            for caption, path in drawn
+            if out is not None
+        ]
+        return shown.markdown(result.study, more, placed)
+
+    show_result(lines, tables, out, markdown)
     if report is not None:
         page = write_report(report / "oneill.html", shown.page(result, more))
         console().print(f"Report: {page}", markup=False)
     if json:
-        found = {"networks": deep, "states": physical}
+        found = {"networks": deep, "states": physical, "kinds": every_kind or None}
         emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
 
 
@@ -122,20 +143,43 @@ def _train(
 
 
 def _fit_states(
-    source: "Source", left_out: dict[str, str], data: Path | None, seed: int
-) -> "StateStudy":
+    source: "Source",
+    left_out: dict[str, str],
+    data: Path | None,
+    seed: int,
+    figures: Path | None,
+) -> tuple["StateStudy", list[tuple[str, Path]]]:
+    from rig.reports.oneill_figures import write
+    from rig.studies.oneill_shown import Shown
     from rig.studies.oneill_states import run_states
+
+    kept: list[Shown] = []
 
     with progress() as bar:
         task = bar.add_task("closing samples", total=None)
         fitted = bar.add_task("estimates from states", total=None)
-        return run_states(
+        study = run_states(
             source.campaign,
             left_out,
             data,
             seed=seed,
             on_run=lambda name: bar.advance(task),
             on_row=lambda done, total: bar.update(fitted, completed=done, total=total),
+            on_shown=kept.append if figures is not None else None,
+        )
+    return study, write(figures, kept) if figures is not None else []
+
+
+def _fit_kinds(source: "Source", left_out: dict[str, str], seed: int) -> "tuple[KindRow, ...]":
+    from rig.studies.oneill_kinds import run_kinds
+
+    with progress() as bar:
+        task = bar.add_task("kinds of estimators", total=None)
+        return run_kinds(
+            source.campaign,
+            left_out,
+            seed,
+            on_fit=lambda done, total: bar.update(task, completed=done, total=total),
         )
 
 
@@ -146,9 +190,11 @@ def zhao(
     spread: Annotated[
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
-    diagnosis: Annotated[
-        bool, typer.Option("--diagnosis", help="Ask what the model lacks: a minute each.")
-    ] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Processes at once.")] = 1,
+    keep: Annotated[
+        Path | None,
+        typer.Option(help="Folder of what is measured; the same command goes on from there."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
     json: JsonFlag = False,
@@ -157,7 +203,7 @@ def zhao(
     from rig.errors import UsageError
     from rig.reports import zhao as shown
     from rig.simulation.grasper_plant import PROTOTYPES
-    from rig.studies.haptics import run_haptics
+    from rig.studies.haptics import haptics_of
     from rig.studies.zhao import run_study
 
     if prototype not in PROTOTYPES:
@@ -165,14 +211,18 @@ def zhao(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
     with progress() as bar:
-        task = bar.add_task("graspers", total=seeds)
+        task = bar.add_task("graspers", total=3 + 4 * seeds)  # three diagnoses, then four a grasper
 
         def step(name: str) -> None:
             bar.update(task, description=name, advance=1)
 
-        study = run_study(prototype, range(seeds), spread, with_diagnosis=diagnosis, on_step=step)
-    haptics = run_haptics(0, spread, prototype)
-    drawn = shown.write_figures(figures, haptics) if figures is not None else []
+        numbers = range(seeds)
+        study = run_study(prototype, numbers, spread, workers=workers, keep=keep, on_step=step)
+        added = study.lacking["grasp"].terms
+        haptics = haptics_of(
+            prototype, numbers, spread, added, workers=workers, keep=keep, on_step=step
+        )
+    drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
     def markdown() -> str:
         names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
@@ -181,7 +231,9 @@ def zhao(
     lines = [shown.lead(study), *shown.notes(study)]
     show_result(lines, shown.tables(study, haptics), out, markdown)
     if json:
-        emit_json({"study": study, "haptics": haptics})
+        cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
+        found = {dof: lacking.findings for dof, lacking in study.lacking.items()}
+        emit_json({"study": {**cells, "findings": found}, "haptics": haptics})
 
 
 @study_app.command()
@@ -209,6 +261,39 @@ def loop(
         )
     lines = [shown.lead(study), *shown.notes(study)]
     show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
+    if json:
+        emit_json(study)
+
+
+@study_app.command()
+def instruments(
+    data: Annotated[Path, typer.Option(help="Folder of the measured data's folders or archives.")],
+    source: Annotated[str, typer.Option(help="Instrument to fit on.")] = "Tool_4_Maryland_L_4",
+    other: Annotated[
+        list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
+    ] = None,
+    networks: Annotated[bool, typer.Option(help="Train networks too: minutes.")] = True,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Adapt one instrument's estimators to others, with one run or three."""
+    from rig.importers.registry import open_campaign
+    from rig.reports import instruments as shown
+    from rig.studies.instruments import run_instruments
+    from rig.studies.oneill import part_of
+
+    others = other or ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
+    with progress() as bar:
+        task = bar.add_task("instruments", total=None)
+        study = run_instruments(
+            (source, open_campaign(part_of(data, source))),
+            {name: open_campaign(part_of(data, name)) for name in others},
+            networks=networks,
+            seed=seed,
+            on_row=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    show_result([shown.lead(study)], [shown.table(study)], out, lambda: shown.markdown(study))
     if json:
         emit_json(study)
 

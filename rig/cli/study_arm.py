@@ -158,13 +158,14 @@ def zhang(
 ) -> None:
     """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
     from rig.reports import zhang as shown
+    from rig.reports.zhang_figures import write_figures
     from rig.studies.zhang import run_zhang
 
     kept = _kept_in(state, "zhang")
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))
-    drawn = shown.write_figures(figures, study) if figures is not None else []
+    drawn = write_figures(figures, study) if figures is not None else []
 
     def markdown() -> str:
         return shown.markdown(study, _from_page(drawn, out))

@@ -8,7 +8,7 @@ from typing import Any
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import DesignError, Run, prepare, targets
 from estimation.diagnosis.instruments import projection as instrumented
-from estimation.diagnosis.maps import PROJECTED_LOAD, projection
+from estimation.diagnosis.maps import PROJECTED, projection
 from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.story import Story
@@ -78,7 +78,7 @@ def _scored(
     limits = load_config().reference_limits
     balance = story.balance
     known = list(balance.runs[0].channels)
-    made = {"time_s", PROJECTED_LOAD, *(projected(name) for name in known)}
+    made = {"time_s", *PROJECTED.values(), *(projected(name) for name in known)}
     others = beside(story, finding)
     told = instrumented(balance.runs, [*others, *rivals], balance.model.target)
     whole = projection(balance)

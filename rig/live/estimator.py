@@ -6,6 +6,7 @@ from pathlib import Path
 from estimation import model_file
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator
+from estimation.estimators.network import NetworkEstimator
 from estimation.model import Model
 from estimation.recording import MissingChannelError
 from estimation.stream import Stream
@@ -28,10 +29,13 @@ class ModelEstimator:
         """
         self.model: Model | None = None  # only a physical model has effects to watch
         self.half_width: float | None = None
+        self.instrument = ""  # of a physical model, which says nothing of it
         self._stream: Stepper
         if path.suffix == ".npz":
             estimator = load(path)
             self._stream, self.target_channel = estimator.stepper(sample_rate_hz), estimator.target
+            if isinstance(estimator, BankEstimator | NetworkEstimator):
+                self.instrument = estimator.instrument
             if isinstance(estimator, BankEstimator) and estimator.interval is not None:
                 self.half_width = estimator.interval.typical
             return

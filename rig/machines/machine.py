@@ -115,7 +115,11 @@ class Machine(Protocol):
         ...
 
     def first_crossing(
-        self, rows: NDArray[np.int32], guard: NDArray[np.int64], limits: NDArray[np.int64]
+        self,
+        rows: NDArray[np.int32],
+        ticks: NDArray[np.float64],
+        guard: NDArray[np.int64],
+        limits: NDArray[np.int64],
     ) -> tuple[int, int, int, int, int, int]:
         """Hold the board's limits against rows of inputs once more."""
         ...

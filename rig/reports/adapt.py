@@ -21,6 +21,8 @@ def table(result: Adaptation) -> TextTable:
         if found is not None
     ]
     note = f"Closing samples of {len(result.unused)} runs not used."
+    if result.covered is not None:
+        note += f" The adapted interval of 95 % covers {result.covered:.1%} of them."
     if result.left_out:
         note += f" Flagged, left out: {', '.join(result.left_out)}."
     columns = [f"{result.target}, {unit}", "MAE", "95th pct", "RMSE"]

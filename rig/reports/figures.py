@@ -125,11 +125,13 @@ class Panel:
         label: Name and unit of the variable.
         x: The variable, shape (n,).
         y: The values, shape (n,).
+        before: Values to compare with, shape (n,), or None.
     """
 
     label: str
     x: FloatArray
     y: FloatArray
+    before: FloatArray | None = None
 
 
 def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24) -> Markup:
@@ -144,12 +146,17 @@ def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24)
     figure, axes = _axes(7.2, 2.5, len(panels))
     with mpl.rc_context(_STYLE):
         for ax, panel in zip(axes, panels, strict=True):
-            x, mean, low, high = binned(panel.x, panel.y, bins)
-            ax.fill_between(x, low, high, color=COLOURS[0], alpha=0.25, linewidth=0)
-            ax.plot(x, mean, color=COLOURS[0], linewidth=1.4)
+            series = [("before", panel.before, COLOURS[1]), ("after", panel.y, COLOURS[0])]
+            for name, values, colour in series:
+                if values is not None:
+                    x, mean, low, high = binned(panel.x, values, bins)
+                    ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0)
+                    ax.plot(x, mean, color=colour, linewidth=1.4, label=name)
             ax.axhline(0, color=_INK, linewidth=0.6)
             ax.set_xlabel(panel.label)
         axes[0].set_ylabel(y_label)
+        if any(panel.before is not None for panel in panels):
+            _legend_above(axes[0])
         limits = [ax.get_ylim() for ax in axes]
         for ax in axes:
             ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))

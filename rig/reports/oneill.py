@@ -1,5 +1,6 @@
 """The study of O'Neill et al. 2018 as tables for any medium, as Markdown and as a page."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig.reports import oneill_states as states
 from rig.reports.render import render
 from rig.reports.table import TextTable, to_markdown
 from rig.studies.oneill import PROTOCOLS, PaperRow, Result, Study
+from rig.studies.oneill_kinds import FILTERS, KindRow
 from rig.studies.oneill_networks import NetworkStudy
 from rig.studies.oneill_states import StateStudy
 
@@ -111,10 +113,12 @@ class More:
     Attributes:
         networks: The network rows.
         states: The estimates from physical states.
+        kinds: Every kind of estimator on the same folds.
     """
 
     networks: NetworkStudy | None = None
     states: StateStudy | None = None
+    kinds: tuple[KindRow, ...] = ()
 
     @property
     def notes(self) -> list[str]:
@@ -126,15 +130,35 @@ class More:
     def tables(self) -> list[TextTable]:
         """Tables of both."""
         own = states.tables(self.states, self.networks) if self.states is not None else []
-        return [*own, *(networks.tables(self.networks) if self.networks is not None else [])]
+        deep = networks.tables(self.networks) if self.networks is not None else []
+        return [*([_kinds_table(self.kinds)] if self.kinds else []), *own, *deep]
+
+
+def _kinds_table(kinds: tuple[KindRow, ...]) -> TextTable:
+    found: dict[str, list[str]] = {}
+    for row in kinds:
+        found.setdefault(row.kind, [row.kind]).append(_mn_m(row.score.rmse))
+    columns = ["estimator", *(f"RMSE, {filters}" for filters in FILTERS)]
+    note = (
+        "Proximal torque, mN m, from the measured current and the encoders, five folds of whole"
+        " runs, closing samples; each was written to a file and read again before it estimated."
+    )
+    return TextTable("Every kind of estimator", columns, list(found.values()), note)
 
 
 NOTHING_MORE = More()
 
 
-def markdown(study: Study, more: More = NOTHING_MORE) -> str:
-    """Return the study, and what goes beyond where there is any, as a Markdown page."""
+def markdown(study: Study, more: More = NOTHING_MORE, drawn: Sequence[tuple[str, str]] = ()) -> str:
+    """Return the study, and what goes beyond where there is any, as a Markdown page.
+
+    Args:
+        study: The linear rows.
+        more: What goes beyond.
+        drawn: Caption and place of each figure, relative to the page.
+    """
     parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, more)]
+    parts += [f"![{caption}]({place})\n\n{caption}" for caption, place in drawn]
     parts += [to_markdown(table).rstrip() for table in all_tables(study, more)]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 

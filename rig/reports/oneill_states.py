@@ -1,5 +1,6 @@
 """Estimates from physical states as tables: errors by what was held out, intervals, ablation."""
 
+from estimation.bank.fitting import CHOICES
 from estimation.bank.states import EFFECTS
 from estimation.derived import TRAVEL_WINDOW_S
 from rig.reports.oneill_networks import SHOWN
@@ -24,17 +25,17 @@ GOALS = {
 
 def notes(study: StateStudy) -> list[str]:
     """Return what a reader must know about the rows."""
-    settings = study.settings
     return [
         *_lead(study),
         f"Physical states: {study.weights} weights of products of states and of a ripple in the"
-        f" spindle's angle, linear, by ridge regression ({settings.ridge:g} of a column's variance;"
-        f" {settings.offset_share:.0%} of each run's means left out). Nothing looks back further"
-        f" than {TRAVEL_WINDOW_S} s. All closing samples of held-out runs are scored, against the"
-        " sensor filtered without lag; live rows have inputs filtered causally, in fit and in use.",
-        "States and settings were chosen by errors on held-out runs of the neutral pose, so its"
-        " rows are somewhat too good. For pitch and roll only the products with the pose were"
-        " chosen on their own runs, out of three sets.",
+        f" spindle's angle, linear, by ridge regression; penalty and share of the runs' means that"
+        f" is left out are chosen in every fit, out of {len(CHOICES)}, by runs left out of it in"
+        f" turn. Nothing looks back further than {TRAVEL_WINDOW_S} s. All closing samples of"
+        " held-out runs are scored, against the sensor filtered without lag; live rows have inputs"
+        " filtered causally, in fit and in use.",
+        "Which states there are was chosen by errors on held-out runs of the neutral pose, by the"
+        " command and without lag, so these rows are somewhat too good; of pitch and roll only the"
+        " products with the pose were chosen on their own runs, out of three sets.",
         *study.notes,
     ]
 

@@ -4,9 +4,13 @@ Not modelled beyond what the drive's fake leaves out: the load motor, which this
 """
 
 import ctypes
+import os
 
 from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
+from drivers.transport.can_bus import CanBus
+from drivers.transport.live_can import LiveCanBus
+from drivers.transport.python_can import open_can
 from drivers.transport.simulated_can import SimulatedCanBus
 from rig.canopen_logger import CanopenLogger
 from rig.config import Config
@@ -48,12 +52,24 @@ class PlantMotor:
 
 
 def open_simulated_canopen(config: Config) -> CanopenLogger:
-    """Return the link to the logic of a simulated CANopen rig."""
+    """Return the link to the logic of a simulated CANopen rig, in virtual time."""
     options = {"node_id": 1, **config.logger.options}
+    bus = SimulatedCanBus([_drive(config, options["node_id"])], "sim://epos4")
+    return CanopenLogger(Epos4(bus, **options), bus)
+
+
+def open_live_bus(config: Config) -> CanBus:
+    """Return the host's place on a virtual bus of python-can with a drive's fake, in real time."""
+    channel = f"can:virtual:rig-{os.getpid()}"
+    drive = _drive(config, config.logger.options.get("node_id", 1))
+    drive.advance(1)  # the plant is compiled the first time, which takes longer than a drive may
+    return LiveCanBus(open_can(channel), open_can(channel), [drive])
+
+
+def _drive(config: Config, node_id: int) -> Epos4Fake:
+    """Return the drive's fake with the plant as its motor."""
     plant, sensors, effects = plant_and_sensors(config.simulation)
     bench = SimulatedBench(plant, sensors, effects, config.simulation.seed)
     constant = round(plant.torque_constant_n_m_a * 1e6)
     objects = {(0x3001, 5): constant, (0x6076, 0): constant * 700 // 1000}
-    fake = Epos4Fake(options["node_id"], PlantMotor(bench), objects)
-    bus = SimulatedCanBus([fake], "sim://epos4")
-    return CanopenLogger(Epos4(bus, **options), bus)
+    return Epos4Fake(node_id, PlantMotor(bench), objects)

@@ -32,6 +32,7 @@ class Adaptation:
         as_it_is: The source's estimator as it is.
         adapted: The source's estimator adapted with the runs used.
         scratch: The same kind fitted on the target's other runs, in folds; None where not done.
+        covered: Share of the samples inside the adapted estimator's interval; None without one.
         rmse_by_run: Error of the adapted estimator by run.
         provenance: When and from what this was made.
     """
@@ -46,6 +47,7 @@ class Adaptation:
     as_it_is: Score
     adapted: Score
     scratch: Score | None
+    covered: float | None
     rmse_by_run: dict[str, float]
     provenance: Provenance
 
@@ -118,6 +120,7 @@ def run_adaptation(
         as_it_is=scores[0],
         adapted=scores[1],
         scratch=_scratch(source, found, unused, seed) if from_scratch else None,
+        covered=_covered(new, [found[run] for run in unused]),
         rmse_by_run={run: _score(new, [found[run]]).rmse for run in unused},
         provenance=Provenance.now(seed),
     )
@@ -138,6 +141,11 @@ def _score(estimator: Adaptable, runs: Sequence[Evidence]) -> Score:
         np.concatenate([run.estimate(estimator) for run in runs]),
         np.concatenate([run.truth for run in runs]),
     )
+
+
+def _covered(estimator: Adaptable, runs: Sequence[Evidence]) -> float | None:
+    parts = [part for run in runs if (part := run.covered(estimator)) is not None]
+    return float(np.mean(np.concatenate(parts))) if parts else None
 
 
 def _scratch(

@@ -172,7 +172,7 @@ def open_reference(path: Path) -> Source:
         UsageError: There is nothing at the path.
         DataError: Nothing there can be read.
     """
-    place = _reference_part(path)
+    place = part_of(path, INSTRUMENT)
     notes = [f"{path.name} holds several parts; {place.name} was taken."] if place != path else []
     campaign = open_campaign(place)
     own = [name for name in campaign.names if f"{INSTRUMENT}/" in name]
@@ -185,12 +185,12 @@ def open_reference(path: Path) -> Source:
     return Source(campaign, place.name, measured, tuple(notes))
 
 
-def _reference_part(path: Path) -> Path:
-    """Return the folder or archive of the paper's instrument, or the path itself."""
-    if path.is_file() or path.name == INSTRUMENT:
+def part_of(path: Path, instrument: str) -> Path:
+    """Return the folder or archive of an instrument below a path, or the path itself."""
+    if path.is_file() or path.name == instrument:
         return path
     parts = sorted(
-        (p for p in path.rglob(f"*{INSTRUMENT}*") if p.name.split(".")[0].endswith(INSTRUMENT)),
+        (p for p in path.rglob(f"*{instrument}*") if p.name.split(".")[0].endswith(instrument)),
         key=lambda p: (p.is_file(), len(p.parts), p),
     )
     return parts[0] if parts else path

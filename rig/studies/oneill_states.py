@@ -12,15 +12,22 @@ from pathlib import Path
 import numpy as np
 
 from estimation import oneill
-from estimation.bank.fitting import Settings
 from estimation.bank.states import EFFECTS, Bank
 from estimation.campaign import Campaign
 from estimation.derived import causal_channels
-from estimation.estimators.bank import EVERY, Estimates, RunEvidence, fit_runs, rows_of
+from estimation.estimators.bank import (
+    EVERY,
+    BankEstimator,
+    Estimates,
+    RunEvidence,
+    fit_runs,
+    rows_of,
+)
 from estimation.recording import FloatArray, Recording
 from estimation.scores import Score, score
 from rig.studies.oneill_data import pose_runs
 from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
+from rig.studies.oneill_shown import Closing, Shown, shown
 
 FOLDS = 5
 POSES = {"neutral": "", "pitch": "wrist_pitch_rad", "roll": "wrist_roll_rad"}
@@ -31,6 +38,8 @@ LOADS = {
 }
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
+DRAWN = (Bank(LOADS["command"]), "live")
+"""What the figures show."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +104,12 @@ class StateStudy:
         schema: Name of this layout.
         rows: The rows.
         weights: Number of weights of the neutral pose's estimator.
-        settings: How weights were found.
         notes: What a reader must know.
     """
 
     schema: str
     rows: tuple[StateRow, ...]
     weights: int
-    settings: Settings
     notes: tuple[str, ...]
 
 
@@ -110,6 +117,8 @@ class StateStudy:
 class _Run:
     """A run's closing samples: rows of channels by surrogate's channel and filters, the truth."""
 
+    name: str
+    time_s: FloatArray
     rows: Mapping[tuple[str, str], FloatArray]
     truth: Mapping[str, FloatArray]
     valid: np.ndarray
@@ -132,10 +141,11 @@ def jobs(poses: Sequence[str]) -> list[StateJob]:
         for target in TARGETS
     ]
     planned += [
-        StateJob(pose, surrogate, target, filters)
+        StateJob(pose, surrogate, target, filters, protocol)
         for pose in ("pitch", "roll")
         for surrogate in ("command", "current")
         for filters in FILTERS
+        for protocol in ("run-wise", "lopo")
         for target in (DISTAL, JAW)
     ]
     return [job for job in planned if job.pose in poses]
@@ -146,10 +156,10 @@ def run_states(
     left_out: Mapping[str, str],
     folder: Path | None,
     *,
-    settings: Settings | None = None,
     seed: int = 0,
     on_run: Callable[[str], None] = lambda name: None,
     on_row: Callable[[int, int], None] = lambda done, total: None,
+    on_shown: Callable[[Shown], None] | None = None,
 ) -> StateStudy:
     """Fit and score all rows.
 
@@ -157,15 +167,14 @@ def run_states(
         neutral: Runs of experiments 1 and 2.
         left_out: Runs left out of them, with the reason.
         folder: Folder that may hold the parts of experiment 3, or lie beside them.
-        settings: How weights are found.
         seed: Seed of the folds.
         on_run: Called with each run's name when it has been processed.
         on_row: Called with the number of rows done and their total.
+        on_shown: Called with what figures are drawn from; nothing is made for them if None.
 
     Raises:
         MissingChannelError: A run lacks a channel.
     """
-    settings = settings or Settings()
     for name, reason in left_out.items():
         neutral = neutral.exclude(name, reason)
     campaigns = {"neutral": neutral}
@@ -185,15 +194,15 @@ def run_states(
             on_run(recording.name)
         for kind, alike in groupby(own, key=lambda job: (job.bank, job.filters)):
             evidence = _evidence(kind, runs)
-            for job in alike:
-                row = _row(job, runs, evidence[job.target], settings, seed)
-                rows += [row] if row is not None else []
-                on_row(len(rows), len(planned))
+            rows += _rows(list(alike), runs, evidence, seed)
+            on_row(len(rows), len(planned))
+            if on_shown is not None and kind == DRAWN:
+                for target in (PROXIMAL, DISTAL):
+                    on_shown(_shown(kind, target, runs, evidence[target], seed))
     return StateStudy(
         "rig.study.oneill-states/1",
         tuple(rows),
         Bank().size,
-        settings,
         tuple(f"No data of experiment 3, {p}." for p in POSES if p not in campaigns),
     )
 
@@ -210,6 +219,8 @@ def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> 
         sources["live"] = causal_channels(recording, names, tracked=True)
     kept = oneill.is_closing(run)
     return _Run(
+        recording.name,
+        run.time_s[kept],
         {
             (LOADS[surrogate], filters): rows_of(sources[filters], banks[surrogate])[kept]
             for surrogate, filters in wanted
@@ -246,33 +257,61 @@ def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[Ru
     return found
 
 
-def _row(
-    job: StateJob,
+def _shown(
+    kind: tuple[Bank, str],
+    target: str,
     runs: Sequence[_Run],
     evidence: Sequence[RunEvidence],
-    settings: Settings,
     seed: int,
-) -> StateRow | None:
-    bank = job.bank
-    estimates: dict[int, Estimates] = {}
+) -> Shown:
+    bank, filters = kind
+    closing = [
+        Closing(r.name, r.time_s, r.rows[bank.surrogate, filters], r.truth[target]) for r in runs
+    ]
+    return shown(target, bank, closing, evidence, _splits(runs, "run-wise", seed))
+
+
+def _rows(
+    alike: Sequence[StateJob],
+    runs: Sequence[_Run],
+    evidence: Mapping[str, Sequence[RunEvidence]],
+    seed: int,
+) -> list[StateRow]:
+    """Fit and score jobs of one bank and one filter, so that each run's design is made once."""
+    bank, filters = alike[0].bank, alike[0].filters
+    fitted = {job: _fitted(job, evidence[job.target], runs, seed) for job in alike}
+    estimates: dict[StateJob, list[Estimates]] = {job: [] for job in alike if fitted[job]}
+    for k, run in enumerate(runs):
+        rows = run.rows[bank.surrogate, filters]
+        design = bank.design(rows)
+        for job, found in estimates.items():
+            found.append(fitted[job][k].of_design(design, rows))
+    return [_row(job, found, runs) for job, found in estimates.items()]
+
+
+def _fitted(
+    job: StateJob, evidence: Sequence[RunEvidence], runs: Sequence[_Run], seed: int
+) -> dict[int, BankEstimator]:
+    """Return the estimator that was fitted without each run; none where it cannot be done."""
+    found: dict[int, BankEstimator] = {}
     for held_out in _splits(runs, job.protocol, seed):
         rest = [run for k, run in enumerate(evidence) if k not in held_out]
-        estimator = fit_runs(rest, bank, job.target, settings)
-        for k in held_out:
-            estimates[int(k)] = estimator.of_rows(runs[k].rows[bank.surrogate, job.filters])
-    if not estimates:
-        return None
-    order = sorted(estimates)
-    truths = [runs[k].truth[job.target] for k in order]
-    errors = [estimates[k].value - truth for k, truth in zip(order, truths, strict=True)]
-    covered = [np.abs(e) <= estimates[k].half_width for k, e in zip(order, errors, strict=True)]
-    inside = np.concatenate([estimates[k].inside for k in order])
+        estimator = fit_runs(rest, job.bank, job.target)
+        found |= dict.fromkeys(map(int, held_out), estimator)
+    return found
+
+
+def _row(job: StateJob, estimates: Sequence[Estimates], runs: Sequence[_Run]) -> StateRow:
+    truths = [run.truth[job.target] for run in runs]
+    errors = [e.value - truth for e, truth in zip(estimates, truths, strict=True)]
+    covered = [np.abs(e) <= own.half_width for own, e in zip(estimates, errors, strict=True)]
+    inside = np.concatenate([own.inside for own in estimates])
     shares = [float(np.mean(part)) for part in covered]
     whole = np.concatenate(errors)
     return StateRow(
         job=job,
-        runs=len(order),
-        score=score(np.concatenate([estimates[k].value for k in order]), np.concatenate(truths)),
+        runs=len(runs),
+        score=score(np.concatenate([own.value for own in estimates]), np.concatenate(truths)),
         run_offset=float(np.sqrt(np.mean([e.mean() ** 2 for e in errors]))),
         covered=float(np.mean(np.concatenate(covered))),
         covered_median=float(np.median(shares)),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from estimation.arm.kinematics import pinocchio
 from estimation.networks.training import has_torch
 from estimation.recording import FloatArray
 from rig.errors import UsageError
@@ -128,6 +129,7 @@ def run_zhang(
             "The paper's networks cannot be trained: torch is not installed.",
             fix="Install it: pip install 'rig[learn]'.",
         )
+    pinocchio()
     outcomes = kept_outcomes(
         one_seed, _read, seeds, state, SCHEMA, workers=workers, start=_one_thread, on_seed=on_seed
     )

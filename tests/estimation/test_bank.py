@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.bank.fitting import Normal, Settings, solve
+from estimation.bank.fitting import CHOICES, Normal, Pool, Settings, chosen, solve
 from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
 from estimation.campaign import Campaign
-from estimation.derived import fall_of, zero_phase_channels
+from estimation.derived import ago_of, causal_channels, fall_of, rise_of, zero_phase_channels
+from estimation.estimator import load
 from estimation.estimators.adaptation import adapted, evidence
 from estimation.estimators.bank import (
     BankEstimator,
     BankRecipe,
-    InstrumentError,
 )
-from estimation.networks.network import NetworkError
+from estimation.estimators.instrument import InstrumentError
+from estimation.estimators.network import NetworkEstimator
+from estimation.networks.network import Network, NetworkError
 from estimation.oneill import closing_samples, processed
 from estimation.recording import Instrument, Recording
 from tests.estimation.synthetic import campaign
@@ -43,13 +45,19 @@ def closing_error(estimator: BankEstimator, run: Recording) -> np.ndarray:
     return np.array([kept["estimate_n_m"] - kept[TARGET], kept["width_n_m"]])
 
 
-def test_a_design_is_its_products_of_states_and_a_ripple_in_the_angle():
-    row = np.array([[-0.2, 0.3, 42.0, 500.0, 2.5, 0.05]])
+@pytest.mark.parametrize("turned_s", [0.2, 0.45, 0.499])
+def test_a_design_is_its_products_of_states_and_a_ripple_in_the_angle(turned_s):
+    past = [0.2, 0.21, 0.22, 0.23, 0.24, 0.25, 0.26, 0.27]
+    row = np.array([[-0.2, 0.3, 42.0, 500.0, 2.5, turned_s, 0.05, 0.1, *past]])
     q, c = (-0.2 + 0.5) / 0.5, 0.3 / 0.21 - 1
     v, a, i, d = 42 / 35 - 1, 0.5, 35 / 42, 0.05 / 0.21
-    k = [min(2.5 / r, 1) - 0.5 for r in (1, 2, 3, 4)]
-    n = [min(2.5 / (r * 0.3 / 0.21), 1) - 0.5 for r in (1, 2, 3)]
-    state = dict(zip(STATES, [q, c, v, a, i, d, *k, *n, 0.0], strict=True))
+    t = 2.5 + 20 * max(turned_s - 0.4, 0) / 0.1  # a turn about to leave the window was long ago
+    k = [min(t / r, 1) - 0.5 for r in (1, 2, 3, 4)]
+    n = [min(t / (r * 0.3 / 0.21), 1) - 0.5 for r in (1, 2, 3)]
+    h = [0.1 / 0.21 * max(1 - t / r, 0) for r in (2, 4)]
+    lags = [load / 0.21 - 1 for load in past]
+    values = [q, c, v, a, i, d, *k, *n, 0.0, *h, *lags]
+    state = dict(zip(STATES, values, strict=True))
     design = BANK.design(row)[0]
     for product, value in zip(BANK.products, design, strict=False):
         assert value == pytest.approx(np.prod([state[name] for name in product]), abs=1e-12)
@@ -83,6 +91,23 @@ def test_the_fall_of_a_channel_is_what_it_lacks_to_its_highest_value_of_the_wind
     np.testing.assert_allclose(found[name][:1500], expected, atol=1e-12)
 
 
+def test_the_rise_of_a_channel_counts_from_where_the_motor_was_lowest_and_ago_looks_back(runs):
+    rise, ago = rise_of("motor_current_a"), ago_of("motor_current_a", 80)
+    assert (rise, ago) == ("motor_current_rise_a", "motor_current_80ms_ago_a")
+    for source in (zero_phase_channels, causal_channels):
+        names = [rise, ago, "motor_turned_s", "motor_current_a", "motor_angle_rad"]
+        found = source(runs[0], names)
+        current, angle = found["motor_current_a"], found["motor_angle_rad"]
+        turns = []
+        for k in range(2000):
+            window = angle[max(k - 499, 0) : k + 1]
+            turns.append(k - int(np.argmin(window[::-1])))  # the last one of equal values
+        places = np.arange(2000)
+        np.testing.assert_allclose(found["motor_turned_s"][:2000], (places - turns) / 1000)
+        np.testing.assert_allclose(found[rise][:2000], current[:2000] - current[turns])
+        np.testing.assert_allclose(found[ago][:2000], current[np.maximum(places - 80, 0)])
+
+
 def test_a_run_s_own_offset_does_not_bend_the_slope():
     draw = np.random.default_rng(0)
     runs = []
@@ -91,7 +116,8 @@ def test_a_run_s_own_offset_does_not_bend_the_slope():
         design = np.column_stack([np.ones(400), x])
         runs.append(Normal.of(design, (2 * x + offset)[:, None]))
     plain, mixed = (
-        solve(runs, Settings(ridge=1e-9, offset_share=share))[1, 0] for share in (0.0, 0.99)
+        solve(Pool.of(runs), Settings(ridge=1e-9, offset_share=share))[1, 0]
+        for share in (0.0, 0.99)
     )
     assert abs(plain - 2) > 1
     assert mixed == pytest.approx(2, abs=0.2)
@@ -135,6 +161,38 @@ def test_another_instrument_is_refused_unless_told(runs):
     )
 
 
+def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_path):
+    own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
+    inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[0.0, 0.0], [1.0, 1.0]])
+    hidden, output = np.ones((2, 3)), np.ones((1, 3))
+    network = Network(inputs, (TARGET,), bounds, np.array([[0.0], [1.0]]), hidden, output)
+    NetworkEstimator(network, instrument="Maryland 1").save(tmp_path / "net.npz")
+    kept = load(tmp_path / "net.npz")
+    assert isinstance(kept, NetworkEstimator)
+    assert np.isfinite(kept.predict(replace(runs[0], instrument=own))).all()
+    with pytest.raises(InstrumentError, match="recording is of Maryland 2"):
+        kept.predict(replace(runs[0], instrument=other))
+    assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
+
+
+def test_settings_are_chosen_by_runs_left_out(runs):
+    bank = Bank("motor_current_a")
+    recipe = BankRecipe(TARGET, bank)
+    found = [run for run in map(recipe.evidence_of, runs) if run is not None]
+    parts = [[run.normal for run in found[k::3]] for k in range(3)]
+    whole, folds = Pool.of([n for part in parts for n in part]), [Pool.of(p) for p in parts]
+
+    def error(settings: Settings) -> float:
+        total = 0.0
+        for k in range(3):
+            rest = [run.normal for j in range(3) if j != k for run in found[j::3]]
+            weights = solve(Pool.of(rest), settings)[:, 0]
+            total += sum(float(np.sum((r.design @ weights - r.truth) ** 2)) for r in found[k::3])
+        return total
+
+    assert chosen(whole, folds) == min(CHOICES, key=error)
+
+
 def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, runs):
     def other(run: Recording) -> Recording:
         angle = run["spindle_angle_rad"]
@@ -148,7 +206,11 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
     )
     assert after < 0.5 * before
     assert isinstance(new, BankEstimator)
-    assert np.isnan(new.estimate(runs[0]).half_width).all()  # one run does not show how runs differ
+    assert new.interval is not None
+    assert fitted.interval is not None
+    assert new.interval.least >= fitted.interval.least  # a run does not make it surer of itself
+    assert one.covered(new).mean() > 0.99
+    assert closing_error(new, other(runs[6]))[1].min() > 0
     with pytest.raises(NetworkError, match="no closing sample"):
         adapted(fitted, [])
 

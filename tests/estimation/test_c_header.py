@@ -78,7 +78,7 @@ def test_an_unknown_interval_and_a_pose_come_through(bank, runs, tmp_path):
         TARGET,
         draw.normal(size=posed.size) / posed.size,
         None,
-        np.array([[-1e9] * 7, [1e9] * 7]),
+        np.array([[-1e9], [1e9]]).repeat(posed.judged, axis=1),
         np.ones(posed.size),
     )
     run = runs[0].with_columns(wrist_pitch_rad=np.full(len(runs[0]), 0.5))

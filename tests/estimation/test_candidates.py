@@ -19,10 +19,13 @@ def wave(order: float) -> Candidate:
     return Candidate.of(Term(effect("ripple.output")), [order])
 
 
-def swept(span_rad: float) -> Run:
-    angle = np.linspace(0.0, span_rad, 100)
+def swept(span_rad: float, speed_rad_s: float = 10.0) -> Run:
+    channels = {
+        "spindle_angle_rad": np.linspace(0.0, span_rad, 100),
+        "motor_velocity_rad_s": np.full(100, speed_rad_s),
+    }
     every = np.ones(100, bool)
-    return Run("swept", {"spindle_angle_rad": angle}, every, every, 1)
+    return Run("swept", channels, every, every, 1)
 
 
 def test_a_wave_is_only_a_wave_where_a_run_covers_a_period():
@@ -33,6 +36,12 @@ def test_a_wave_is_only_a_wave_where_a_run_covers_a_period():
 def test_an_effect_without_a_wave_is_always_covered():
     friction = Candidate.of(Term(effect("friction.drag")), [])
     assert covered([friction], [swept(0.1)]) == [friction]
+
+
+@pytest.mark.parametrize(("width_rad_s", "shown"), [(4.0, True), (6.0, False)])
+def test_a_sign_that_turns_round_over_half_of_the_usual_speed_is_none(width_rad_s, shown):
+    friction = Candidate.of(Term(effect("friction.position")), [width_rad_s])
+    assert bool(covered([friction], [swept(0.1), swept(0.1), swept(0.1, 30.0)])) is shown
 
 
 @pytest.mark.parametrize(("place", "limit"), [(0.5, False), (0.8, False), (1.0, True)])

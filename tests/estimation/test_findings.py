@@ -63,3 +63,15 @@ def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(
     told = [Told(f, {}, None, 0) for f in (ripple, inertia)]
     monkeypatch.setattr(findings, "_causes", lambda stories: told)
     assert echoes({}) == small
+
+
+def test_findings_come_in_the_order_found_however_much_each_explains(monkeypatch):
+    small, large = finding("motor", "friction.drag"), finding("motor", "ripple.motor")
+    told = [  # in the order of what each explains
+        findings.Told(finding("gearbox", "sensor.creep"), {}, None, 0),
+        findings.Told(replace(large, rmse_after=0.1), {}, None, 1),
+        findings.Told(small, {}, None, 0),
+    ]
+    monkeypatch.setattr(findings, "_causes", lambda _: told)
+    listed = findings.one_cause_one_finding({"motor": None, "gearbox": None})
+    assert [f.family for f in listed] == ["friction.drag", "ripple.motor", "sensor.creep"]

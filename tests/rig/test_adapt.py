@@ -47,6 +47,13 @@ def test_a_fit_of_states_is_a_file_that_knows_its_instrument(states):
     assert estimator.instrument == "Maryland 1"
 
 
+def test_replay_refuses_another_instrument_unless_told(folders, states, capsys):
+    words = ["replay", str(folders[1] / "00.mcap"), "--model", str(states), "--speed", "0"]
+    assert main([*words, "--plain"]) != 0
+    assert "fitted on Maryland 1" in capsys.readouterr().err
+    assert main([*words, "--plain", "--any-instrument"]) == 0
+
+
 def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states, tmp_path):
     found, new = tmp_path / "a.json", tmp_path / "new.npz"
     words = ["adapt", str(states), str(folders[1]), "--runs", "01,05"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
 from rig.cli.study import study_app
 from rig.simulation.arm import draw_arm
@@ -13,7 +14,7 @@ from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrumen
 from rig.simulation.psm_grasp import configurations, grasp_and_release
 from rig.simulation.psm_instruments import KINDS
 from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies import zhang_free, zhang_networks
+from rig.studies import zhang_free, zhang_networks, zhang_physics
 from rig.studies.zhang import PAPER, run_zhang
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
@@ -99,9 +100,27 @@ def test_states_look_back_and_never_ahead(psm):
     np.testing.assert_array_equal(rows[0], [run.position[0, 0]] * 2 + [run.velocity[0, 2]])
 
 
+def test_free_motion_tells_what_the_coupling_matrix_gets_wrong():
+    rng = np.random.default_rng(1)
+    psm = with_instrument(rng, draw_arm(rng), "CF")
+    runs = []
+    for gripper in (moving_gripper(rng, 60.0, psm.kind.open_rad), 0.0):
+        motion = with_gripper(random_path(rng, 60.0), gripper, psm.kind.open_rad)
+        runs.append(simulate(psm, motion, rng, lead=lead_samples()))
+    tried = [*candidates(psm.table), *zhang_physics.of_long_slips()]
+    wanted = ("wrist drive hysteresis", "cable slip J7", "long slip J3")
+    effects = [effect for effect in tried if effect.name in wanted]
+    found = zhang_physics.fitted(psm.table, effects, runs, network=False).leaks
+    true = psm.leak[1:3, 3] / psm.leak[3, 3]
+    assert np.abs(true).min() > 0.1
+    np.testing.assert_allclose(found[2:], true, atol=0.02)
+
+
 @torch_only
 def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(zhang_free, "MINUTES", 4.2)
+    monkeypatch.setattr(zhang_free, "MINUTES", 2.8)
+    monkeypatch.setattr(zhang_free, "OTHER_MINUTES", (1.0, 0.3, 0.4))
+    monkeypatch.setattr(zhang_free, "OUR_OTHER_MINUTES", 0.5)
     monkeypatch.setattr(zhang_networks, "SETTINGS", Settings(nodes=4, iterations=8))
     monkeypatch.setattr(zhang_networks, "TRANSFER", Settings(nodes=4, iterations=5))
     monkeypatch.setattr("rig.studies.seeds._done", here)

@@ -1,0 +1,38 @@
+"""Which instrument an estimator was fitted on, and that it is asked about no other one."""
+
+from estimation.errors import EstimationError
+from estimation.recording import Recording
+
+
+class InstrumentError(EstimationError):
+    """An estimator is asked about an instrument it was not fitted on."""
+
+
+def instrument_of(recording: Recording) -> str:
+    """Return the model and serial number of a recording's instrument, empty if not known."""
+    own = recording.instrument
+    return " ".join(part for part in (own.model, own.serial) if part)
+
+
+def require_own(instrument: str, recording: Recording) -> None:
+    """Refuse a recording of another instrument; an instrument that is not known is not refused.
+
+    Args:
+        instrument: What the estimator was fitted on; empty where it does not matter.
+        recording: What it is asked about.
+
+    Raises:
+        InstrumentError: The recording is of another instrument.
+    """
+    other = instrument_of(recording)
+    if instrument and other and other != instrument:
+        raise InstrumentError(
+            f"The estimator was fitted on {instrument}, the recording is of {other}.",
+            "Another instrument has other friction and another zero.",
+            "Adapt it: rig adapt MODEL PATH --runs NAMES; or tell rig replay --any-instrument.",
+        )
+
+
+def only_one(instruments: set[str]) -> str:
+    """Return the one instrument of a campaign's recordings, empty where there are several."""
+    return next(iter(instruments)) if len(instruments) == 1 else ""

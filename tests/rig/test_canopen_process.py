@@ -1,0 +1,121 @@
+"""The drive's logic in a process of its own, in real time; asserted is its own clock and count."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.errors import LinkLostError
+from rig.canopen_process import CanopenProcess
+from rig.config import Config, load_config
+from rig.errors import SafetyTripError
+from rig.logger import open_logger
+from rig.session import Session
+
+
+def config(**changes: object) -> Config:
+    settings = load_config(Path("canopen_virtual"))
+    return settings.changed(devices={}, safety={"watchdog_s": 1.0}, **changes)
+
+
+def test_a_session_runs_on_it_and_nothing_is_lost_while_the_host_pauses() -> None:
+    settings = config()
+    with Session(settings, open_logger(settings)) as session:
+        next(session.rest(0.1))
+        start = session.spindle_angle_rad
+        readings = []
+        for k, reading in enumerate(session.play(start + np.linspace(0, 0.1, 800), np.zeros(800))):
+            readings.append(reading)
+            if k == 3:
+                time.sleep(0.2)  # what is behind is read later; the ticks went on meanwhile
+    setpoint = np.concatenate([r.setpoint for r in readings])
+    assert np.array_equal(setpoint[setpoint >= 0], np.arange(800))
+    assert readings[-1].lost == 0
+    tick_us = np.concatenate([r.tick_us for r in readings])
+    assert (np.diff(tick_us) > 0).all()
+    moved = np.concatenate([r.columns["spindle_angle_rad"] for r in readings])
+    assert moved[-1] - moved[0] > 0.05
+
+
+def test_a_process_that_is_killed_is_a_lost_link_and_the_drive_is_told_to_be_live() -> None:
+    settings = config()
+    link = open_logger(settings)
+    assert isinstance(link, CanopenProcess)
+    unsafe = pytest.raises(SafetyTripError, match="did not confirm")
+    with unsafe as told, Session(settings, link) as session:
+        next(session.rest(0.05))
+        link.process.kill()
+        with pytest.raises(LinkLostError, match="is gone"):
+            for _ in session.watch():
+                pass
+    assert "Cut the motor supply" in told.value.fix
+    assert link.process.poll() is not None
+
+
+def test_a_drive_that_cannot_be_reached_is_said_with_what_to_type() -> None:
+    settings = load_config(Path("canopen")).changed(
+        logger={"url": "can:slcan:/dev/nonesuch?bitrate=1000000"}
+    )
+    with pytest.raises(LinkLostError.__mro__[1], match="nonesuch"):
+        open_logger(settings)
+
+
+HOST = """
+import sys
+import numpy as np
+from pathlib import Path
+from rig.config import load_config
+from rig.logger import open_logger
+from rig.session import Session
+
+config = load_config(Path("canopen_virtual")).changed(devices={}, safety={"watchdog_s": 1.0})
+link = open_logger(config)
+with Session(config, link) as session:
+    for reading in session.play(np.full(60000, -1.04), np.zeros(60000)):
+        if reading.setpoint.max() > 0:
+            print(link.process.pid, flush=True)
+"""
+
+
+def test_a_host_that_is_killed_leaves_no_process_behind() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOST], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as host:
+        assert host.stdout is not None
+        worker = int(host.stdout.readline())
+        host.kill()
+        host.stdout.read()
+    give_up_s = time.monotonic() + 60
+    while Path(f"/proc/{worker}/stat").exists() and _state(worker) != "Z":
+        assert time.monotonic() < give_up_s, "the process is still there"
+        time.sleep(0.01)
+
+
+def _state(process: int) -> str:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return "Z"
+
+
+def test_ctrl_c_of_the_whole_group_lets_the_host_disarm_first() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOST],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as host:
+        assert host.stdout is not None
+        assert host.stderr is not None
+        host.stdout.readline()
+        os.killpg(host.pid, signal.SIGINT)
+        os.killpg(host.pid, signal.SIGINT)
+        told = host.stderr.read()
+    assert told.splitlines()[-1] == "KeyboardInterrupt"
+    assert "not confirm" not in told

@@ -1,0 +1,118 @@
+"""What `rig diagnose` says of recordings it can decide nothing of: what, why, and never a name."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.campaign import Campaign
+from estimation.recording import Instrument, Recording
+from rig.cli.main import main
+from rig.diagnosis import subject
+from tests.estimation.test_diagnosis import runs, spring
+
+Spoil = Callable[[list[Recording]], list[Recording]]
+
+
+def without(channel: str, places: slice = slice(None)) -> Spoil:
+    """Take a channel out of some runs."""
+
+    def spoilt(recordings: list[Recording]) -> list[Recording]:
+        chosen = {r.name for r in recordings[places]}
+        return [
+            replace(r, columns={n: v for n, v in r.columns.items() if n != channel})
+            if r.name in chosen
+            else r
+            for r in recordings
+        ]
+
+    return spoilt
+
+
+def every(change: Callable[[Recording], Recording]) -> Spoil:
+    """Change every run."""
+    return lambda recordings: [change(r) for r in recordings]
+
+
+def standing(r: Recording) -> Recording:
+    """The rig stands, with current and torque held."""
+    return r.with_columns(**{name: np.full(len(r), float(v[0])) for name, v in r.columns.items()})
+
+
+def holed(r: Recording) -> Recording:
+    """Some samples of a channel are not numbers, and no flag says so."""
+    current = r["motor_current_a"].copy()
+    current[700:720] = np.nan
+    return r.with_columns(motor_current_a=current)
+
+
+def of_two(**names: object) -> Spoil:
+    """Every other run is of something else."""
+    return lambda recordings: [
+        replace(r, **names) if k % 2 else r for k, r in enumerate(recordings)
+    ]
+
+
+CASES: dict[str, tuple[Spoil, str]] = {
+    "one run": (lambda r: r[:1], "too few to diagnose"),
+    "two runs that do not repeat": (lambda r: r[:2], "does not repeat itself"),
+    "no run": (lambda _: [], "too few to diagnose"),
+    "no current": (without("motor_current_a"), "motor_current_a"),
+    "no current in one run": (without("motor_current_a", slice(1)), "motor_current_a"),
+    "no torque": (without("proximal_torque_n_m"), "proximal_torque_n_m"),
+    "NaN throughout": (
+        every(lambda r: r.with_columns(motor_current_a=np.full(len(r), np.nan))),
+        "not finite",
+    ),
+    "NaN in one run": (lambda r: [holed(r[0]), *r[1:]], "not finite"),
+    "a rig that stands": (every(standing), "Record runs in which the rig moves"),
+    "two rigs": (of_two(rig="another rig"), "2 rigs"),
+    "two instruments": (
+        of_two(instrument=Instrument(model="Maryland", serial="another")),
+        "2 instruments",
+    ),
+}
+
+
+def diagnosed(monkeypatch, folder: Path, recordings: list[Recording]) -> dict[str, Any]:
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+    words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
+    words += ["--ledger", str(folder / "looks.jsonl"), "--json", str(folder / "diagnosis.json")]
+    assert main(words) == 0
+    found: dict[str, Any] = json.loads((folder / "diagnosis.json").read_text())
+    return found
+
+
+def test_with_few_runs_something_may_be_missing_and_nothing_has_a_name(monkeypatch, tmp_path):
+    found = diagnosed(monkeypatch, tmp_path, runs(spring, count=6, seconds=2.0))
+    assert len(found["runs"]["discover"]) == 4
+    assert {f["family"] for f in found["findings"]} <= {"unknown"}
+    assert any("fewer than 5 no effect is named" in note for note in found["notes"])
+
+
+def test_what_never_varies_is_said(monkeypatch, tmp_path):
+    held = [
+        r.with_columns(load_command_a=np.full(len(r), 0.5))
+        for r in runs(spring, count=6, seconds=2.0)
+    ]
+    found = diagnosed(monkeypatch, tmp_path, held)
+    assert any(n.startswith("load_command_a never varies") for n in found["notes"])
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys, what) -> None:
+    spoil, reason = CASES[what]
+    recordings = spoil(runs(spring, count=9, seconds=2.0))
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+    ledger, out = tmp_path / "looks.jsonl", tmp_path / "diagnosis.json"
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick"]
+    assert main([*words, "--ledger", str(ledger), "--json", str(out)]) == 5
+    said = capsys.readouterr().err
+    assert reason in " ".join(said.split())
+    assert "spring" not in said
+    assert not ledger.exists()
+    assert not out.exists()

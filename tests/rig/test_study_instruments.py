@@ -1,0 +1,44 @@
+"""An instrument's estimators on another one: rows, table, and that adapting helps."""
+
+from dataclasses import replace
+
+import pytest
+
+from estimation.campaign import Campaign
+from estimation.recording import Recording
+from rig.reports import instruments as shown
+from rig.studies.instruments import run_instruments
+from tests.estimation.synthetic import campaign
+
+TARGET = "proximal_torque_n_m"
+
+
+def other(run: Recording) -> Recording:
+    return run.with_columns(**{TARGET: run[TARGET] + 0.02 + 0.03 * run["spindle_angle_rad"]})
+
+
+@pytest.fixture(scope="module")
+def study():
+    runs = [replace(run, name=f"{k:02}") for k, run in enumerate(campaign())]
+    return run_instruments(
+        ("own", Campaign.of(runs)),
+        {"other": Campaign.of(other(run) for run in runs)},
+        used=(("01",), ("01", "05")),
+        networks=False,
+    )
+
+
+def test_adapting_helps_and_a_fit_anew_stands_beside_the_first_row(study):
+    first, second = (row.result for row in study.rows)
+    for result in (first, second):
+        assert result.adapted.rmse < 0.5 * result.as_it_is.rmse
+    assert first.scratch is not None
+    assert second.scratch is None
+    assert len(second.unused) == len(first.unused) - 1
+
+
+def test_the_page_holds_a_row_for_each_choice_of_runs(study):
+    assert [row[2] for row in shown.table(study).rows] == ["01", "01, 05"]
+    page = shown.markdown(study)
+    assert "on other" in shown.lead(study)
+    assert shown.lead(study) in page
