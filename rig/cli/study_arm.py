@@ -14,6 +14,13 @@ StateFolder = Annotated[
     Path | None, typer.Option("--state", help="Folder of finished arms; a cache folder by default.")
 ]
 
+FigureFolder = Annotated[Path | None, typer.Option("--figures", help="Folder for the figures.")]
+
+
+def _from_page(drawn: list[Path], out: Path | None) -> list[str]:
+    """Return the places of figures from where a page will be."""
+    return [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
+
 
 def _kept_in(state: Path | None, study: str) -> Path:
     return state or Path.home() / ".cache" / "rig" / study
@@ -32,6 +39,7 @@ def pique(
         typer.Option(help="A further run to test on, with models fitted on the second path."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
@@ -45,8 +53,11 @@ def pique(
         study = run_study(
             first, second, also=others, on_step=lambda step: bar.update(task, description=step)
         )
+    drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.notes(study)]
-    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
+    show_result(
+        lines, shown.tables(study), out, lambda: shown.markdown(study, _from_page(drawn, out))
+    )
     if json:
         emit_json(study)
 
@@ -88,6 +99,7 @@ def wrench(
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
@@ -99,7 +111,12 @@ def wrench(
         study = run_wrench_study(
             seeds, _kept_in(state, "wrench"), workers, lambda: bar.advance(task)
         )
-    show_result(shown.NOTES, shown.tables(study), out, lambda: shown.markdown(study))
+    drawn = shown.write_figures(figures, study) if figures is not None else []
+
+    def markdown() -> str:
+        return shown.markdown(study, _from_page(drawn, out))
+
+    show_result(shown.NOTES, shown.tables(study), out, markdown)
     if json:
         emit_json(study)
 
@@ -110,24 +127,22 @@ def delsol(
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
-    from rig.reports.table import to_markdown
-    from rig.simulation.hydraulic_arm import HYDRAULIC
-    from rig.studies.delsol import run_delsol, tables
+    from rig.reports import delsol as shown
+    from rig.studies.delsol import run_delsol
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_delsol(seeds, _kept_in(state, "delsol"), workers, lambda: bar.advance(task))
-    note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
+    drawn = shown.write_figures(figures, study) if figures is not None else []
 
     def markdown() -> str:
-        title = "# External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
-        parts = [title, note, *(to_markdown(table).rstrip() for table in tables(study))]
-        return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+        return shown.markdown(study, _from_page(drawn, out))
 
-    show_result([note], tables(study), out, markdown)
+    show_result([shown.NOTE], shown.tables(study), out, markdown)
     if json:
         emit_json(study)
 
@@ -138,7 +153,7 @@ def zhang(
     workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
     state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
@@ -153,8 +168,7 @@ def zhang(
     drawn = write_figures(figures, study) if figures is not None else []
 
     def markdown() -> str:
-        names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
-        return shown.markdown(study, names)
+        return shown.markdown(study, _from_page(drawn, out))
 
     show_result([shown.lead(study), *shown.notes(study)], shown.tables(study), out, markdown)
     if json:

@@ -1,10 +1,14 @@
 """The study of Piqué 2018 as tables for any medium, and as Markdown."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
+from rig.reports.figures import paired_bars, write_svgs
 from rig.reports.table import TextTable, to_markdown
 from rig.studies.arm_search import DAMPING, LEAST_GAIN
-from rig.studies.pique import EFFECTS, Row, Study
+from rig.studies.pique import EFFECTS, THESIS, Row, Study
 
 TITLE = "Joint torques of a patient-side manipulator: table 3.2 of Piqué 2018, made again"
 
@@ -42,11 +46,26 @@ def tables(study: Study) -> list[TextTable]:
     return [_errors(study), *others, _kept(study), _dropped(study), _parameters(study)]
 
 
-def markdown(study: Study) -> str:
-    """Return the study as a Markdown page."""
+def markdown(study: Study, figures: Sequence[str] = ()) -> str:
+    """Return the study as a Markdown page.
+
+    Args:
+        study: The study.
+        figures: Places of its figures, from where the page will be.
+    """
     parts = [f"# {TITLE}", lead(study), f"Arm: {study.arm}.", *notes(study)]
     parts += [to_markdown(table).rstrip() for table in tables(study)]
+    parts += [f"![]({name})" for name in figures]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+
+
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Write the errors of each joint by the thesis' model and with effects, mean of both ways."""
+    before, after = _mean(study, THESIS), _mean(study, EFFECTS)
+    pairs = {f"J{k + 1}": (before[k], after[k]) for k in range(len(before))}
+    caption = "NRMSD on the path that was not fitted, mean of both directions"
+    bars = paired_bars(pairs, ("thesis' model", "with the effects kept"), "NRMSD, %", caption)
+    return write_svgs(folder, {"pique-joints": bars})
 
 
 def _mean(study: Study, model: str) -> np.ndarray:
@@ -68,9 +87,10 @@ def _percent(values: tuple[float, ...] | np.ndarray) -> list[str]:
 def _errors(study: Study) -> TextTable:
     joints = [f"J{k + 1}" for k in range(len(study.thesis))]
     rows = [["thesis, table 3.2 (another robot)", "", *_percent(study.thesis)]]
-    for model in dict.fromkeys(row.model for row in study.rows):
-        for row in study.rows:
-            if row.model == model and row.tested_on in study.paths:
+    on_paths = [row for row in study.rows if row.tested_on in study.paths]
+    for model in dict.fromkeys(row.model for row in on_paths):
+        for row in on_paths:
+            if row.model == model:
                 rows.append([_way(row), str(row.parameters), *_percent(row.nrmsd_percent)])
         rows.append([f"{model}, mean of both", "", *_percent(_mean(study, model))])
     return TextTable(
@@ -80,12 +100,16 @@ def _errors(study: Study) -> TextTable:
 
 def _others(study: Study) -> TextTable:
     joints = [f"J{k + 1}" for k in range(len(study.thesis))]
-    rows = [
-        [_way(row), *_percent(row.nrmsd_percent)]
-        for row in study.rows
-        if row.tested_on not in study.paths
-    ]
-    note = "Nothing was chosen on these runs."
+    rows = []
+    for row in study.rows:
+        if row.tested_on not in study.paths:
+            rows.append([_way(row), *_percent(row.nrmsd_percent)])
+            if row.without_offset_percent is not None:
+                rows.append(["the same, offsets removed", *_percent(row.without_offset_percent)])
+    note = (
+        "Nothing was chosen on these runs. Offsets removed: each joint's mean error, which a zero"
+        " of its current or a spring leaves after a restart."
+    )
     return TextTable("NRMSD on further runs, %", ["model", *joints], rows, note)
 
 

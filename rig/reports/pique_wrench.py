@@ -1,9 +1,13 @@
 """The simulated tables 3.1 to 3.3 of Piqué 2018, for any medium, and as Markdown."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
+from rig.reports.figures import paired_bars, write_svgs
 from rig.reports.table import TextTable, to_markdown
-from rig.studies.pique_wrench import CONTACT, OURS, THESIS, Cell, WrenchStudy
+from rig.studies.pique_wrench import CONTACT, OURS, TABLES, THESIS, Cell, WrenchStudy
 
 TITLE = "Free space and contact on simulated arms: tables 3.1 to 3.3 of Piqué 2018"
 
@@ -26,19 +30,37 @@ NOTES = (
 
 def tables(study: WrenchStudy) -> list[TextTable]:
     """Return one table for each of the thesis'."""
-    from rig.studies.pique_wrench import TABLES
-
     return [_table(study, name, paper) for name, paper in TABLES.items()]
 
 
-def markdown(study: WrenchStudy) -> str:
-    """Return the study as a Markdown page."""
+def markdown(study: WrenchStudy, figures: Sequence[str] = ()) -> str:
+    """Return the study as a Markdown page.
+
+    Args:
+        study: The study.
+        figures: Places of its figures, from where the page will be.
+    """
     parts = [f"# {TITLE}", *NOTES, *(to_markdown(table).rstrip() for table in tables(study))]
+    parts += [f"![]({name})" for name in figures]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
 
+def write_figures(folder: Path, study: WrenchStudy) -> list[Path]:
+    """Write the median errors of each table, by method."""
+    drawn = {}
+    for number, name in enumerate(TABLES, start=1):
+        thesis, ours = (
+            next(c.median for c in study.cells if (c.table, c.method) == (name, method))
+            for method in (THESIS, OURS)
+        )
+        pairs = {label: (thesis[k], ours[k]) for k, label in enumerate(_columns(name))}
+        drawn[f"wrench-3-{number}"] = paired_bars(
+            pairs, ("thesis' method", "ours"), "NRMSD, %", f"Table {name}, medians"
+        )
+    return write_svgs(folder, drawn)
+
+
 def _table(study: WrenchStudy, name: str, paper: tuple[float, ...]) -> TextTable:
-    columns = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz") if name == CONTACT else _joints()
     rows = [["thesis", *(f"{value:.2f}" for value in paper)]]
     cells = [cell for cell in study.cells if cell.table == name]
     for cell in cells:
@@ -49,10 +71,12 @@ def _table(study: WrenchStudy, name: str, paper: tuple[float, ...]) -> TextTable
     better = np.sum(by_method[OURS] < by_method[THESIS], axis=0)
     rows.append(["seeds better than the thesis' method", *map(str, better)])
     title = f"Table {name}: NRMSD, %, {len(study.seeds)} seeds"
-    return TextTable(title, ["", *columns], rows)
+    return TextTable(title, ["", *_columns(name)], rows)
 
 
-def _joints() -> tuple[str, ...]:
+def _columns(name: str) -> tuple[str, ...]:
+    if name == CONTACT:
+        return ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
     return tuple(f"J{k}" for k in range(1, 7))
 
 

@@ -22,7 +22,6 @@ from estimation.arm.periodic import periodic_motion
 from estimation.filters import LowPass, zero_phase
 from estimation.recording import FloatArray
 from rig.reports.provenance import Provenance
-from rig.reports.table import TextTable
 from rig.simulation.hydraulic_arm import (
     HYDRAULIC,
     RATE_HZ,
@@ -244,50 +243,3 @@ def tip_force(motion: Motion, external: FloatArray) -> FloatArray:
         "nij,nj->ni", np.linalg.pinv(jacobians.transpose(0, 2, 1)), smooth
     )
     return force
-
-
-def tables(study: DelSolStudy) -> list[TextTable]:
-    """Return the paper's tables with ours beside them."""
-    joints = [f"joint {k + 1}" for k in range(JOINTS)]
-    excited = [[f"joint {k + 1}", *(f"{f:.3f}" for f in row)] for k, row in enumerate(TABLE_1_HZ)]
-    residual = [["paper", *(f"{value:.2f}" for value in TABLE_2_N_M)]]
-    forces = [["paper", *(f"{v:.2f}" for v in (TABLE_5_N[0], PEAK_PERCENT, TABLE_5_N[1]))]]
-    for method, each in study.outcomes.items():
-        rms = np.array([outcome.residual_n_m for outcome in each])
-        residual.append([f"{method}, median", *(f"{v:.2f}" for v in np.median(rms, axis=0))])
-        residual.append([f"{method}, least to most", *_ranges(rms)])
-        force = np.array([(o.impact_n, o.impact_percent, o.sliding_n) for o in each])
-        forces.append([f"{method}, median", *(f"{v:.2f}" for v in np.median(force, axis=0))])
-        forces.append([f"{method}, least to most", *_ranges(force)])
-    paper_rms = np.median([o.residual_n_m for o in study.outcomes[PAPER]], axis=0)
-    paper_force = np.median(
-        [(o.impact_n, o.impact_percent, o.sliding_n) for o in study.outcomes[PAPER]], axis=0
-    )
-    fair = (TABLE_5_N[0], PEAK_PERCENT, TABLE_5_N[1])
-    residual.append(["within 25 % of the paper", *_near(paper_rms, TABLE_2_N_M)])
-    forces.append(["within 25 % of the paper", *_near(paper_force, fair)])
-    first = sum(joint == 1 for joint, _ in study.hoses_found)
-    note = (
-        f"A pull by position was found strongest on joint 1, where the hoses are, on {first} of"
-        f" {len(study.seeds)} arms. The paper's impact peaks at {PEAK_N:.0f} N; its sliding force"
-        " is not stated and assumed."
-    )
-    count = f"{len(study.seeds)} seeds"
-    return [
-        TextTable("Table 1: excitation, Hz", ["", "lowest", "highest"], excited),
-        TextTable(f"Table 2: RMS residual, N m, {count}", ["", *joints], residual),
-        TextTable(
-            f"Table 5: RMS error of force, {count}",
-            ["", "impact, N", "impact, % of peak", "sliding, N"],
-            forces,
-            note,
-        ),
-    ]
-
-
-def _near(found: FloatArray, paper: tuple[float, ...]) -> list[str]:
-    return ["yes" if abs(f / p - 1) <= WITHIN else "no" for f, p in zip(found, paper, strict=True)]
-
-
-def _ranges(values: FloatArray) -> list[str]:
-    return [f"{low:.1f}-{high:.1f}" for low, high in zip(values.min(0), values.max(0), strict=True)]

@@ -8,6 +8,8 @@ not fitted, in one direction. An effect that the other direction does not confir
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimation.arm.base import base_of
 from estimation.arm.consistent import consistent_fit
 from estimation.arm.effects import ArmEffect
@@ -27,6 +29,9 @@ CONSISTENT = "thesis' model, physically consistent"
 FILTERED = "columns filtered as the torque"
 EFFECTS = "with the effects kept"
 
+SIMPLER_PERCENT = (1.0, 3.0)
+"""Least gain in both directions of simpler choices of effects that further runs are tested with."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -41,6 +46,8 @@ class Row:
             damped or bounded fit, whose damping or bounds set it.
         nrmsd_percent: Error of each joint on the test path, % of its torque's range.
         fitted_nrmsd_percent: The same on the path of the fit.
+        without_offset_percent: The error on the test path with each joint's mean error removed, or
+            None where it was not asked for.
     """
 
     model: str
@@ -50,6 +57,7 @@ class Row:
     condition: float | None
     nrmsd_percent: tuple[float, ...]
     fitted_nrmsd_percent: tuple[float, ...]
+    without_offset_percent: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -128,8 +136,10 @@ def run_study(
             _row(CLOSED, one, other, one.closed, other.closed),
             _consistent_row(one, other),
             _row(FILTERED, one, other, one.filtered, other.filtered),
-            _row_with_effects(one, other, kept),
+            _row_with_effects(EFFECTS, one, other, kept),
         ]
+    for run in also:
+        rows += _simpler_rows(there[1], prepare(run, effects), trials)
     found = _fit(there[0], there[0].thesis)
     real = _consistent(there[0])
     named = zip(base_of(PSM).names, found.values, found.errors, real, strict=True)
@@ -183,14 +193,33 @@ def _consistent_row(one: Prepared, other: Prepared) -> Row:
     return Row(CONSISTENT, one.name, other.name, len(values), None, error(other), error(one))
 
 
-def _row_with_effects(one: Prepared, other: Prepared, kept: list[str]) -> Row:
+def _simpler_rows(one: Prepared, other: Prepared, trials: Sequence[Trial]) -> list[Row]:
+    """Return rows of the effects that gained most in both directions, chosen without this run."""
+    rows = []
+    for least in SIMPLER_PERCENT:
+        kept = [
+            trial.effect
+            for trial in trials
+            if trial.kept_in_round is not None
+            and min(trial.gain_percent, trial.other_way_percent) >= least
+        ]
+        model = f"with the {len(kept)} effects that gain {least:g} % both ways"
+        rows.append(_row_with_effects(model, one, other, kept))
+    return rows
+
+
+def _row_with_effects(model: str, one: Prepared, other: Prepared, kept: list[str]) -> Row:
     values = one.values(kept)
+    torque = other.torque[:, : other.joints]
+    left = torque - other.estimate(kept, values)
+    spread = np.ptp(torque, axis=0)
     return Row(
-        model=EFFECTS,
+        model=model,
         fitted_on=one.name,
         tested_on=other.name,
         parameters=len(values),
         condition=None,
         nrmsd_percent=tuple(map(float, other.nrmsd_percent(kept, values))),
         fitted_nrmsd_percent=tuple(map(float, one.nrmsd_percent(kept, values))),
+        without_offset_percent=tuple(map(float, 100 * left.std(axis=0) / spread)),
     )

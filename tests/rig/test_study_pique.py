@@ -108,7 +108,7 @@ def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_pat
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
     assert found["schema"] == "rig.study.pique/1"
-    assert len(found["rows"]) == 15
+    assert len(found["rows"]) == 17
     text = out.read_text()
     assert "thesis, table 3.2 (another robot)" in text
     assert "| 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in text

@@ -17,8 +17,9 @@ from rig.studies.pique_wrench import ati
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
     out = tmp_path / "wrench.md"
     words = ["wrench", "--seeds", "2", "--json", "--out", str(out), "--state", str(tmp_path)]
-    ran = CliRunner().invoke(study_app, words)
+    ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path / "figures")])
     assert ran.exit_code == 0, ran.output
+    assert "figures/wrench-3-3.svg" in out.read_text()
     found = json.loads(ran.stdout)
     assert found["seeds"] == [0, 1]
     assert len(found["cells"]) == 9

@@ -1,0 +1,51 @@
+"""`rig diagnose` on recordings of an arm: its joints are balances, in the same JSON and page."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.campaign import Campaign
+from rig.cli.main import main
+from rig.diagnosis import subject
+from rig.diagnosis.schema import DiagnosisSchema
+from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+
+
+def runs() -> Campaign:
+    """Runs of an arm whose second joint has friction with memory that no model declares."""
+    rng = np.random.default_rng(11)
+    arm = draw_arm(rng)
+    hidden = np.zeros_like(arm.hidden)
+    hidden[0, 1] = arm.hidden[0, 1]
+    made = []
+    for k in range(8):
+        run = simulate(replace(arm, hidden=hidden), excitation(rng, 12.0), rng)
+        made.append(recorded(f"run {k}", run.position, run.torque, RATE_HZ))
+    return Campaign.of(made)
+
+
+def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, capsys) -> None:
+    campaign = runs()
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: campaign)
+    out, report = tmp_path / "diagnosis.json", tmp_path / "report"
+    words = ["diagnose", str(tmp_path), "--balance", "joint.2", "--quick", "--json", str(out)]
+    words += ["--report", str(report), "--ledger", str(tmp_path / "looks.jsonl")]
+    assert main(words) == 0
+    found = json.loads(out.read_text())
+    DiagnosisSchema.model_validate(found)
+    assert set(found["rmse_before"]) == {"joint.2"}
+    first = next(f for f in found["findings"] if f["balance"] == "joint.2")
+    assert first["family"].startswith("hysteresis.")
+    assert "joint_2" in first["depends_on"]
+    page = (report / "diagnosis.html").read_text()
+    assert first["family"] in page
+    assert "joint 2, rad" in page  # the residual over the joint's own angle
+    assert main(words) == 0
+    assert json.loads(out.read_text())["exploratory"] is True
+    assert main([*words[:3], "joint.9", *words[4:]]) == 2
+    assert "joint.6" in capsys.readouterr().err
