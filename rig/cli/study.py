@@ -190,9 +190,11 @@ def zhao(
     spread: Annotated[
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
-    diagnosis: Annotated[
-        bool, typer.Option("--diagnosis", help="Ask what the model lacks: a minute each.")
-    ] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Processes at once.")] = 1,
+    keep: Annotated[
+        Path | None,
+        typer.Option(help="Folder of what is measured; the same command goes on from there."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
     json: JsonFlag = False,
@@ -201,7 +203,7 @@ def zhao(
     from rig.errors import UsageError
     from rig.reports import zhao as shown
     from rig.simulation.grasper_plant import PROTOTYPES
-    from rig.studies.haptics import run_haptics
+    from rig.studies.haptics import haptics_of
     from rig.studies.zhao import run_study
 
     if prototype not in PROTOTYPES:
@@ -209,14 +211,18 @@ def zhao(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
     with progress() as bar:
-        task = bar.add_task("graspers", total=seeds)
+        task = bar.add_task("graspers", total=3 + 4 * seeds)  # three diagnoses, then four a grasper
 
         def step(name: str) -> None:
             bar.update(task, description=name, advance=1)
 
-        study = run_study(prototype, range(seeds), spread, with_diagnosis=diagnosis, on_step=step)
-    haptics = run_haptics(0, spread, prototype)
-    drawn = shown.write_figures(figures, haptics) if figures is not None else []
+        numbers = range(seeds)
+        study = run_study(prototype, numbers, spread, workers=workers, keep=keep, on_step=step)
+        added = study.lacking["grasp"].terms
+        haptics = haptics_of(
+            prototype, numbers, spread, added, workers=workers, keep=keep, on_step=step
+        )
+    drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
     def markdown() -> str:
         names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
@@ -225,7 +231,9 @@ def zhao(
     lines = [shown.lead(study), *shown.notes(study)]
     show_result(lines, shown.tables(study, haptics), out, markdown)
     if json:
-        emit_json({"study": study, "haptics": haptics})
+        cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
+        found = {dof: lacking.findings for dof, lacking in study.lacking.items()}
+        emit_json({"study": {**cells, "findings": found}, "haptics": haptics})
 
 
 @study_app.command()
@@ -264,6 +272,7 @@ def instruments(
     other: Annotated[
         list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
     ] = None,
+    networks: Annotated[bool, typer.Option(help="Train networks too: minutes.")] = True,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
     out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
     json: JsonFlag = False,
@@ -280,6 +289,7 @@ def instruments(
         study = run_instruments(
             (source, open_campaign(part_of(data, source))),
             {name: open_campaign(part_of(data, name)) for name in others},
+            networks=networks,
             seed=seed,
             on_row=lambda done, total: bar.update(task, completed=done, total=total),
         )

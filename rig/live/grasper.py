@@ -11,7 +11,7 @@ from rig.grasper.wrist import CablePath
 from rig.live.replay import ESTIMATED
 from rig.simulation.grasper_inputs import hold
 from rig.simulation.grasper_plant import RATE_HZ, THIRD
-from rig.studies.zhao import axes_of, record
+from rig.studies.zhao_methods import axes_of, record
 
 SLOPES = {"grasp": 1.28, "pitch": 1.31, "yaw": 1.55}
 """Slope of estimate over force in long steady grasps: the paper's, and for the pitch, whose
@@ -48,13 +48,13 @@ def master_session(seed: int = 0) -> Recording:
         joints[turn * asked.size : (turn + 1) * asked.size, JOINTS.index(dof)] = asked
         motors = chief.motor_rad(chief.counts(joints))
         reached = chief.grasper.joint_position(motors)[:, JOINTS.index(dof)]
-        run = record(dof, axes, reached - reached[0], seed + turn)
+        run = record(dof, dof, axes, reached - reached[0], seed + turn)
         method = CurrentForce(axes[0].arm_m, coefficient=1.0 / SLOPES[dof])
         name = f"{dof}_force_n"
-        columns[name] = run["distal_torque_n_m"][::EVERY] / axes[0].arm_m
-        estimate = method.force_n(run["motor_current_a"], RATE_HZ)
+        columns[name] = run[f"{dof}_torque_n_m"][::EVERY] / axes[0].arm_m
+        estimate = method.force_n(run[f"{dof}_current_a"], RATE_HZ)
         columns[f"{ESTIMATED}{name}"] = estimate[::EVERY]
-        columns[f"{dof}_current_a"] = run["motor_current_a"][::EVERY]
+        columns[f"{dof}_current_a"] = run[f"{dof}_current_a"][::EVERY]
     size = len(next(iter(columns.values())))
     time_s = np.arange(size) * EVERY / RATE_HZ
     return Recording("master", time_s, columns, rig="simulated grasper", source="simulated")

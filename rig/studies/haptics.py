@@ -7,18 +7,22 @@ adds to that slope, to all places alike, so the answer does not need it declared
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
 from estimation.filters import CausalFilter, LowPass
-from estimation.model import Model, predict
+from estimation.model import Model, Term, predict
 from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import FILTER, CurrentForce
 from rig.simulation.grasper_inputs import hold
 from rig.simulation.grasper_plant import PROTOTYPES, RATE_HZ
-from rig.studies.zhao import Axes, axes_of, declared, fitted, record, with_effects
+from rig.studies.resumable import results
+from rig.studies.zhao import mark_of
+from rig.studies.zhao_methods import Axes, axes_of, fitted, record
 
 MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
 """Stiffness at the joint. Assumed; the paper gives none."""
@@ -27,7 +31,9 @@ TISSUE_N_M_RAD, INCLUSION_RATIO = 0.15, 2.0
 PEAK_N = 1.5
 RISE_S = 4.0
 """A palpating grasp is slow: the filters' lag must not pass for a slope."""
+DOF = "grasp"
 LEVEL = 0.95
+"""Confidence from which an answer counts as sure."""
 
 Estimate = Callable[[Recording], tuple[FloatArray, FloatArray]]
 """Gives the force and the angle of a run, N and rad, filtered alike."""
@@ -78,15 +84,62 @@ class Answer:
     place_confidence: float
 
 
-def run_haptics(seed: int = 0, spread: float = 0.1, prototype: str = "third") -> list[Answer]:
+@dataclass(frozen=True)
+class Task:
+    """Both experiments on one grasper: plain data that travels to other processes."""
+
+    prototype: str
+    seed: int
+    spread: float
+    added: tuple[Term, ...]
+
+    @property
+    def file(self) -> str:
+        """Name of its result; the same task has the same name."""
+        return f"{self.prototype}-haptics-{self.seed:03d}-{mark_of(self.spread, self.added)}.json"
+
+
+def haptics_of(
+    prototype: str,
+    seeds: Sequence[int],
+    spread: float,
+    added: Sequence[Term],
+    *,
+    workers: int = 1,
+    keep: Path | None = None,
+    on_step: Callable[[str], None] = lambda _: None,
+) -> list[list[Answer]]:
+    """Return the answers on graspers of one make, one list a seed, in their order.
+
+    Args:
+        prototype: `third`, `journal` or `ball`.
+        seeds: One grasper each.
+        spread: Spread of the hidden parameters from grasper to grasper.
+        added: Effects that ours adds to the declared model.
+        workers: Processes at once.
+        keep: Folder where each result is kept once it is there.
+        on_step: Told what is done.
+    """
+    tasks = [Task(prototype, seed, spread, tuple(added)) for seed in seeds]
+    done = {}
+    for task, answers in results(
+        tasks, run_haptics, _to_json, _from_json, workers=workers, keep=keep
+    ):
+        done[task.seed] = answers
+        on_step(f"haptics of grasper {task.seed}")
+    return [done[seed] for seed in seeds]
+
+
+def run_haptics(task: Task) -> list[Answer]:
     """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
-    axes = axes_of(PROTOTYPES[prototype], "grasp", seed, spread)
+    seed = task.seed
+    axes = axes_of(PROTOTYPES[task.prototype], DOF, seed, task.spread)
     return [
         _answer(name, estimate, axes, seed)
         for name, estimate in {
             "paper's method": _of_current(axes),
-            "ours": _of_model(fitted(axes, seed, with_effects(declared())), axes),
-            "ours, friction not declared": _of_model(fitted(axes, seed, declared()), axes),
+            "ours": _of_model(fitted(DOF, axes, seed, task.added), axes),
+            "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
         }.items()
     ]
 
@@ -126,9 +179,8 @@ def _grasped(
     for _ in range(GRASPS):
         contact = float(random.uniform(0.08, 0.12))
         held = tuple(replace(a, contact_n_m_rad=stiffness, contact_rad=contact) for a in axes)
-        run = record(
-            name, held, hold(held[0], PEAK_N, 0.5, RISE_S), int(random.integers(1_000_000))
-        )
+        asked = hold(held[0], PEAK_N, 0.5, RISE_S)
+        run = record(name, DOF, held, asked, int(random.integers(1_000_000)))
         force, angle = estimate(run)
         slopes.append(_slope(force, angle))
     return Stiffness(name, stiffness / axes[0].arm_m, tuple(slopes))
@@ -156,7 +208,7 @@ def _of_current(axes: Axes) -> Estimate:
     method = CurrentForce(axes[0].arm_m)
 
     def estimate(run: Recording) -> tuple[FloatArray, FloatArray]:
-        return method.force_n(run["motor_current_a"], RATE_HZ), _low(run, FILTER)
+        return method.force_n(run[f"{DOF}_current_a"], RATE_HZ), _low(run, FILTER)
 
     return estimate
 
@@ -169,5 +221,20 @@ def _of_model(model: Model, axes: Axes) -> Estimate:
 
 
 def _low(run: Recording, low_pass: LowPass) -> FloatArray:
-    angle = run["spindle_angle_rad"]
+    angle = run[f"{DOF}_angle_rad"]
     return CausalFilter(run.sample_rate_hz, low_pass).step(angle[:, None])[:, 0]
+
+
+def _to_json(answers: list[Answer]) -> list[dict[str, Any]]:
+    return [asdict(answer) for answer in answers]
+
+
+def _from_json(told: list[dict[str, Any]]) -> list[Answer]:
+    return [
+        Answer(**{**one, "materials": _all(one["materials"]), "places": _all(one["places"])})
+        for one in told
+    ]
+
+
+def _all(told: list[dict[str, Any]]) -> tuple[Stiffness, ...]:
+    return tuple(Stiffness(s["name"], s["true_n_rad"], tuple(s["grasps_n_rad"])) for s in told)
