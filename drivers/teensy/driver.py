@@ -24,6 +24,7 @@ from drivers.teensy.protocol import Ack, Identity, Kind, Result, TripReport
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.transport import Transport
 
+FLASH = "Run: rig firmware flash"
 _REASONS: dict[int, tuple[str, str]] = {
     Result.UNKNOWN_KIND: ("It does not know the command.", "Run: rig firmware flash"),
     Result.WRONG_SIZE: ("The command has the wrong size.", "Run: rig firmware flash"),
@@ -125,11 +126,13 @@ class TeensyLogger:
         except FrameError as error:
             raise self._mismatch("a protocol of another layout", str(error)) from error
         if identity.protocol_hash != self._profile.protocol_hash:
+            other = _profile_named(identity.protocol_hash)
             raise self._mismatch(
-                f"protocol {identity.protocol_hash:08x}{_profile_named(identity.protocol_hash)}",
+                f"protocol {identity.protocol_hash:08x}" + (f" ({other})" if other else ""),
                 f"The board {identity.serial} has firmware {identity.firmware_version},"
                 f" this program goes with"
                 f" {protocol.version_text(protocol.FIRMWARE_VERSION)}.",
+                f'Write profile = "{other}" into [logger], or {FLASH}' if other else FLASH,
             )
         self._identity = identity
         return identity
@@ -266,12 +269,12 @@ class TeensyLogger:
         finally:
             self._link.transport.close()
 
-    def _mismatch(self, theirs: str, why: str) -> ProtocolMismatchError:
+    def _mismatch(self, theirs: str, why: str, fix: str = FLASH) -> ProtocolMismatchError:
         return ProtocolMismatchError(
             f"The board at {self._link.transport.url} speaks {theirs}, this program"
             f" protocol {self._profile.protocol_hash:08x} ({self._profile.name}).",
             why,
-            "Run: rig firmware flash",
+            fix,
         )
 
     def _unconfirmed(self, why: str) -> DisarmUnconfirmedError:
@@ -356,7 +359,7 @@ def _profile_named(protocol_hash: int) -> str:
     named = [
         profile.name for profile in (REFERENCE, GRASPER) if protocol_hash == profile.protocol_hash
     ]
-    return f" ({named[0]})" if named else ""
+    return named[0] if named else ""
 
 
 def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArray[Any]:

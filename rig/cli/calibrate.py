@@ -226,6 +226,7 @@ def _conduct(procedure: "Procedure", how: Keeping) -> None:
     from rig.errors import UsageError
 
     settings = load_config(how.config)
+    _ = settings.reference_limits  # the procedures are of its sensors and its motor
     if how.seed is not None:
         settings = settings.changed(simulation={"seed": how.seed})
     if how.raw is not None:

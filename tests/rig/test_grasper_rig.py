@@ -182,3 +182,5 @@ def test_commands_on_the_grasper_as_a_person_types_them(
     assert "grasper protocol" in capsys.readouterr().err
     assert main(["grip", "-c", "grasper", "--torque", "0.05"]) == 2
     assert "is a grasper" in capsys.readouterr().err
+    assert main(["calibrate", "torque", "-c", "grasper", "--operator", "me", "--yes"]) == 2
+    assert "is a grasper" in capsys.readouterr().err
