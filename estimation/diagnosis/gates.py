@@ -39,7 +39,7 @@ class Gates:
     surrogates: int = 199
     rival: float = 0.5
     veto: float = 0.9
-    form: float = 0.7
+    form: float = 0.8
     sure: float = 0.9
     map_floor: float = 0.2
     kept: float = 0.5
