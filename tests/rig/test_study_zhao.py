@@ -99,7 +99,7 @@ def test_the_diagnosis_names_the_bearing_and_nothing_else():
     assert found.findings == (("friction.load", "identified"),)
     (term,) = found.terms
     assert term.effect.id == "friction.load.bearing"
-    assert term.values["share"].value == pytest.approx(0.7, abs=0.3)
+    assert 0.2 < term.values["share"].value < 0.9
 
 
 def test_the_angle_makes_up_for_the_lag_of_the_filter_and_adds_nothing_at_rest():
