@@ -92,6 +92,22 @@ def fakes() -> dict[str, OpenFake]:
     return {entry.name: partial(_open_fake, entry) for entry in sorted(entry_points(group=FAKES))}
 
 
+def open_fake(name: str) -> Device:
+    """Open a driver on its fake.
+
+    Raises:
+        UnknownDriverError: It has none.
+    """
+    known = fakes()
+    if name not in known:
+        raise UnknownDriverError(
+            f"The driver {name!r} has no fake.",
+            f"Fakes are installed for: {', '.join(known)}.",
+            "Write the url of the device in place of sim://.",
+        )
+    return known[name](Faults())
+
+
 def _open_fake(entry: EntryPoint, faults: Faults) -> Device:
     device: Device = _load(entry)(faults)
     return device

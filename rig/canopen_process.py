@@ -21,6 +21,8 @@ from rig.config import Config
 STARTS_S = 90.0
 """Time for the drive to be set up; the code is compiled the first time."""
 ENDS_S = 3.0
+TAKES_S = 1.0
+"""Time for the process to take what is sent; it looks every 2 ms."""
 LARGEST_READ = 65536
 _KINDS: dict[str, type[DriverError]] = {
     name: kind
@@ -103,7 +105,7 @@ class CanopenProcess:
         """
         self._require_link()
         try:
-            self._socket.setblocking(True)
+            self._socket.settimeout(TAKES_S)
             self._socket.sendall(data)
         except OSError as error:
             raise self._gone() from error
@@ -171,7 +173,10 @@ class CanopenProcess:
 
 
 def _raise_if_error(line: bytes) -> None:
-    told = json.loads(line)
+    try:
+        told = json.loads(line)
+    except ValueError:
+        return  # it was ended in the middle of a line
     if "error" in told:
         kind = _KINDS.get(told["error"], DriverError)
         raise kind(told["what"], told["why"], told["fix"])

@@ -6,7 +6,7 @@ from itertools import combinations
 from typing import Any
 from urllib.parse import parse_qsl
 
-from drivers.registry import CanUse, Driver, drivers
+from drivers.registry import CanUse, Driver, drivers, fakes
 from rig.config import Config, DeviceSection, LoggerSection, is_simulated
 from rig.errors import UsageError
 
@@ -71,6 +71,9 @@ def _driver_problems(
         Problem(key, f"The driver {driver.name} has no option {option!r}.", _one_of(driver.options))
         for option in sorted(set(section.options) - set(driver.options))
     ]
+    if is_simulated(section.url) and driver.name not in fakes():
+        what = f"The driver {driver.name} has no fake."
+        found.append(Problem(key, what, "Write the url of the device in place of sim://."))
     on_can = section.url.startswith("can:")
     if not is_simulated(section.url) and on_can and driver.can is None:
         found.append(Problem(key, f"The driver {driver.name} is on no CAN bus.", "Change its url."))

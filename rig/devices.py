@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from drivers.device import Device
-from drivers.registry import fakes, open_device
+from drivers.registry import open_device, open_fake
 from drivers.teensy.channels import raw_channels
 from drivers.teensy.device import TeensyDevice
-from drivers.transport.faulty import Faults
 from rig.config import Config, DeviceSection, is_simulated
 from rig.config_check import LOGGER
 from rig.logger import open_logger
@@ -24,7 +23,7 @@ def open_section(section: DeviceSection) -> Device:
         DriverError: It cannot be opened.
     """
     if is_simulated(section.url):
-        return fakes()[section.driver](Faults())
+        return open_fake(section.driver)
     return open_device(section.driver, section.url, **section.options)
 
 

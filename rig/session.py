@@ -23,7 +23,7 @@ from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.companions import Companion, open_companions
 from rig.config import Config
-from rig.errors import RigError, SafetyTripError
+from rig.errors import RigError, SafetyTripError, UsageError
 from rig.interrupts import leaving_safely
 from rig.logger import is_real_time
 from rig.machines.choose import machine_of
@@ -157,9 +157,16 @@ class Session:
                 of yaw, jaw 1 and jaw 2, rad.
 
         Raises:
+            UsageError: The motion is for another kind of rig.
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
+        if len(setpoints) != len(self.machine.setpoint_channels):
+            raise UsageError(
+                f"{self.config.name} takes {', '.join(self.machine.setpoint_channels)}.",
+                f"The motion has {len(setpoints)} of them: it is for another kind of rig.",
+                "Choose a configuration with another [logger] profile.",
+            )
         self.machine.check_setpoints(self.config, setpoints)
         most = self.machine.profile.max_setpoints
         blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]

@@ -185,14 +185,15 @@ def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str,
             s["lost"] == 0 and s["duration_s"] >= 0.99 * goal_s,
         )
     ]
+    speed = s["duration_s"] / s["elapsed_s"]
     if part == "soak":
-        speed = s["duration_s"] / s["elapsed_s"]
         return [*rows, (f"{s['where']}: speed", f"{speed:.0f} times real time", "", "")]
     p50, p99, p999, top = s["latency_ms"]
     told = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
     share = f"{100 * s['processor_ratio']:.1f} % of a core"
     return [
         *rows,
+        _row(f"{s['where']}: pace", f"{speed:.3f} times real time", "1", speed > 0.99),
         (f"{s['where']}: latency p50 / p99 / p99.9 / max", told, "", ""),
         _row(f"{s['where']}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
     ]

@@ -27,6 +27,7 @@ class LiveCanBus:
         self._nodes = list(nodes)
         self._began_s = bus.now_s
         self._ticks = 0
+        self._answer()  # that they have booted
 
     @property
     def url(self) -> str:
@@ -46,11 +47,13 @@ class LiveCanBus:
     def send(self, frame: CanFrame) -> None:
         """Send a frame; the nodes take it at once."""
         self._bus.send(frame)
-        self._exchange()
+        while (heard := self._theirs.read(0.0)) is not None:
+            for node in self._nodes:
+                node.receive(heard)
+        self._answer()
 
     def read(self, timeout_s: float) -> CanFrame | None:
         """Return the next frame, letting time pass until there is one or `timeout_s` is over."""
-        self._exchange()
         remaining = max(1, round(timeout_s / TICK_S)) if timeout_s > 0 else 0
         while True:
             frame = self._bus.read(0.0)
@@ -71,13 +74,10 @@ class LiveCanBus:
             time.sleep(early_s)
         for node in self._nodes:
             node.advance(1)
-        self._exchange()
+        self._answer()
 
-    def _exchange(self) -> None:
-        """Let the nodes hear what was said, and say what they say."""
-        while (frame := self._theirs.read(0.0)) is not None:
-            for node in self._nodes:
-                node.receive(frame)
+    def _answer(self) -> None:
+        """Let the nodes say what they have to say."""
         for node in self._nodes:
             for answer in node.transmit():
                 self._theirs.send(answer)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arm.base import base_of
-from estimation.arm.closed_chain import ClosedChain, closed_regressor, parameter_names
 from estimation.arm.motion import LOW_PASS, JointNames, Motion, joint_names
 from estimation.arm.regressor import SIGN_WIDTH, regressor
 from estimation.arm.regressor import names as serial_names
@@ -27,7 +26,7 @@ ARMS = (PSM,)
 CORRECTIONS = 3
 """Changes of the links' parameters that each joint's balance fits anew beside every candidate."""
 
-OWN = ("F", "f", "Ke", "Ia", "tau0")
+OWN = ("F", "Ke", "Ia", "tau0")
 """How the names of parameters begin that belong to one joint and are declared in its balance."""
 
 
@@ -113,34 +112,8 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
         columns,
         shared,
         SIGN_WIDTH * np.array([joint.speed for joint in arm.joints]),
-        np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
-        arm.wrist or 0,
-    )
-
-
-def closed(chain: ClosedChain, recording: Recording, sign_rad_s: float) -> ArmBalances:
-    """Return the balances of an arm with closed loops; its frictions are its actuated joints' own.
-
-    Args:
-        chain: The arm.
-        recording: Any of its recordings; tells the channels' names.
-        sign_rad_s: Speed over which Coulomb friction changes sign.
-    """
-    names = joint_names(recording)[: len(chain.reach)]
-    shared = np.array([not name.startswith(OWN) for name in parameter_names(chain)])
-
-    def columns(motion: Motion) -> FloatArray:
-        return closed_regressor(chain, motion, sign_rad_s)
-
-    source = f"{chain.name}; {chain.source}"
-    each = zip(names, _changes(columns, shared, len(names)), strict=True)
-    return ArmBalances(
-        chain.name,
-        tuple(_model(own, _of_every_joint(own, changes), source) for own, changes in each),
-        tuple(names),
-        columns,
-        shared,
-        np.full(len(names), sign_rad_s),
+        motors=np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
+        wrist=arm.wrist or 0,
     )
 
 

@@ -272,6 +272,7 @@ def instruments(
     other: Annotated[
         list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
     ] = None,
+    networks: Annotated[bool, typer.Option(help="Train networks too: minutes.")] = True,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
     out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
     json: JsonFlag = False,
@@ -288,6 +289,7 @@ def instruments(
         study = run_instruments(
             (source, open_campaign(part_of(data, source))),
             {name: open_campaign(part_of(data, name)) for name in others},
+            networks=networks,
             seed=seed,
             on_row=lambda done, total: bar.update(task, completed=done, total=total),
         )

@@ -10,6 +10,14 @@ from rig.cli.output import JsonFlag, emit_json, progress, show_result
 
 arm_studies = typer.Typer(rich_markup_mode=None)
 
+StateFolder = Annotated[
+    Path | None, typer.Option("--state", help="Folder of finished arms; a cache folder by default.")
+]
+
+
+def _kept_in(state: Path | None, study: str) -> Path:
+    return state or Path.home() / ".cache" / "rig" / study
+
 
 @arm_studies.command()
 def pique(
@@ -78,6 +86,7 @@ def excitation(
 def wrench(
     seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
@@ -87,7 +96,9 @@ def wrench(
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
-        study = run_wrench_study(seeds, workers, lambda: bar.advance(task))
+        study = run_wrench_study(
+            seeds, _kept_in(state, "wrench"), workers, lambda: bar.advance(task)
+        )
     show_result(shown.NOTES, shown.tables(study), out, lambda: shown.markdown(study))
     if json:
         emit_json(study)
@@ -96,6 +107,8 @@ def wrench(
 @arm_studies.command()
 def delsol(
     seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
@@ -106,7 +119,7 @@ def delsol(
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
-        study = run_delsol(seeds, lambda: bar.advance(task))
+        study = run_delsol(seeds, _kept_in(state, "delsol"), workers, lambda: bar.advance(task))
     note = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
 
     def markdown() -> str:
@@ -123,9 +136,7 @@ def delsol(
 def zhang(
     seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
-    state: Annotated[
-        Path | None, typer.Option(help="Folder of finished arms; a cache folder by default.")
-    ] = None,
+    state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
     json: JsonFlag = False,
@@ -135,7 +146,7 @@ def zhang(
     from rig.reports.zhang_figures import write_figures
     from rig.studies.zhang import run_zhang
 
-    kept = state or Path.home() / ".cache" / "rig" / "zhang"
+    kept = _kept_in(state, "zhang")
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))

@@ -8,6 +8,8 @@ it adds slip and what the diagnosis of the residual found: a pull by position on
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,9 @@ from rig.simulation.hydraulic_arm import (
     draw,
     measured_torque,
 )
+from rig.studies.seeds import kept_outcomes
+
+SCHEMA = "rig.study.delsol/1"
 
 TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
 TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
@@ -88,23 +93,45 @@ class DelSolStudy:
     provenance: Provenance
 
 
-def run_delsol(seeds: int, on_seed: Callable[[], None] = lambda: None) -> DelSolStudy:
-    """Do the study on arms of several seeds, from 0."""
-    outcomes: dict[str, list[Outcome]] = {PAPER: [], OURS: []}
-    found = []
-    for seed in range(seeds):
-        by_method, hose = one_seed(seed)
-        for method, outcome in by_method.items():
-            outcomes[method].append(outcome)
-        found.append(hose)
-        on_seed()
-    fixed = {method: tuple(each) for method, each in outcomes.items()}
-    numbers = tuple(range(seeds))
-    return DelSolStudy("rig.study.delsol/1", numbers, fixed, tuple(found), Provenance.now(0))
+@dataclass(frozen=True)
+class Seed:
+    """One arm's results by method, and where the hoses were found."""
+
+    outcomes: dict[str, Outcome]
+    hose: tuple[int, float]
 
 
-def one_seed(seed: int) -> tuple[dict[str, Outcome], tuple[int, float]]:
-    """Return one arm's results by method, and where the hoses were found."""
+def run_delsol(
+    seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
+) -> DelSolStudy:
+    """Do the study on arms of several seeds, from 0.
+
+    Args:
+        seeds: How many.
+        state: Folder where the outcome of each seed is kept.
+        workers: Processes; each does one seed.
+        on_seed: Called after each seed, also after one that was kept.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
+    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in (PAPER, OURS)}
+    hoses_found = tuple(seed.hose for seed in done)
+    return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, hoses_found, Provenance.now(0))
+
+
+def _read(held: Any) -> Seed:
+    outcomes = {
+        method: Outcome(**{**each, "residual_n_m": tuple(each["residual_n_m"])})
+        for method, each in held["outcomes"].items()
+    }
+    joint, share = held["hose"]
+    return Seed(outcomes, (joint, share))
+
+
+def one_seed(seed: int) -> Seed:
+    """Do one arm."""
     rng = np.random.default_rng([seed, 2014])
     arm = draw(rng)
     runs = [(m, measured_torque(arm, m, np.zeros((len(m), 3)), rng)) for m in swings(rng)]
@@ -130,7 +157,7 @@ def one_seed(seed: int) -> tuple[dict[str, Outcome], tuple[int, float]]:
             impact_percent=100 * errors["impact"] / peak,
             sliding_n=errors["sliding"],
         )
-    return outcomes, hose
+    return Seed(outcomes, hose)
 
 
 def swings(rng: np.random.Generator) -> list[Motion]:

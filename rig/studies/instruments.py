@@ -47,10 +47,10 @@ class InstrumentStudy:
     provenance: Provenance
 
 
-def recipes() -> dict[str, Recipe]:
-    """Return what fits each kind; networks only where torch is installed."""
+def recipes(networks: bool) -> dict[str, Recipe]:
+    """Return what fits each kind; networks only where they are wanted and torch is installed."""
     found: dict[str, Recipe] = {"products of physical states": BankRecipe(TARGET, Bank(LOAD))}
-    if has_torch():
+    if networks and has_torch():
         inputs = (*STATE_INPUTS, LOAD)
         found |= {
             "network with physical states": NetworkRecipe(
@@ -65,6 +65,7 @@ def run_instruments(
     source: tuple[str, Campaign],
     others: Mapping[str, Campaign],
     used: Sequence[Sequence[str]] = USED,
+    networks: bool = True,
     seed: int = 0,
     on_row: Callable[[int, int], None] = lambda done, total: None,
 ) -> InstrumentStudy:
@@ -74,6 +75,7 @@ def run_instruments(
         source: Name and runs of the instrument that estimators are fitted on.
         others: Name and runs of the others.
         used: Names of the runs adapted with, one row each.
+        networks: Whether to train networks too.
         seed: Seed of the folds of fits anew.
         on_row: Called with the number of rows done and their total.
 
@@ -82,7 +84,7 @@ def run_instruments(
         MissingChannelError: A run lacks a channel.
     """
     name, campaign = source
-    wanted = recipes()
+    wanted = recipes(networks)
     total = len(wanted) * len(others) * len(used)
     rows: list[InstrumentRow] = []
     for kind, recipe in wanted.items():

@@ -5,12 +5,14 @@ name made of the data and of all settings; a study that was interrupted goes on 
 """
 
 import hashlib
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 
@@ -383,7 +385,7 @@ def _train_all(
     done = 0
     on_network(0, len(tasks))
     # torch's threads do not survive a fork
-    with ProcessPoolExecutor(workers, get_context("spawn"), _one_thread) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin_worker) as pool:
         running: set[Future[None]] = set()
         try:
             while True:
@@ -404,7 +406,16 @@ def _train_all(
             raise
 
 
-def _one_thread() -> None:
+def _begin_worker() -> None:
     import torch
 
     torch.set_num_threads(1)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End when the study was killed, which closes no pool."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

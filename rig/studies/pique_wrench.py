@@ -2,21 +2,24 @@
 
 Each seed draws an arm with effects that no model declares, excites it, identifies it, and looks at
 other motions and at contact with a force sensor of its own faults. The thesis' own method first;
-then columns filtered as the torque, slip of the joints, and joints weighed by their errors.
+then columns filtered as the torque, slip of the joints, and joints weighed by their errors; then
+the same with a window of past samples in place of the zero-phase filter.
 """
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from estimation.arm.base import base_of
 from estimation.arm.effects import on_joint
 from estimation.arm.elements import slip
 from estimation.arm.identification import fit, nrmsd_percent, smoothed, thesis_weights
-from estimation.arm.motion import FINE, LOW_PASS, motion_of
+from estimation.arm.motion import FINE, LOW_PASS, Motion, motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import by_pseudo_inverse, most_likely, spatial_jacobians
@@ -33,9 +36,13 @@ from rig.simulation.arm import (
     simulate,
     smooth_motion,
 )
+from rig.studies.seeds import kept_outcomes
+
+SCHEMA = "rig.study.pique.wrench/1"
 
 THESIS = "thesis' method"
 OURS = "with slip and errors weighed"
+CAUSAL = "the same, causal"
 
 TABLES = {
     "3.1, a hand's motion": (5.92, 5.78, 18.84, 10.41, 16.84, 22.96),
@@ -47,6 +54,8 @@ TABLES = {
 HAND, SERIES, CONTACT = TABLES
 
 CUT = slice(100, -100)
+WINDOW, ORDER = 25, 3
+"""Samples and degree of the causal window: a quarter of a second, an eighth late."""
 SLIP_SHARE = (0.003, 0.01, 0.03, 0.1)
 DAMPING = 1e-4
 WITHIN = 0.25
@@ -86,25 +95,32 @@ class WrenchStudy:
     provenance: Provenance
 
 
+@dataclass(frozen=True)
+class Seed:
+    """Errors of one arm, %, by table and, in it, by method."""
+
+    errors: dict[str, dict[str, tuple[float, ...]]]
+
+
 def run_wrench_study(
-    seeds: int, workers: int = 1, on_seed: Callable[[], None] = lambda: None
+    seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
 ) -> WrenchStudy:
     """Do the study on arms of several seeds.
 
     Args:
         seeds: How many; from 0.
+        state: Folder where the outcome of each seed is kept.
         workers: Processes at once.
-        on_seed: Called after each seed.
+        on_seed: Called after each seed, also after one that was kept.
+
+    Raises:
+        OSError: The folder cannot be written.
     """
-    numbers = tuple(range(seeds))
-    found = []
-    for errors in _each(numbers, workers):
-        found.append(errors)
-        on_seed()
+    done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
     cells = tuple(
-        Cell(table, method, tuple(errors[table, method] for errors in found))
+        Cell(table, method, tuple(seed.errors[table][method] for seed in done))
         for table in TABLES
-        for method in (THESIS, OURS)
+        for method in (THESIS, OURS, CAUSAL)
     )
     fair = {
         cell.table: tuple(
@@ -113,21 +129,20 @@ def run_wrench_study(
         for cell in cells
         if cell.method == THESIS
     }
-    return WrenchStudy("rig.study.pique.wrench/1", numbers, cells, fair, Provenance.now(0))
+    return WrenchStudy(SCHEMA, tuple(range(seeds)), cells, fair, Provenance.now(0))
 
 
-def _each(
-    seeds: tuple[int, ...], workers: int
-) -> Iterator[dict[tuple[str, str], tuple[float, ...]]]:
-    if workers == 1:
-        yield from map(one_seed, seeds)
-        return
-    with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(one_seed, seeds)
+def _read(held: Any) -> Seed:
+    return Seed(
+        {
+            table: {method: tuple(error) for method, error in methods.items()}
+            for table, methods in held["errors"].items()
+        }
+    )
 
 
-def one_seed(seed: int) -> dict[tuple[str, str], tuple[float, ...]]:
-    """Return the errors of one arm by table and method, %."""
+def one_seed(seed: int) -> Seed:
+    """Do one arm."""
     rng = np.random.default_rng([seed, 20180])
     arm = draw_arm(rng)
     learnt = simulate(arm, excitation(rng), rng)
@@ -136,24 +151,28 @@ def one_seed(seed: int) -> dict[tuple[str, str], tuple[float, ...]]:
     touched = contact_motion(rng, 60.0)
     touch = simulate(arm, touched, rng, contact(rng, touched))
     sensor = ati(touch.wrench, rng)
-    errors = {}
-    for method, columns_of in ((THESIS, _thesis_columns), (OURS, _our_columns)):
-        own, torque = columns_of(learnt), _filtered(learnt.torque)
+    errors: dict[str, dict[str, tuple[float, ...]]] = {table: {} for table in TABLES}
+    for method, columns_of, filtered in (
+        (THESIS, _thesis_columns, _filtered),
+        (OURS, _our_columns, _filtered),
+        (CAUSAL, _causal_columns, _smoothed),
+    ):
+        own, torque = columns_of(learnt), filtered(learnt.torque)
         damping = 0.0 if method == THESIS else DAMPING
         values = fit(own, torque, thesis_weights(torque), damping).values
         left = np.std(torque - own @ values, axis=0)
         for table, run in free.items():
-            error = nrmsd_percent(columns_of(run) @ values, _filtered(run.torque))
-            errors[table, method] = tuple(map(float, error))
-        external = _filtered(touch.torque) - columns_of(touch) @ values
-        jacobians = spatial_jacobians(PSM, zero_phase(touch.position, RATE_HZ, LOW_PASS)[CUT])
+            error = nrmsd_percent(columns_of(run) @ values, filtered(run.torque))
+            errors[table][method] = tuple(map(float, error))
+        external = filtered(touch.torque) - columns_of(touch) @ values
+        jacobians = spatial_jacobians(PSM, filtered(touch.position))
         if method == THESIS:
             wrench = by_pseudo_inverse(jacobians, external)
         else:
             wrench = most_likely(jacobians, external, left).value
-        error = nrmsd_percent(wrench, _filtered(sensor))
-        errors[CONTACT, method] = tuple(map(float, error))
-    return errors
+        error = nrmsd_percent(wrench, filtered(sensor))
+        errors[CONTACT][method] = tuple(map(float, error))
+    return Seed(errors)
 
 
 def _filtered(values: FloatArray) -> FloatArray:
@@ -166,13 +185,30 @@ def _thesis_columns(run: ArmRun) -> FloatArray:
 
 
 def _our_columns(run: ArmRun) -> FloatArray:
-    motion = motion_of(run.position, 1 / RATE_HZ, FINE)
+    columns = _with_slip(motion_of(run.position, 1 / RATE_HZ, FINE))
+    return smoothed(columns, RATE_HZ, LOW_PASS)[CUT]
+
+
+def _smoothed(values: FloatArray, derivative: int = 0) -> FloatArray:
+    """Return what a window of past samples tells half a window late, as `LiveWrench` does."""
+    late: FloatArray = savgol_filter(
+        values, WINDOW, ORDER, deriv=derivative, delta=1 / RATE_HZ, axis=0
+    )[CUT]
+    return late
+
+
+def _causal_columns(run: ArmRun) -> FloatArray:
+    position, velocity, acceleration = (_smoothed(run.position, k) for k in range(3))
+    return _with_slip(Motion(position, velocity, acceleration, 1 / RATE_HZ))
+
+
+def _with_slip(motion: Motion) -> FloatArray:
     parts = [regressor(PSM, motion)[:, :, base_of(PSM).columns]]
     for k, joint in enumerate(PSM.joints):
         half = (joint.upper - joint.lower) / 2
         slips = [slip(motion.position[:, [k]], share * half) for share in SLIP_SHARE]
         parts.append(on_joint(np.hstack(slips), k, len(PSM.joints)))
-    return smoothed(np.concatenate(parts, axis=2), RATE_HZ, LOW_PASS)[CUT]
+    return np.concatenate(parts, axis=2)
 
 
 def ati(wrench: FloatArray, rng: np.random.Generator) -> FloatArray:

@@ -1,26 +1,19 @@
-"""Zhang et al. 2022 on simulated seven-joint arms: all seeds, kept as they are done.
+"""Zhang et al. 2022 on simulated seven-joint arms: all seeds, kept as they are done."""
 
-An outcome is kept under a name made of the seed and of the source that makes it, so a study that
-was interrupted goes on where it stopped and never mixes in what other source made.
-"""
-
-import hashlib
-import json
 from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from estimation.arm.kinematics import pinocchio
-from estimation.files import write_text_atomic
 from estimation.networks.training import has_torch
 from estimation.recording import FloatArray
 from rig.errors import UsageError
 from rig.reports.provenance import Provenance
+from rig.studies.seeds import kept_outcomes
 from rig.studies.zhang_free import NETWORKS, Cells
 from rig.studies.zhang_seed import Outcome, one_seed
 
@@ -137,18 +130,9 @@ def run_zhang(
             fix="Install it: pip install 'rig[learn]'.",
         )
     pinocchio()
-    source = source_digest()
-    places = {seed: state / f"{source}-{seed}.json" for seed in range(seeds)}
-    outcomes: dict[int, Outcome] = {}
-    for seed, place in places.items():
-        kept = _kept(place)
-        if kept is not None:
-            outcomes[seed] = kept
-            on_seed()
-    for seed, outcome in _each([seed for seed in places if seed not in outcomes], workers):
-        write_text_atomic(places[seed], json.dumps(asdict(outcome)))
-        outcomes[seed] = outcome
-        on_seed()
+    outcomes = kept_outcomes(
+        one_seed, _read, seeds, state, SCHEMA, workers=workers, start=_one_thread, on_seed=on_seed
+    )
     numbers = tuple(range(seeds))
     found = Counter(name for seed in numbers for name in outcomes[seed].effects)
     return ZhangStudy(
@@ -161,41 +145,12 @@ def run_zhang(
     )
 
 
-def source_digest() -> str:
-    """Return a name for the source that outcomes come from: estimation, simulation, this study."""
-    root = Path(__file__).parents[2]
-    parts = [root / "estimation", root / "rig" / "simulation", root / "rig" / "studies"]
-    digest = hashlib.sha256(SCHEMA.encode())
-    for path in sorted(path for part in parts for path in part.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _kept(place: Path) -> Outcome | None:
-    try:
-        held = json.loads(place.read_text())
-        cells, traces = (
-            {name: tuple(numbers) for name, numbers in held[part].items()}
-            for part in ("cells", "traces")
-        )
-        return Outcome(cells, traces, tuple(held["effects"]))
-    except (OSError, ValueError, KeyError, AttributeError, TypeError):
-        return None  # not there, or damaged: it is made again
-
-
-def _each(seeds: list[int], workers: int) -> Iterator[tuple[int, Outcome]]:
-    """Do seeds in processes of their own, so that each keeps to one core."""
-    if not seeds:
-        return
-    # torch's threads do not survive a fork
-    with ProcessPoolExecutor(workers, get_context("spawn"), _one_thread) as pool:
-        running = {pool.submit(one_seed, seed): seed for seed in seeds}
-        try:
-            for future in as_completed(running):
-                yield running[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+def _read(held: Any) -> Outcome:
+    cells, traces = (
+        {name: tuple(numbers) for name, numbers in held[part].items()}
+        for part in ("cells", "traces")
+    )
+    return Outcome(cells, traces, tuple(held["effects"]))
 
 
 def _one_thread() -> None:

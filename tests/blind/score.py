@@ -75,8 +75,9 @@ def _level(truth: Truth, findings: Sequence[Mapping[str, Any]]) -> str:
         if not _shows(finding, truth):
             continue
         families = {finding["family"], *finding["alternatives"]}
-        if finding["verdict"] == "identified" and truth.names(finding["family"]):
-            said.add("right name")
+        named = finding["verdict"] in ("identified", "one_of")
+        if named and all(map(truth.names, families)):
+            said.add("right name")  # rivals that no sensor tells apart are one name
         elif finding["verdict"] == "one_of" and any(map(truth.names, families)):
             said.add("one of")
         elif finding["verdict"] == "depends_on" and (

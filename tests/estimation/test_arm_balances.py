@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.arm.balances import balances_of, closed
+from estimation.arm.balances import balances_of
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import motion_of
 from estimation.arm.shared import shared_fit, with_links
@@ -15,7 +15,6 @@ from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
-from rig.simulation.hydraulic_arm import HYDRAULIC, SIGN_RAD_S
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 
@@ -97,14 +96,3 @@ def test_the_wrists_motors_and_a_sliding_joint_are_among_the_candidates() -> Non
 
 
 RENAMED = {"angle_rad": "position_m", "velocity_rad_s": "velocity_m_s", "torque_n_m": "force_n"}
-
-
-def test_a_closed_chains_joints_are_balances_too() -> None:
-    time = np.arange(1500)[:, None] / 50
-    position = 0.3 * np.sin(2 * np.pi * time * (0.1 + 0.07 * np.arange(5)) + np.arange(5))
-    run = recorded("swing", position, np.cumsum(0.01 * np.sin(position), axis=0), 50.0)
-    arm = closed(HYDRAULIC, run, SIGN_RAD_S)
-    (whole,) = with_links(arm, [run], shared_fit(arm, [run]))
-    assert [m.balance for m in arm.models] == [f"joint.{k}" for k in range(1, 6)]
-    assert np.isfinite(whole["joint_5_links_torque_n_m"]).all()
-    assert balances_of(run) is None

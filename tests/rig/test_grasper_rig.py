@@ -123,6 +123,9 @@ def test_protocols_and_rigs_of_different_kinds_refuse_each_other(tmp_path: Path)
         mixed(grasper(), "quick", tmp_path / "a")
     with pytest.raises(UsageError, match=r"joints of a grasper"):
         mixed(load_config(), "grasper", tmp_path / "b")
+    with Session(grasper(), open_logger(grasper())) as session:  # noqa: SIM117
+        with pytest.raises(UsageError, match=r"yaw_target_rad.*another kind of rig"):
+            next(session.play(STILL, STILL))
     two = [table("yaw", 0.1), {"kind": "sine", "frequencies_hz": [1.0], "loads_a": [0.0]}]
     with pytest.raises(ValueError, match="no rig has both"):
         Protocol.model_validate({"name": "both", "runs": two})

@@ -78,7 +78,7 @@ def test_a_part_that_was_not_measured_here_keeps_its_rows(
     earlier = page.TABLE.read_text()
     monkeypatch.setattr(fuzz, "STATE", tmp_path / "fuzz.json")
     rows = [line for line in earlier.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 + 12 + len(TARGETS)
+    assert len(rows) >= 2 + 12 + len(TARGETS)
     kept = page.written({}, earlier)
     assert [line for line in kept.splitlines() if line.startswith("| ")] == rows
     kills = {"count": 3, "most_lost_s": 0.5, "median_lost_s": 0.1}

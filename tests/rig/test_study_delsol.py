@@ -14,7 +14,8 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install
 
 def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):
     out = tmp_path / "delsol.md"
-    ran = CliRunner().invoke(study_app, ["delsol", "--seeds", "1", "--json", "--out", str(out)])
+    words = ["delsol", "--seeds", "1", "--json", "--out", str(out), "--state", str(tmp_path)]
+    ran = CliRunner().invoke(study_app, words)
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
     joint, share = found["hoses_found"][0]

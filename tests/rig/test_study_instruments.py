@@ -7,8 +7,7 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.reports import instruments as shown
-from rig.studies import instruments
-from rig.studies.instruments import recipes, run_instruments
+from rig.studies.instruments import run_instruments
 from tests.estimation.synthetic import campaign
 
 TARGET = "proximal_torque_n_m"
@@ -21,14 +20,12 @@ def other(run: Recording) -> Recording:
 @pytest.fixture(scope="module")
 def study():
     runs = [replace(run, name=f"{k:02}") for k, run in enumerate(campaign())]
-    states = {kind: recipe for kind, recipe in recipes().items() if "network" not in kind}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(instruments, "recipes", lambda: states)
-        return run_instruments(
-            ("own", Campaign.of(runs)),
-            {"other": Campaign.of(other(run) for run in runs)},
-            used=(("01",), ("01", "05")),
-        )
+    return run_instruments(
+        ("own", Campaign.of(runs)),
+        {"other": Campaign.of(other(run) for run in runs)},
+        used=(("01",), ("01", "05")),
+        networks=False,
+    )
 
 
 def test_adapting_helps_and_a_fit_anew_stands_beside_the_first_row(study):

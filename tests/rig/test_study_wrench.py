@@ -16,11 +16,12 @@ from rig.studies.pique_wrench import ati
 
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
     out = tmp_path / "wrench.md"
-    ran = CliRunner().invoke(study_app, ["wrench", "--seeds", "2", "--json", "--out", str(out)])
+    words = ["wrench", "--seeds", "2", "--json", "--out", str(out), "--state", str(tmp_path)]
+    ran = CliRunner().invoke(study_app, words)
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
     assert found["seeds"] == [0, 1]
-    assert len(found["cells"]) == 6
+    assert len(found["cells"]) == 9
     assert all(len(cell["nrmsd_percent"]) == 2 for cell in found["cells"])
     thesis, ours = (
         np.mean([c["nrmsd_percent"] for c in found["cells"] if ("thesis" in c["method"]) is own])

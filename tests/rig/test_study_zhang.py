@@ -14,7 +14,7 @@ from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrumen
 from rig.simulation.psm_grasp import configurations, grasp_and_release
 from rig.simulation.psm_instruments import KINDS
 from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies import zhang_free, zhang_networks, zhang_physics, zhang_seed
+from rig.studies import zhang_free, zhang_networks, zhang_physics
 from rig.studies.zhang import PAPER, run_zhang
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
@@ -123,7 +123,7 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     monkeypatch.setattr(zhang_free, "OUR_OTHER_MINUTES", 0.5)
     monkeypatch.setattr(zhang_networks, "SETTINGS", Settings(nodes=4, iterations=8))
     monkeypatch.setattr(zhang_networks, "TRANSFER", Settings(nodes=4, iterations=5))
-    monkeypatch.setattr("rig.studies.zhang._each", here)
+    monkeypatch.setattr("rig.studies.seeds._done", here)
     out, state = tmp_path / "zhang.md", tmp_path / "state"
     words = ["zhang", "--seeds", "1", "--json", "--out", str(out), "--state", str(state)]
     ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path)])
@@ -145,17 +145,17 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
             assert after < before / 2
     assert "| M+C on M: paper | lost | lost | 6.11 | lost | lost | lost |" in out.read_text()
     assert (tmp_path / "zhang-grasp.svg").exists()
-    monkeypatch.setattr("rig.studies.zhang._each", nothing_left)
+    monkeypatch.setattr("rig.studies.seeds._done", nothing_left)
     again = run_zhang(1, state)
     assert {cell: list(numbers) for cell, numbers in again.outcomes[0].items()} == cells
     assert set(PAPER) <= {cell.rsplit(" | ", 1)[0] for cell in cells}
 
 
-def here(seeds, workers):
+def here(one_seed, seeds, workers, start):
     for seed in seeds:
-        yield seed, zhang_seed.one_seed(seed)
+        yield seed, one_seed(seed)
 
 
-def nothing_left(seeds, workers):
+def nothing_left(one_seed, seeds, workers, start):
     assert seeds == []
     return iter(())

@@ -1,0 +1,92 @@
+"""Seeds of a simulated study, each kept as it is done.
+
+An outcome is kept under a name made of the seed and of the source that makes it, so a study that
+was interrupted goes on where it stopped and never mixes in what other source made.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+from estimation.files import write_text_atomic
+
+T = TypeVar("T")
+
+
+def kept_outcomes(
+    one_seed: Callable[[int], T],
+    read: Callable[[Any], T],
+    seeds: int,
+    state: Path,
+    schema: str,
+    *,
+    workers: int = 1,
+    start: Callable[[], None] | None = None,
+    on_seed: Callable[[], None] = lambda: None,
+) -> list[T]:
+    """Do seeds from 0 that are not kept yet, and return the outcomes of all in order.
+
+    Args:
+        one_seed: Does one seed; returns a dataclass of what JSON can hold.
+        read: Makes that outcome of its JSON again; raises where it is damaged.
+        seeds: How many.
+        state: Folder where outcomes are kept.
+        schema: Name of the study's layout.
+        workers: Processes; each does one seed at a time.
+        start: Called first in each process; None with one worker works in this one.
+        on_seed: Called after each seed, also after one that was kept.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    source = source_digest(schema)
+    places = {seed: state / f"{source}-{seed}.json" for seed in range(seeds)}
+    outcomes: dict[int, T] = {}
+    for seed, place in places.items():
+        try:
+            outcomes[seed] = read(json.loads(place.read_text()))
+        except (OSError, ValueError, KeyError, AttributeError, TypeError):
+            continue  # not there, or damaged: it is made again
+        on_seed()
+    missing = [seed for seed in places if seed not in outcomes]
+    for seed, outcome in _done(one_seed, missing, workers, start):
+        held: Any = outcome
+        write_text_atomic(places[seed], json.dumps(asdict(held)))
+        outcomes[seed] = outcome
+        on_seed()
+    return [outcomes[seed] for seed in range(seeds)]
+
+
+def source_digest(schema: str) -> str:
+    """Return a name for the source that outcomes come from: estimation, simulation, studies."""
+    root = Path(__file__).parents[2]
+    parts = [root / "estimation", root / "rig" / "simulation", root / "rig" / "studies"]
+    digest = hashlib.sha256(schema.encode())
+    for path in sorted(path for part in parts for path in part.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _done(
+    one_seed: Callable[[int], T], seeds: list[int], workers: int, start: Callable[[], None] | None
+) -> Iterator[tuple[int, T]]:
+    if workers == 1 and start is None:
+        for seed in seeds:
+            yield seed, one_seed(seed)
+        return
+    if not seeds:
+        return
+    # threads, such as a learning library's, do not survive a fork
+    with ProcessPoolExecutor(workers, get_context("spawn"), start) as pool:
+        running = {pool.submit(one_seed, seed): seed for seed in seeds}
+        try:
+            for future in as_completed(running):
+                yield running[future], future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

@@ -1,0 +1,71 @@
+"""A driver of another package: found by its entry point, opened, and named when it is broken."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import DriverError
+from drivers.registry import UnknownDriverError, drivers, open_device
+from rig.config import Config, load_config
+from rig.config_check import problems
+from rig.devices import open_section
+
+MODULE = '''
+"""A scale on a serial line."""
+from drivers.errors import PortNotFoundError
+from drivers.registry import Driver
+
+def open_scale(url: str, rate_hz: float = 10.0):
+    raise PortNotFoundError(f"no scale at {url}, {rate_hz} Hz")
+
+DRIVER = Driver("acme-scale", "ACME bench scale", open_scale)
+'''
+
+
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry: str) -> None:
+    """Put a package with one driver on the path, as pip would."""
+    (folder / "acme_scale.py").write_text(MODULE)
+    info = folder / "acme-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[rig.drivers]\nacme-scale = {entry}\n")
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "acme_scale", raising=False)
+
+
+def with_scale(url: str, **options: object) -> Config:
+    scale = {"driver": "acme-scale", "url": url, "options": options}
+    return load_config().changed(devices={"scale": scale})
+
+
+def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, monkeypatch, "acme_scale:DRIVER")
+    assert drivers()["acme-scale"].options == {"rate_hz": 10.0}
+    with pytest.raises(DriverError, match=r"no scale at /dev/ttyS9, 5.0 Hz"):
+        open_device("acme-scale", "/dev/ttyS9", rate_hz=5.0)
+    assert not problems(with_scale("/dev/ttyS9"))
+    (problem,) = problems(with_scale("/dev/ttyS9", colour="red"))
+    assert "colour" in problem.what
+
+
+def test_one_without_a_fake_is_told_where_one_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, monkeypatch, "acme_scale:DRIVER")
+    config = with_scale("sim://")
+    (problem,) = problems(config)
+    assert "no fake" in problem.what
+    with pytest.raises(DriverError, match="no fake"):
+        open_section(config.devices["scale"])
+
+
+@pytest.mark.parametrize("entry", ["acme_scale:NONE", "acme_nonesuch:DRIVER", "acme_scale:MODULE"])
+def test_a_broken_one_names_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, entry: str
+) -> None:
+    install(tmp_path, monkeypatch, entry)
+    with pytest.raises(UnknownDriverError, match=r"acme"):
+        drivers()

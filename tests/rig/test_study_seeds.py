@@ -1,0 +1,43 @@
+"""Seeds of a study are kept, and only what is missing or damaged is made again."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig.studies.seeds import kept_outcomes
+
+
+@dataclass(frozen=True)
+class Square:
+    value: int
+
+
+made: list[int] = []
+
+
+def square(seed: int) -> Square:
+    made.append(seed)
+    return Square(seed * seed)
+
+
+def run(state: Path, seeds: int, schema: str = "squares/1") -> tuple[list[int], int]:
+    made.clear()
+    told: list[None] = []
+    found = kept_outcomes(
+        square,
+        lambda held: Square(int(held["value"])),
+        seeds,
+        state,
+        schema,
+        on_seed=lambda: told.append(None),
+    )
+    assert len(told) == seeds
+    return [each.value for each in found], len(made)
+
+
+def test_a_stopped_study_goes_on_and_a_damaged_outcome_is_made_again(tmp_path: Path) -> None:
+    assert run(tmp_path, 2) == ([0, 1], 2)
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 2)
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 0)
+    next(tmp_path.glob("*-3.json")).write_text("{")
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 1)
+    assert run(tmp_path, 2, "squares/2") == ([0, 1], 2)  # another layout is another study
