@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.output import JsonFlag, console, emit_json, progress, show_result
-from rig.cli.study_arm import arm_studies
+from rig.cli.study_arm import StateFolder, arm_studies, kept_in
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
@@ -191,10 +191,7 @@ def zhao(
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
     workers: Annotated[int, typer.Option(min=1, help="Processes at once.")] = 1,
-    keep: Annotated[
-        Path | None,
-        typer.Option(help="Folder of what is measured; the same command goes on from there."),
-    ] = None,
+    state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
     json: JsonFlag = False,
@@ -211,17 +208,15 @@ def zhao(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
     with progress() as bar:
-        task = bar.add_task("graspers", total=3 + 4 * seeds)  # three diagnoses, then four a grasper
+        task = bar.add_task("graspers", total=3 + 2 * seeds)  # three diagnoses
 
-        def step(name: str) -> None:
-            bar.update(task, description=name, advance=1)
+        def step() -> None:
+            bar.advance(task)
 
-        numbers = range(seeds)
-        study = run_study(prototype, numbers, spread, workers=workers, keep=keep, on_step=step)
+        kept = kept_in(state, "zhao")
+        study = run_study(prototype, seeds, spread, kept, workers=workers, on_step=step)
         added = study.lacking["grasp"].terms
-        haptics = haptics_of(
-            prototype, numbers, spread, added, workers=workers, keep=keep, on_step=step
-        )
+        haptics = haptics_of(prototype, seeds, spread, added, kept, workers=workers, on_step=step)
     drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
     def markdown() -> str:

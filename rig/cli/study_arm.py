@@ -11,7 +11,7 @@ from rig.cli.output import JsonFlag, emit_json, progress, show_result
 arm_studies = typer.Typer(rich_markup_mode=None)
 
 StateFolder = Annotated[
-    Path | None, typer.Option("--state", help="Folder of finished arms; a cache folder by default.")
+    Path | None, typer.Option("--state", help="Folder of what is done; a cache folder by default.")
 ]
 
 FigureFolder = Annotated[Path | None, typer.Option("--figures", help="Folder for the figures.")]
@@ -22,7 +22,8 @@ def _from_page(drawn: list[Path], out: Path | None) -> list[str]:
     return [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
 
 
-def _kept_in(state: Path | None, study: str) -> Path:
+def kept_in(state: Path | None, study: str) -> Path:
+    """Return where a study keeps what is done."""
     return state or Path.home() / ".cache" / "rig" / study
 
 
@@ -109,7 +110,7 @@ def wrench(
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_wrench_study(
-            seeds, _kept_in(state, "wrench"), workers, lambda: bar.advance(task)
+            seeds, kept_in(state, "wrench"), workers, lambda: bar.advance(task)
         )
     drawn = shown.write_figures(figures, study) if figures is not None else []
 
@@ -136,7 +137,7 @@ def delsol(
 
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
-        study = run_delsol(seeds, _kept_in(state, "delsol"), workers, lambda: bar.advance(task))
+        study = run_delsol(seeds, kept_in(state, "delsol"), workers, lambda: bar.advance(task))
     drawn = shown.write_figures(figures, study) if figures is not None else []
 
     def markdown() -> str:
@@ -161,7 +162,7 @@ def zhang(
     from rig.reports.zhang_figures import write_figures
     from rig.studies.zhang import run_zhang
 
-    kept = _kept_in(state, "zhang")
+    kept = kept_in(state, "zhang")
     with progress() as bar:
         task = bar.add_task("arms", total=seeds)
         study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))

@@ -7,7 +7,8 @@ adds to that slope, to all places alike, so the answer does not need it declared
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,7 @@ from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import FILTER, CurrentForce
 from rig.simulation.grasper_inputs import hold
 from rig.simulation.grasper_plant import PROTOTYPES, RATE_HZ
-from rig.studies.resumable import results
-from rig.studies.zhao import mark_of
+from rig.studies.seeds import kept_outcomes
 from rig.studies.zhao_methods import Axes, axes_of, fitted, record
 
 MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
@@ -31,6 +31,7 @@ TISSUE_N_M_RAD, INCLUSION_RATIO = 0.15, 2.0
 PEAK_N = 1.5
 RISE_S = 4.0
 """A palpating grasp is slow: the filters' lag must not pass for a slope."""
+SCHEMA = "rig.study.haptics/1"
 DOF = "grasp"
 LEVEL = 0.95
 """Confidence from which an answer counts as sure."""
@@ -85,63 +86,49 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Task:
-    """Both experiments on one grasper: plain data that travels to other processes."""
+class Answers:
+    """What the methods say of one grasper, in the order of `run_haptics`."""
 
-    prototype: str
-    seed: int
-    spread: float
-    added: tuple[Term, ...]
-
-    @property
-    def file(self) -> str:
-        """Name of its result; the same task has the same name."""
-        return f"{self.prototype}-haptics-{self.seed:03d}-{mark_of(self.spread, self.added)}.json"
+    answers: tuple[Answer, ...]
 
 
 def haptics_of(
     prototype: str,
-    seeds: Sequence[int],
+    seeds: int,
     spread: float,
     added: Sequence[Term],
+    state: Path,
     *,
     workers: int = 1,
-    keep: Path | None = None,
-    on_step: Callable[[str], None] = lambda _: None,
-) -> list[list[Answer]]:
-    """Return the answers on graspers of one make, one list a seed, in their order.
+    on_step: Callable[[], None] = lambda: None,
+) -> list[tuple[Answer, ...]]:
+    """Return the answers on graspers of one make, one tuple a seed, in their order.
 
     Args:
         prototype: `third`, `journal` or `ball`.
-        seeds: One grasper each.
+        seeds: Number of graspers, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
         added: Effects that ours adds to the declared model.
+        state: Folder where each is kept as it is done.
         workers: Processes at once.
-        keep: Folder where each result is kept once it is there.
-        on_step: Told what is done.
+        on_step: Called after each grasper.
     """
-    tasks = [Task(prototype, seed, spread, tuple(added)) for seed in seeds]
-    done = {}
-    for task, answers in results(
-        tasks, run_haptics, _to_json, _from_json, workers=workers, keep=keep
-    ):
-        done[task.seed] = answers
-        on_step(f"haptics of grasper {task.seed}")
-    return [done[seed] for seed in seeds]
+    done = kept_outcomes(
+        partial(run_haptics, prototype, spread, tuple(added)), _read, seeds, state,
+        f"{SCHEMA} {prototype} {spread:g}", workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    return [each.answers for each in done]
 
 
-def run_haptics(task: Task) -> list[Answer]:
+def run_haptics(prototype: str, spread: float, added: Sequence[Term], seed: int) -> Answers:
     """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
-    seed = task.seed
-    axes = axes_of(PROTOTYPES[task.prototype], DOF, seed, task.spread)
-    return [
-        _answer(name, estimate, axes, seed)
-        for name, estimate in {
-            "paper's method": _of_current(axes),
-            "ours": _of_model(fitted(DOF, axes, seed, task.added), axes),
-            "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
-        }.items()
-    ]
+    axes = axes_of(PROTOTYPES[prototype], DOF, seed, spread)
+    methods = {
+        "paper's method": _of_current(axes),
+        "ours": _of_model(fitted(DOF, axes, seed, added), axes),
+        "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
+    }
+    return Answers(tuple(_answer(name, way, axes, seed) for name, way in methods.items()))
 
 
 def _answer(method: str, estimate: Estimate, axes: Axes, seed: int) -> Answer:
@@ -225,15 +212,13 @@ def _low(run: Recording, low_pass: LowPass) -> FloatArray:
     return CausalFilter(run.sample_rate_hz, low_pass).step(angle[:, None])[:, 0]
 
 
-def _to_json(answers: list[Answer]) -> list[dict[str, Any]]:
-    return [asdict(answer) for answer in answers]
-
-
-def _from_json(told: list[dict[str, Any]]) -> list[Answer]:
-    return [
-        Answer(**{**one, "materials": _all(one["materials"]), "places": _all(one["places"])})
-        for one in told
-    ]
+def _read(held: Any) -> Answers:
+    return Answers(
+        tuple(
+            Answer(**{**one, "materials": _all(one["materials"]), "places": _all(one["places"])})
+            for one in held["answers"]
+        )
+    )
 
 
 def _all(told: list[dict[str, Any]]) -> tuple[Stiffness, ...]:

@@ -3,19 +3,17 @@
 The diagnosis looks at one grasper that is not reported; what it names is added on all the others.
 """
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from estimation.effects import effect
-from estimation.files import write_text_atomic
 from estimation.model import Estimate, Term
 from rig.grasper.current_force import CurrentForce
 from rig.simulation.grasper_plant import PROTOTYPES
-from rig.studies.resumable import results
+from rig.studies.seeds import kept_outcomes
 from rig.studies.zhao_methods import (
     Lacking,
     Outcome,
@@ -29,6 +27,8 @@ from rig.studies.zhao_methods import (
     slope,
 )
 from rig.studies.zhao_paper import DOFS
+
+SCHEMA = "rig.study.zhao/1"
 
 LOOKED_AT = 1000
 """Seed of the grasper that the diagnosis looks at; it is not reported."""
@@ -72,106 +72,102 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Task:
-    """One cell to measure: plain data that travels to other processes."""
+class Grasper:
+    """All degrees of freedom of one grasper, in the order of `DOFS`."""
 
-    prototype: str
-    dof: str
-    seed: int
-    spread: float
-    added: tuple[Term, ...]
-
-    @property
-    def file(self) -> str:
-        """Name of its result; the same task has the same name."""
-        return (
-            f"{self.prototype}-{self.dof}-{self.seed:03d}-{mark_of(self.spread, self.added)}.json"
-        )
+    cells: tuple[Cell, ...]
 
 
-def mark_of(spread: float, added: Sequence[Term]) -> str:
-    """Return eight digits that differ where the spread or the added effects do."""
-    said = [(t.effect.id, sorted((k, v.value) for k, v in t.values.items())) for t in added]
-    return hashlib.sha256(json.dumps([spread, said]).encode()).hexdigest()[:8]
+@dataclass(frozen=True)
+class Looked:
+    """What the diagnosis said of one degree of freedom, as it is kept."""
+
+    findings: tuple[tuple[str, str], ...]
+    terms: tuple[Mapping[str, Any], ...]
 
 
-def look(prototype: str, dof: str, spread: float, keep: Path | None = None) -> Lacking:
+def look(prototype: str, spread: float, number: int) -> Looked:
     """Ask the diagnosis what a degree of freedom's model lacks, on the grasper for that."""
-    kept = keep / f"{prototype}-{dof}-diagnosis-{spread:g}.json" if keep is not None else None
-    if kept is not None and kept.is_file():
-        read = json.loads(kept.read_text())
-        return Lacking(
-            tuple((family, verdict) for family, verdict in read["findings"]),
-            tuple(_term(one) for one in read["terms"]),
-        )
-    found = lacking(dof, axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread), LOOKED_AT)
-    if keep is not None and kept is not None:
-        keep.mkdir(parents=True, exist_ok=True)
-        said = {"findings": found.findings, "terms": [_plain(term) for term in found.terms]}
-        write_text_atomic(kept, json.dumps(said) + "\n")
-    return found
+    dof = DOFS[number]
+    axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread)
+    found = lacking(dof, axes, LOOKED_AT)
+    return Looked(found.findings, tuple(_plain(term) for term in found.terms))
 
 
-def measure(task: Task) -> Cell:
+def one_grasper(
+    prototype: str, spread: float, added: Mapping[str, Sequence[Term]], seed: int
+) -> Grasper:
+    """Measure all degrees of freedom of one grasper."""
+    return Grasper(tuple(measure(prototype, dof, seed, spread, added[dof]) for dof in DOFS))
+
+
+def measure(prototype: str, dof: str, seed: int, spread: float, added: Sequence[Term]) -> Cell:
     """Calibrate both methods on some runs of a grasper and report them on others."""
-    dof, seed = task.dof, task.seed
-    axes = axes_of(PROTOTYPES[task.prototype], dof, seed, task.spread)
+    axes = axes_of(PROTOTYPES[prototype], dof, seed, spread)
     arm_m = axes[0].arm_m
     method = CurrentForce(arm_m)
     steep = slope(dof, axes, method, seed * 1000 + 500)
     tests = report_runs(dof, axes, seed * 1000 + 700)
     ways = [
         of_current(dof, replace(method, coefficient=1.0 / steep)),
-        of_model(fitted(dof, axes, seed, task.added), arm_m),
+        of_model(fitted(dof, axes, seed, added), arm_m),
         of_model(fitted(dof, axes, seed, ()), arm_m),
     ]
     return Cell(seed, steep, *(outcome(dof, tests, way, arm_m) for way in ways))
 
 
 def run_study(
-    prototype: str = "third",
-    seeds: Sequence[int] = tuple(range(20)),
-    spread: float = 0.1,
+    prototype: str,
+    seeds: int,
+    spread: float,
+    state: Path,
     *,
     workers: int = 1,
-    keep: Path | None = None,
-    on_step: Callable[[str], None] = lambda _: None,
+    on_step: Callable[[], None] = lambda: None,
 ) -> Study:
     """Run the three experiments on graspers of one make.
 
     Args:
         prototype: `third`, `journal` or `ball`.
-        seeds: One grasper each.
+        seeds: Number of graspers, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
+        state: Folder where each is kept as it is done.
         workers: Processes at once.
-        keep: Folder where each cell is kept once it is measured, and not measured again.
-        on_step: Told what is done.
+        on_step: Called after each of three diagnoses and each grasper.
     """
-    looked = {}
-    for dof in DOFS:
-        looked[dof] = look(prototype, dof, spread, keep)
-        on_step(f"diagnosis of {dof}")
-    tasks = [
-        Task(prototype, dof, seed, spread, looked[dof].terms) for seed in seeds for dof in DOFS
-    ]
-    cells: dict[str, list[Cell]] = {dof: [] for dof in DOFS}
-    for task, cell in results(tasks, measure, asdict, _cell, workers=workers, keep=keep):
-        cells[task.dof].append(cell)
-        on_step(f"{task.dof} of grasper {task.seed}")
-    return Study(
-        PROTOTYPES[prototype].name,
-        spread,
-        {dof: sorted(found, key=lambda cell: cell.seed) for dof, found in cells.items()},
-        looked,
-    )
+    name = f"{SCHEMA} {prototype} {spread:g}"
+    looked = kept_outcomes(
+        partial(look, prototype, spread), _looked, len(DOFS), state, f"{name} diagnosis",
+        workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    lacked = {
+        dof: Lacking(found.findings, tuple(_term(term) for term in found.terms))
+        for dof, found in zip(DOFS, looked, strict=True)
+    }
+    added = {dof: found.terms for dof, found in lacked.items()}
+    graspers = kept_outcomes(
+        partial(one_grasper, prototype, spread, added), _grasper, seeds, state, name,
+        workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    cells = {dof: [g.cells[k] for g in graspers] for k, dof in enumerate(DOFS)}
+    return Study(PROTOTYPES[prototype].name, spread, cells, lacked)
 
 
-def _cell(told: dict[str, Any]) -> Cell:
+def _looked(held: Any) -> Looked:
+    findings = tuple((family, verdict) for family, verdict in held["findings"])
+    return Looked(findings, tuple(held["terms"]))
+
+
+def _grasper(held: Any) -> Grasper:
+    return Grasper(tuple(_cell(cell) for cell in held["cells"]))
+
+
+def _cell(held: Any) -> Cell:
     methods = {
-        name: Outcome(tuple(told[name]["errors_n"]), told[name]["delay_ms"])
+        name: Outcome(tuple(held[name]["errors_n"]), held[name]["delay_ms"])
         for name in ("paper", "ours", "undeclared")
     }
-    return Cell(told["seed"], told["slope"], **methods)
+    return Cell(held["seed"], held["slope"], **methods)
 
 
 def _plain(term: Term) -> dict[str, Any]:
@@ -184,6 +180,6 @@ def _plain(term: Term) -> dict[str, Any]:
     }
 
 
-def _term(told: dict[str, Any]) -> Term:
+def _term(told: Mapping[str, Any]) -> Term:
     values = {name: Estimate(value) for name, value in told["values"].items()}
     return Term(effect(told["id"]), told["sign"], told["channels"], values)

@@ -1,0 +1,1 @@
+"""Master of the 3-DOF grasper: three potentiometers on a Teensy's converter."""

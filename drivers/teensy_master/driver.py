@@ -1,0 +1,42 @@
+"""The master's three potentiometers, read by the converter of a Teensy that drives no motor."""
+
+from drivers.registry import Driver
+from drivers.teensy.channels import linear
+from drivers.teensy.device import TeensyDevice
+from drivers.teensy.grasper import GRASPER
+from drivers.transport import open_transport
+from drivers.transport.transport import Transport
+
+JOINTS = ("yaw", "pitch", "grasp")
+
+POTS = tuple(
+    linear(
+        f"{joint}_count",
+        f"force_{k}",
+        description=f"potentiometer of the {joint}, 12 bits",
+        profile=GRASPER,
+    )
+    for k, joint in enumerate(JOINTS, start=1)
+)
+"""The board's three analogue inputs, which at a grasper are its force sensors."""
+
+
+class TeensyMaster(TeensyDevice):
+    """Counts of the potentiometers at 2 kHz, on the board's clock. It is never armed.
+
+    Args:
+        transport: The way to the board; the device closes it.
+    """
+
+    name = "teensy-master"
+
+    def __init__(self, transport: Transport) -> None:
+        super().__init__(transport, POTS, GRASPER)
+
+
+def open_master(url: str) -> TeensyMaster:
+    """Open the master at a serial port or a USB identity."""
+    return TeensyMaster(open_transport(url))
+
+
+DRIVER = Driver("teensy-master", "The 3-DOF grasper's master, potentiometers", open_master)
