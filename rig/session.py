@@ -172,21 +172,24 @@ class Session:
         blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]
         yield from self.follow(tuple(column[b] for column in setpoints) for b in blocks)
 
-    def follow(self, setpoints: Iterator[tuple[NDArray[np.float64], ...]]) -> Iterator[Reading]:
+    def follow(
+        self, setpoints: Iterator[tuple[NDArray[np.float64], ...]], lead_s: float = LEAD_S
+    ) -> Iterator[Reading]:
         """Arm the rig and play setpoints that are decided while it goes, until there are no more.
 
-        A piece is asked for `LEAD_S` before it is played, so what a reading tells can change what
+        A piece is asked for `lead_s` before it is played, so what a reading tells can change what
         comes so much later.
 
         Args:
             setpoints: Pieces of what `play` takes, each of shape (n,), n from 1 to the profile's
                 `max_setpoints`.
+            lead_s: Time between asking and playing; shorter pauses of this computer do no harm.
 
         Raises:
             SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
-        lead = round(LEAD_S * self.machine.profile.rate_hz)
+        lead = round(lead_s * self.machine.profile.rate_hz)
         board = self.machine.board_limits(self.config, self.calibrations)
         self._watch = HostWatch(board, self.machine)
         self._watch.prepare()

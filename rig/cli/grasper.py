@@ -1,4 +1,4 @@
-"""`rig grasper`: the 3-DOF grasper: its designs, and recordings of the simulated one."""
+"""`rig grasper`: the 3-DOF grasper: its designs, its master, and recordings of a simulated one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from rig.cli.output import JsonFlag, console, emit_json, progress
 
 grasper_app = typer.Typer(
     name="grasper",
-    help="The 3-DOF grasper: possible designs, and recordings of the simulated one.",
+    help="The 3-DOF grasper: possible designs, its master, recordings of the simulated one.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -66,3 +66,54 @@ def record(
     console().print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
     if json:
         emit_json({"folder": out, "logs": logs})
+
+
+@grasper_app.command()
+def follow(
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration; simulated grasper if none."),
+    ] = None,
+    master: Annotated[
+        str | None,
+        typer.Option(help="Where the master is, such as usb:16c0:0483; simulated if none."),
+    ] = None,
+    duration: Annotated[float, typer.Option(min=0.5, help="How long, s.")] = 10.0,
+    scale: Annotated[
+        float, typer.Option(min=0.01, max=2, help="Angle of a joint for an angle of the master.")
+    ] = 0.3,
+    json: JsonFlag = False,
+) -> None:
+    """Send the three motors where the master goes, within the limits of the configuration.
+
+    The grasper moves. It starts where it stands, however the master is held. Ctrl-C leaves, with
+    the motors out of force.
+    """
+    from rig.config import load_config
+    from rig.config_check import refuse_problems
+    from rig.grasper.following import follow_master
+    from rig.live.grasper import master as chief_of
+
+    settings = load_config(config or Path("grasper"))
+    refuse_problems(settings)
+    screen = console()
+    with progress() as bar:
+        task = bar.add_task("following", total=duration)
+
+        def show(time_s: float) -> None:
+            bar.update(task, completed=time_s)
+
+        try:
+            axes = follow_master(settings, master, chief_of(), duration, scale, show)
+        except KeyboardInterrupt:
+            screen.print("Stopped; the grasper is safe.")
+            raise
+    for moved in axes:
+        screen.print(
+            f"{moved.axis:5}  from {moved.lowest_rad:+.3f} to {moved.highest_rad:+.3f} rad, "
+            f"{moved.largest_error_rad:.4f} rad off at most, "
+            f"force up to {moved.largest_force_n:.2f} N",
+            markup=False,
+        )
+    if json:
+        emit_json({"config": settings.name, "duration_s": duration, "axes": axes})

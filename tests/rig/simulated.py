@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_ARMED
+from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
 from rig.config import Config, load_config
 from rig.protocol import Protocol
@@ -45,15 +47,15 @@ class Wrapped:
         return self._change(self._board.transmit())  # type: ignore[operator,no-any-return]
 
 
-def status_of(board: Board) -> NDArray[np.uint16]:
+def status_of(board: Board, profile: Profile = REFERENCE) -> NDArray[np.uint16]:
     """Ask a board, by a fresh link, for the status of its next samples."""
-    logger = TeensyLogger(SimulatedTransport(board))
+    logger = TeensyLogger(SimulatedTransport(board), profile)
     logger.identify()
     logger.start()
     status: NDArray[np.uint16] = logger.read(0.1).samples["status"]
     return status
 
 
-def is_armed(board: Board) -> bool:
+def is_armed(board: Board, profile: Profile = REFERENCE) -> bool:
     """Whether a board's motors are in force now."""
-    return bool((status_of(board)[-1] & STATUS_ARMED) != 0)
+    return bool((status_of(board, profile)[-1] & STATUS_ARMED) != 0)

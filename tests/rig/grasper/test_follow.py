@@ -1,88 +1,154 @@
-"""The master's driver on its fake, and three motors that follow it in position."""
+"""The master's driver on its fake, and a grasper whose three motors follow it in position."""
+
+import json
+import os
+import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import TeensyFake
-from drivers.teensy.grasper import GRASPER, GrasperLimits
-from drivers.teensy.grasper_guard import GRASPER_LOGIC
-from drivers.teensy_master.fake import MIDDLE, REACH, TurnedByHand, open_fake
+from drivers.teensy.grasper import GRASPER
+from drivers.teensy_master.fake import MIDDLE, REACH, open_fake
 from drivers.transport.faulty import Faults
-from drivers.transport.simulated import SimulatedTransport
+from rig.cli.main import main
+from rig.config import load_config
+from rig.errors import ExitCode, UsageError
+from rig.grasper import following
 from rig.grasper.coupling import GrasperError
-from rig.grasper.follow import follow
+from rig.grasper.follow import setpoints
 from rig.live.grasper import master
+from rig.logger import open_logger
+from rig.machines.grasper import axes_of_joints
+from tests.rig.simulated import is_armed
 
-RAD_PER_COUNT = np.full(3, 2 * np.pi / 2048)
-GAINS = np.array([[2.0, 0.0, 0.0, 0.5, 3000.0]] * 3)
-
-
-def armed_board():
-    """A grasper's board in virtual time, armed with gains and the widest limits."""
-    fake = TeensyFake(TurnedByHand(), logic=GRASPER_LOGIC)
-    link = SimulatedTransport(fake, "sim://grasper", tick_s=GRASPER.tick_us * 1e-6)
-    board = TeensyLogger(link, GRASPER)
-    board.identify()
-    board.arm(GAINS, GrasperLimits())
-    board.start()
-    return board
+HERE = (0.1, 0.0, -0.05)
 
 
 @pytest.fixture
-def chief():
+def potentiometers():
     device = open_fake(Faults())
     device.start()
     yield device
     device.close()
 
 
-def test_the_potentiometers_come_in_counts_at_2_khz(chief):
-    assert [c.name for c in chief.channels] == ["yaw_count", "pitch_count", "grasp_count"]
-    assert {c.rate_hz for c in chief.channels} == {2000.0}
-    batches = [chief.read(0.1) for _ in range(40)]
+@pytest.fixture
+def link(monkeypatch, library):
+    """The simulated grasper's link, to look at its board afterwards."""
+    link = open_logger(load_config(Path("grasper")))
+    monkeypatch.setattr(following, "open_logger", lambda config: link)
+    return link
+
+
+def remembered(device):
+    """Return a list that fills with the counts that the device's reads return."""
+    counts, read = [], device.read
+
+    def reading(timeout_s):
+        batch = read(timeout_s)
+        counts.append(np.column_stack(list(batch.columns.values())))
+        return batch
+
+    device.read = reading
+    return counts
+
+
+def test_the_potentiometers_come_in_counts_at_2_khz(potentiometers):
+    names = [channel.name for channel in potentiometers.channels]
+    assert names == ["yaw_count", "pitch_count", "grasp_count"]
+    assert {c.rate_hz for c in potentiometers.channels} == {2000.0}
+    batches = [potentiometers.read(0.1) for _ in range(40)]
     yaw = np.concatenate([batch.columns["yaw_count"] for batch in batches])
     assert yaw.max() == pytest.approx(MIDDLE + REACH, abs=2)
     assert np.abs(np.diff(yaw)).max() <= 1
 
 
-def test_three_motors_are_sent_where_the_master_is(chief):
-    board = armed_board()
-    asked = []
-    read = chief.read
-
-    def remembered(timeout_s):
-        batch = read(timeout_s)
-        asked.append(np.column_stack(list(batch.columns.values())))
-        return batch
-
-    chief.read = remembered
-    following = follow(chief, master(), board, RAD_PER_COUNT)
-    samples = [next(following).samples for _ in range(30)]
-    following.close()
-    counts = np.concatenate(asked)
-    expected = np.round(master().motor_rad(counts) / RAD_PER_COUNT)
-    played = np.concatenate(
-        [np.column_stack([s[f"target_{k}"] for k in (1, 2, 3)]) for s in samples]
-    )
-    moved = played[np.any(played != 0, axis=1)]
-    assert len(moved) > 200
-    # each setpoint is one of those asked for, in their order
-    begin = int(np.flatnonzero((expected == moved[0]).all(axis=1))[0])
-    np.testing.assert_array_equal(moved[:200], expected[begin : begin + 200])
+def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potentiometers):
+    counts = remembered(potentiometers)
+    asked = list(setpoints(potentiometers, master(), HERE, 1.0, scale=0.5))
+    axes = np.concatenate([np.column_stack(piece) for piece in asked])
+    joints = master().joint_rad(np.concatenate(counts)[:2000])
+    assert len(axes) == 2000
+    np.testing.assert_allclose(axes[0], HERE)
+    np.testing.assert_allclose(axes, HERE + axes_of_joints(0.5 * (joints - joints[0])), atol=1e-12)
 
 
-def test_a_broken_wire_disarms_the_motors(chief):
-    board = armed_board()
-    read = chief.read
+def test_a_master_that_sends_nothing_is_told(potentiometers):
+    potentiometers.stop()
+    with pytest.raises(UsageError, match="sent nothing"):
+        next(setpoints(potentiometers, master(), HERE, 1.0))
+
+
+def test_three_motors_go_where_the_master_goes(link, capsys):
+    code = main(["grasper", "follow", "--duration", "3", "--scale", "0.3", "--json"])
+    assert code == ExitCode.OK
+    assert not is_armed(link.board, GRASPER)
+    told = json.loads(capsys.readouterr().out)
+    reach_rad = 0.3 * REACH * np.radians(300.0) / 4095
+    yaw, jaw_1, jaw_2 = told["axes"]
+    assert yaw["highest_rad"] == pytest.approx(reach_rad, rel=0.1)
+    assert yaw["lowest_rad"] == pytest.approx(-reach_rad, rel=0.1)
+    for axis in (yaw, jaw_1, jaw_2):
+        assert axis["largest_error_rad"] < 0.1 * reach_rad
+    assert max(jaw_1["largest_force_n"], jaw_2["largest_force_n"]) > 0.5  # the jaws meet
+
+
+def test_a_master_that_asks_for_too_much_trips_the_grasper(link, capsys):
+    code = main(["grasper", "follow", "--duration", "6", "--scale", "1"])
+    assert code == ExitCode.SAFETY
+    assert "force" in capsys.readouterr().err
+    assert not is_armed(link.board, GRASPER)
+
+
+def test_a_broken_wire_disarms_the_motors(link, monkeypatch):
+    device = open_fake(Faults())
+    read, reads, followed = device.read, [], []
 
     def broken(timeout_s):
         batch = read(timeout_s)
-        batch.columns["pitch_count"][:] = 0
+        reads.append(batch)
+        if len(reads) > 20:
+            batch.columns["pitch_count"][:] = 0
         return batch
 
-    chief.read = broken
+    device.read = broken
+    monkeypatch.setattr(following, "open_section", lambda section: device)
     with pytest.raises(GrasperError, match="rail"):
-        for _ in follow(chief, master(), board, RAD_PER_COUNT):
-            pass
-    assert not (board.read(0.05).samples["status"][-1] & 1)
+        following.follow_master(
+            load_config(Path("grasper")), None, master(), 5.0, 0.2, followed.append
+        )
+    assert followed[-1] > 0.1
+    assert not is_armed(link.board, GRASPER)
+
+
+def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
+    pieces = []
+
+    def asked(*given):
+        for piece in setpoints(*given):
+            pieces.append(piece)
+            if len(pieces) == 20:
+                os.kill(os.getpid(), signal.SIGINT)
+            yield piece
+
+    monkeypatch.setattr(following, "setpoints", asked)
+    assert main(["grasper", "follow"]) == ExitCode.INTERRUPTED
+    assert len(pieces) == 20
+    assert not is_armed(link.board, GRASPER)
+    assert "safe" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("config", "url", "said"),
+    [
+        ("simulated", None, "is no grasper"),
+        ("bench", None, "Where is the master"),
+        ("bench", "sim://", "simulated master"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(config, url, said, library):
+    bench = load_config(Path("grasper")).changed(logger={"url": "usb:16c0:0483"})
+    chosen = bench if config == "bench" else load_config(Path(config))
+    with pytest.raises(UsageError, match=said):
+        following.follow_master(chosen, url, master(), 1.0, 0.2)

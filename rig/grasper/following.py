@@ -1,0 +1,105 @@
+"""A session in which the grasper follows its master, and what its motors did."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.config import Config, DeviceSection, is_simulated
+from rig.devices import open_section
+from rig.errors import UsageError
+from rig.grasper.follow import LEAD_S, setpoints
+from rig.grasper.master import Master
+from rig.logger import open_logger
+from rig.machines.grasper import AXES
+from rig.reading import Reading
+from rig.session import Session
+
+DRIVER = "teensy-master"
+SIMULATED_URL = "sim://"
+ZEROS_S = 0.5
+
+
+@dataclass(slots=True)
+class Followed:
+    """What one motor did.
+
+    Attributes:
+        axis: `yaw`, `jaw_1` or `jaw_2`.
+        lowest_rad: Least angle it was at.
+        highest_rad: Greatest.
+        largest_error_rad: Greatest size of its angle less its setpoint.
+        largest_force_n: Greatest force at its tip.
+    """
+
+    axis: str
+    lowest_rad: float = np.inf
+    highest_rad: float = -np.inf
+    largest_error_rad: float = 0.0
+    largest_force_n: float = 0.0
+
+    def add(self, reading: Reading) -> None:
+        """Take in samples that played a setpoint."""
+        angle = reading.columns[f"{self.axis}_angle_rad"]
+        error = np.abs(angle - reading.columns[f"{self.axis}_target_rad"])
+        force = reading.columns[f"{self.axis}_force_n"]
+        self.lowest_rad = min(self.lowest_rad, float(angle.min()))
+        self.highest_rad = max(self.highest_rad, float(angle.max()))
+        self.largest_error_rad = max(self.largest_error_rad, float(error.max()))
+        self.largest_force_n = max(self.largest_force_n, float(force.max()))
+
+
+def follow_master(
+    config: Config,
+    url: str | None,
+    chief: Master,
+    duration_s: float,
+    scale: float,
+    on_time: Callable[[float], None] = lambda time_s: None,
+) -> list[Followed]:
+    """Let the grasper follow its master for a while; whatever ends it, the rig is disarmed.
+
+    Args:
+        config: Of a grasper.
+        url: Where the master is; a simulated grasper has a simulated one if not said.
+        chief: What its counts mean.
+        duration_s: How long.
+        scale: Angle of a joint for an angle of the master.
+        on_time: Told how long it has followed, s.
+
+    Returns:
+        What yaw, jaw 1 and jaw 2 did.
+
+    Raises:
+        UsageError: The configuration is of another kind of rig, or nobody said where the master is.
+        GrasperError: A potentiometer is at its rail.
+        SafetyTripError: A limit was crossed.
+        DriverError: A link is lost.
+    """
+    if config.logger.profile != "grasper":
+        raise UsageError(
+            f"{config.name} is no grasper.",
+            "Only the 3-DOF grasper has a master.",
+            'Name a configuration with [logger] profile = "grasper".',
+        )
+    if url is None and not config.is_simulated:
+        raise UsageError("Where is the master?", fix="Write for example --master usb:16c0:0483.")
+    section = DeviceSection(driver=DRIVER, url=url or SIMULATED_URL)
+    if is_simulated(section.url) and not config.is_simulated:
+        raise UsageError(
+            "A simulated master does not move a real grasper.", fix="Say where the real one is."
+        )
+    followed = [Followed(axis) for axis in AXES]
+    with closing(open_section(section)) as master, Session(config, open_logger(config)) as session:
+        session.take_zeros(ZEROS_S)
+        master.identify()
+        master.start()
+        asked = setpoints(master, chief, session.here, duration_s, scale)
+        for reading in session.follow(asked, LEAD_S):
+            played = reading.where(reading.setpoint >= 0)
+            if len(played):
+                for axis in followed:
+                    axis.add(played)
+                on_time(float(played.setpoint[-1] + 1) / session.machine.profile.rate_hz)
+    return followed
