@@ -64,6 +64,7 @@ SAID = {
     },
     "qia128": _UNNUMBERED_STREAM,
     "teensy": _NUMBERED_STREAM,
+    "teensy-master": _NUMBERED_STREAM,
     "teensy-can": _NUMBERED_STREAM | {Fault.DELAY: _DAMAGED_AND_MISSING | {"duplicates"}},
     "usb520": {
         **_UNNUMBERED_STREAM,
