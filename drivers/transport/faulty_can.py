@@ -73,7 +73,7 @@ class FaultyCanBus:
         if now_s < self.faults.stalled_until_s(now_s):
             return None
         for entry in self._held:
-            if entry[0] <= now_s:
+            if _at_least_an_instant(entry[0] - now_s) == 0.0:
                 self._held.remove(entry)
                 return CanFrame.from_bytes(entry[1])
         return None

@@ -64,12 +64,11 @@ def diagnose(
     from rig.reports.render import write_report
 
     screen = console()
-    asked = subject(path, model, balance, format_)
-    models = asked.models
     with engine(workers, scheduler) as executor:
+        asked = subject(path, model, balance, format_)
         done = run_diagnosis(
             asked.campaign,
-            models,
+            asked.models,
             Ledger(ledger or default_ledger()),
             seed=seed,
             executor=executor,

@@ -229,3 +229,13 @@ def test_faults_strike_frames() -> None:
     bus.faults.inject(Fault.DISCONNECT)
     with pytest.raises(LinkLostError):
         bus.read(0.1)
+
+
+def test_a_late_frame_comes_though_its_time_is_but_a_rounding_away() -> None:
+    bus = FaultyCanBus(SimulatedCanBus([Parrot()]), Faults())
+    bus.faults.inject(Fault.DELAY, duration_s=0.05 + 5e-10)
+    bus.send(CanFrame(1, b"\x07"))
+    assert bus.read(0.05) is None
+    late = bus.read(0.1)
+    assert late is not None
+    assert late.data == b"\x07"

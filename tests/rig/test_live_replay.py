@@ -186,7 +186,7 @@ def test_command_shows_the_run_asked_for_and_why_it_does_not_count(logs, capsys)
 
 
 def test_command_runs_a_model(logs, capsys, monkeypatch):
-    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Smoothed())
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda *_: Smoothed())
     path = logs(recording())
     assert command(path, "--json", "--speed", "0", "--model", "model.json") == 0
     frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -202,7 +202,7 @@ def test_command_interrupted_leaves_with_130(logs, capsys, monkeypatch):
                 raise KeyboardInterrupt
             return super().push(columns, time_s)
 
-    monkeypatch.setattr("rig.cli.replay._estimator", lambda path, recording: Interrupting())
+    monkeypatch.setattr("rig.cli.replay._estimator", lambda *_: Interrupting())
     assert command(logs(recording()), "--json", "--speed", "0", "--model", "m.json") == 130
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert last["summary"]["ended"] == "interrupted"

@@ -72,8 +72,8 @@ class Mps2Hardware {
     }
 
     static void on_received() {
+        at(kUart + 0x0C) = 2;  // first: a byte that comes while these are taken interrupts again
         while ((at(kUart + 0x04) & 2U) != 0) received.put(static_cast<std::uint8_t>(at(kUart)));
-        at(kUart + 0x0C) = 2;
     }
 
   private:
