@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from drivers.device import Device
+from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from estimation.recording import FloatArray
-from rig.errors import UsageError
 from rig.grasper.master import Master
 from rig.grasper.three_dof import JOINTS
 from rig.machines.grasper import axes_of_joints
@@ -43,7 +43,7 @@ def setpoints(
 
     Raises:
         GrasperError: A potentiometer is at its rail.
-        UsageError: The master sends nothing.
+        LinkTimeoutError: The master sends nothing.
         DriverError: Its link is lost.
     """
     first: FloatArray | None = None
@@ -62,7 +62,7 @@ def _counts(master: Device) -> FloatArray:
         batch = master.read(READ_S)
         if len(batch):
             return np.column_stack([batch.columns[f"{joint}_count"] for joint in JOINTS])
-    raise UsageError(
+    raise LinkTimeoutError(
         f"The master has sent nothing for {SILENT_READS * READ_S:g} s.",
         "Its cable was pulled, or its board was reset.",
         "Check the cable, then start again.",

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy_master.fake import MIDDLE, REACH, open_fake
 from drivers.transport.faulty import Faults
@@ -76,7 +77,7 @@ def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potent
 
 def test_a_master_that_sends_nothing_is_told(potentiometers):
     potentiometers.stop()
-    with pytest.raises(UsageError, match="sent nothing"):
+    with pytest.raises(LinkTimeoutError, match="sent nothing"):
         next(setpoints(potentiometers, master(), HERE, 1.0))
 
 
