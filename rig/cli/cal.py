@@ -294,7 +294,7 @@ def _summary(record: "CalibrationRecord") -> dict[str, Any]:
 
 
 def _flat(record: "CalibrationRecord") -> dict[str, Any]:
-    """Return a record as dotted names and values; of the figure only its hash."""
+    """Return a record as dotted names and values; a hash of the figure, a line of the raw logs."""
     from hashlib import sha256
 
     from rig.cli.output import plain
@@ -307,6 +307,8 @@ def _flat(record: "CalibrationRecord") -> dict[str, Any]:
                 walk(f"{prefix}.{name}" if prefix else name, item)
         elif prefix == "figure_svg":
             flat[prefix] = sha256(value.encode()).hexdigest()[:16] if value else ""
+        elif prefix == "raw" and value:
+            flat[prefix] = f"{len(value)} logs from {value[0]['path']}"
         else:
             flat[prefix] = value
 
