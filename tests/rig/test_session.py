@@ -142,13 +142,15 @@ def test_lost_and_damaged_bytes_are_counted_and_nothing_is_made_up():
     assert missing == readings[-1].lost
 
 
-def test_a_host_that_is_late_leaves_flagged_samples_not_wrong_ones(monkeypatch):
+def test_a_host_that_is_late_leaves_flagged_samples_not_wrong_ones():
     """The queue runs dry when the host is late; the target is held and the samples say so."""
-    monkeypatch.setattr("rig.session.LEAD_S", 0.05)
     config = simulated()
     link = SimulatedTransport(transport(config).board, step_s=0.08)
+    angle_rad, load_a = np.linspace(-1.0, -0.8, 500), np.zeros(500)
+    pieces = [slice(cut, cut + 10) for cut in range(0, 500, 10)]
     with Session(config, link) as session:
-        readings = list(session.play(np.linspace(-1.0, -0.8, 500), np.zeros(500)))
+        asked = ((angle_rad[piece], load_a[piece]) for piece in pieces)
+        readings = list(session.follow(asked, lead_s=0.05))
     setpoint = np.concatenate([r.setpoint for r in readings])
     flags = np.concatenate([r.flags for r in readings])
     np.testing.assert_array_equal(setpoint[setpoint >= 0], np.arange(500))
