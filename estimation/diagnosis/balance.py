@@ -9,6 +9,7 @@ from scipy import linalg, optimize
 from estimation.diagnosis.candidate import Candidate, step
 from estimation.diagnosis.design import Mapper, Run, tables, targets
 from estimation.diagnosis.evidence import resampled
+from estimation.diagnosis.least_squares import least_squares
 from estimation.diagnosis.paths import path_of
 from estimation.fitting import OFFSET
 from estimation.model import Estimate, Model, Term
@@ -123,9 +124,7 @@ class Balance:
         if not places:
             return list(terms)
         base, left = np.vstack(self.base(terms)), np.concatenate(self.left(terms))
-        scale = np.maximum(np.linalg.norm(base, axis=0), np.finfo(float).tiny)
-        found = np.linalg.lstsq(base / scale, left, rcond=1e-8)[0] / scale
-        steps = np.clip(found[-len(places) :], -1.0, 1.0)
+        steps = np.clip(least_squares(base, left)[-len(places) :], -1.0, 1.0)
         least = self.loss(terms)
         for share in 0.5 ** np.arange(6):
             moved = list(terms)

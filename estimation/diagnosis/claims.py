@@ -3,9 +3,7 @@
 from collections.abc import Sequence
 
 from estimation.diagnosis.balance import Balance
-from estimation.diagnosis.frozen import (
-    Part,
-)
+from estimation.diagnosis.frozen import Part
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.maps import Map, variables_of, within
 from estimation.diagnosis.naming import Discovery

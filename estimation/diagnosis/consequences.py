@@ -10,6 +10,7 @@ import numpy as np
 
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import Part
+from estimation.diagnosis.least_squares import least_squares
 from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray
 
@@ -36,11 +37,11 @@ def follows(cause: Story, first: int, story: Story, second: int) -> bool:
             continue
         echo = run.thin(_echo(cause.claims[first].part, origin[run.name]))
         own = run.thin(_columns(story.claims[second].part, run))
-        parts = (base[k], echo, own, balance.target[k][:, None])
+        parts = (base[k], echo, own, balance.target[k])
         rows.append([part - part.mean(axis=0) for part in parts])
     if not rows:
         return False
-    known, echoes, named, aim = (np.vstack(part) for part in zip(*rows, strict=True))
+    known, echoes, named, aim = (np.concatenate(part) for part in zip(*rows, strict=True))
     left = [_left(np.hstack([known, *more]), aim) for more in ([], [echoes], [named])]
     return left[0] - left[1] >= MOST * (left[0] - left[2])
 
@@ -64,6 +65,4 @@ def _columns(part: Part, run: Run) -> FloatArray:
 
 def _left(columns: FloatArray, aim: FloatArray) -> float:
     """Return the squared error that a fit of columns leaves."""
-    scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    weights = np.linalg.lstsq(columns / scale, aim, rcond=1e-8)[0] / scale[:, None]
-    return float(np.sum((aim - columns @ weights) ** 2))
+    return float(np.sum((aim - columns @ least_squares(columns, aim)) ** 2))

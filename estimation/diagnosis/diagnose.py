@@ -14,15 +14,9 @@ from estimation.diagnosis.balance import intervals, lay_out
 from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.claims import claims_of
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
-from estimation.diagnosis.findings import echoes, moved, one_cause_one_finding
+from estimation.diagnosis.findings import causes_of, echoes, findings_of, moved
 from estimation.diagnosis.formula import formulas
-from estimation.diagnosis.frozen import (
-    Frozen,
-    errors,
-    freeze,
-    settled,
-    squares,
-)
+from estimation.diagnosis.frozen import Frozen, errors, freeze, settled, squares
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments
 from estimation.diagnosis.instruments import projection as instrumented
@@ -96,9 +90,12 @@ def diagnose(
     on_stage("opening the confirm runs")
     on_open()
     stories = {name: _confirmed(story, gates) for name, story in stories.items()}
-    for name, places in echoes(stories).items():
-        stories[name] = _confirmed(_without(stories[name], places), gates)
-    findings = one_cause_one_finding(stories)
+    causes = causes_of(stories)
+    if small := echoes(causes):
+        for name, places in small.items():
+            stories[name] = _confirmed(_without(stories[name], places), gates)
+        causes = causes_of(stories)
+    findings = findings_of(causes, list(stories))
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
     }

@@ -16,6 +16,7 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.instruments import FORCES, Fit, as_told, fitted, instrument_columns
+from estimation.diagnosis.least_squares import least_squares, orthonormal
 from estimation.recording import FloatArray
 
 
@@ -44,11 +45,11 @@ def kept_share(
     told = replace(balance, runs=[_told(r, fits) for r in balance.runs], tables_of={})
     outside = [instrument_columns(r.channels, forces)[r.kept] for r in balance.runs]
     outside = [block - block.mean(axis=0) for block in outside]
-    basis = _basis(np.hstack([np.vstack(told.columns(together)), np.vstack(outside)]))
+    basis = orthonormal(np.hstack([np.vstack(told.columns(together)), np.vstack(outside)]))
     aim = np.concatenate(balance.target)
     count = sum(len(c.effect.amplitudes) for c in added)
-    plain = _weights(seen, aim)[-count:]
-    through = _weights(basis @ (basis.T @ seen), aim)[-count:]
+    plain = least_squares(seen, aim)[-count:]
+    through = least_squares(basis @ (basis.T @ seen), aim)[-count:]
     own_columns = _beside(seen[:, :-count], seen[:, -count:])
     size, left = own_columns @ plain, own_columns @ through
     return float(size @ left / max(float(size @ size), np.finfo(float).tiny))
@@ -64,19 +65,6 @@ def _told(run: Run, fits: dict[str, Fit]) -> Run:
     """Return the run with its noisy channels as the other sensors tell them."""
     told = {name: as_told(run, fit) for name, fit in fits.items()}
     return replace(run, channels={**run.channels, **told})
-
-
-def _basis(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of what columns span, shape (n, rank)."""
-    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    left, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, sizes > 1e-8 * sizes[0]])
-
-
-def _weights(columns: FloatArray, aim: FloatArray) -> FloatArray:
-    scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    weights: FloatArray = np.linalg.lstsq(columns / scale, aim, rcond=1e-8)[0] / scale
-    return weights
 
 
 def _beside(base: FloatArray, columns: FloatArray) -> FloatArray:

@@ -9,12 +9,7 @@ from estimation.derived import GEAR_RATIO
 from estimation.diagnosis.candidate import UNKNOWN, Candidate
 from estimation.diagnosis.consequences import follows
 from estimation.diagnosis.design import Run
-from estimation.diagnosis.frozen import (
-    Frozen,
-    freeze,
-    samples_of,
-    squares,
-)
+from estimation.diagnosis.frozen import Frozen, freeze, samples_of, squares
 from estimation.diagnosis.result import Finding, Stated, Value
 from estimation.diagnosis.story import Claim, Story
 from estimation.recording import FloatArray
@@ -140,21 +135,18 @@ def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
     return {name: Value(e.value, units[name], e.ci95) for name, e in own.items()}
 
 
-def one_cause_one_finding(stories: Mapping[str, Story]) -> list[Finding]:
-    """Report a cause seen in several balances once, where it explains the largest share."""
-    order = list(stories)
-    causes = _causes(stories)
+def findings_of(causes: Sequence[Told], order: Sequence[str]) -> list[Finding]:
+    """Return the findings to report: by balance in this order, in each as they were found."""
     ranked = sorted(causes, key=lambda told: (order.index(told.finding.balance), told.place))
     return [told.finding for told in ranked]
 
 
-def echoes(stories: Mapping[str, Story]) -> dict[str, set[int]]:
+def echoes(causes: Sequence[Told]) -> dict[str, set[int]]:
     """Return the places of claims too small to be told from what a larger cause does elsewhere.
 
     What shakes the axis shows whatever the other balances lack: an inertia that nothing but a
     ripple makes visible is there, and is not what is wrong.
     """
-    causes = _causes(stories)
     small: dict[str, set[int]] = {}
     for told in causes:
         larger = (c for c in causes if c.finding.balance != told.finding.balance)
@@ -163,8 +155,8 @@ def echoes(stories: Mapping[str, Story]) -> dict[str, set[int]]:
     return small
 
 
-def _causes(stories: Mapping[str, Story]) -> list[Told]:
-    """Return the findings of all balances, each cause once."""
+def causes_of(stories: Mapping[str, Story]) -> list[Told]:
+    """Return the findings of all balances, each cause once, where it explains the largest share."""
     found = [told for story in stories.values() for told in _findings(story)]
     # a named fault of a sensor speaks for what other balances only show
     found.sort(

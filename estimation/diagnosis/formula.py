@@ -25,6 +25,7 @@ from estimation.diagnosis.formula_library import (
     values,
     word,
 )
+from estimation.diagnosis.least_squares import orthonormal
 from estimation.diagnosis.maps import SIMPLER, Map
 from estimation.effects.unknown_product import Product
 from estimation.recording import FloatArray
@@ -129,7 +130,7 @@ class _Pursuit:
         if self.balance.demean:
             ones = [np.ones(len(r)) for r in self.left]
             fixed = np.hstack([fixed, *(self._alone(k, one) for k, one in enumerate(ones))])
-        self.fixed = _orthonormal(fixed)
+        self.fixed = orthonormal(fixed)
 
     def _alone(self, k: int, ones: FloatArray) -> FloatArray:
         parts = [ones if k == j else np.zeros(len(r)) for j, r in enumerate(self.left)]
@@ -272,11 +273,3 @@ def _distinct(found: Sequence[_Partial]) -> list[_Partial]:
     for one in sorted(found, key=lambda one: -one.gain):
         best.setdefault(tuple(sorted((t.id, t.channels) for t in one.terms)), one)
     return list(best.values())
-
-
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of what the columns span."""
-    scale = np.linalg.norm(columns, axis=0)
-    wide = columns[:, scale > 0] / scale[scale > 0]
-    left, size, _ = np.linalg.svd(wide, full_matrices=False)
-    return np.asarray(left[:, size > 1e-8 * size.max(initial=1e-300)])

@@ -14,6 +14,7 @@ import numpy as np
 from estimation.derived import measured_channels
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import Run
+from estimation.diagnosis.least_squares import least_squares
 from estimation.recording import FloatArray
 
 SPEED, ACCELERATION, ANGLE = (
@@ -82,10 +83,7 @@ def fitted(runs: Sequence[Run], name: str, target: str) -> Fit | None:
         table -= table.mean(axis=0)
         columns.append(table[:, :-1])
         aims.append(table[:, -1])
-    joined = np.vstack(columns)
-    scale = np.maximum(joined.std(axis=0), np.finfo(float).tiny)
-    weights = np.linalg.lstsq(joined / scale, np.concatenate(aims), rcond=1e-8)[0]
-    return forces, weights / scale
+    return forces, least_squares(np.vstack(columns), np.concatenate(aims))
 
 
 def instrument_columns(channels: Mapping[str, FloatArray], forces: Sequence[str]) -> FloatArray:

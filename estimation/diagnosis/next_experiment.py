@@ -14,6 +14,7 @@ import numpy as np
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, pool
 from estimation.diagnosis.design import Run, targets
+from estimation.diagnosis.least_squares import least_squares
 from estimation.diagnosis.result import Finding
 from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray
@@ -133,8 +134,7 @@ def worth(
 def _left(truth: Sequence[FloatArray], span: Sequence[FloatArray], old: int) -> float:
     """Return the mean square that columns leave of a truth on the runs after the first `old`."""
     whole, aim = np.vstack(list(span)), np.concatenate(list(truth))
-    scale = np.sqrt(np.maximum(np.einsum("nk,nk->k", whole, whole), np.finfo(float).tiny))
-    weights = np.linalg.lstsq(whole / scale, aim, rcond=1e-8)[0] / scale
+    weights = least_squares(whole, aim)
     error = np.concatenate([y - c @ weights for y, c in zip(truth[old:], span[old:], strict=True)])
     return float(np.mean(error**2))
 

@@ -7,10 +7,7 @@ from estimation.diagnosis.balance import Balance, as_model
 from estimation.diagnosis.candidate import UNKNOWN
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.formula import Formula
-from estimation.diagnosis.frozen import (
-    Frozen,
-    Part,
-)
+from estimation.diagnosis.frozen import Frozen, Part
 from estimation.diagnosis.naming import Discovery, Named
 from estimation.model import Estimate, Model
 

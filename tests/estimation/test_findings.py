@@ -2,8 +2,7 @@
 
 import pytest
 
-from estimation.diagnosis import findings
-from estimation.diagnosis.findings import Told, echoes, same_fault
+from estimation.diagnosis.findings import Told, echoes, findings_of, same_fault
 from estimation.diagnosis.result import Finding, Value
 
 
@@ -53,23 +52,19 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
 
 
 @pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.4, {})])
-def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(
-    monkeypatch, share, small
-):
+def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(share, small):
     ripple = Told(finding("motor", "ripple.motor"), {}, None, 0, 0.9)
     inertia = Told(finding("gearbox", "inertia.missing"), {}, None, 0, share)
     told = [ripple, inertia]
-    monkeypatch.setattr(findings, "_causes", lambda stories: told)
-    assert echoes({}) == small
+    assert echoes(told) == small
 
 
-def test_findings_come_in_the_order_found_however_much_each_explains(monkeypatch):
+def test_findings_come_in_the_order_found_however_much_each_explains():
     small, large = finding("motor", "friction.drag"), finding("motor", "ripple.motor")
     told = [  # in the order of what each explains
         Told(finding("gearbox", "sensor.creep"), {}, None, 0, 0.9),
         Told(large, {}, None, 1, 0.8),
         Told(small, {}, None, 0, 0.1),
     ]
-    monkeypatch.setattr(findings, "_causes", lambda _: told)
-    listed = findings.one_cause_one_finding({"motor": None, "gearbox": None})
+    listed = findings_of(told, ["motor", "gearbox"])
     assert [f.family for f in listed] == ["friction.drag", "ripple.motor", "sensor.creep"]
