@@ -39,12 +39,12 @@ from drivers.teensy.watches import (
     STALL_TICKS,
     STATE,
     TICKS,
-    TRIP_CHANNEL,
     judge_by_time,
     motor_crossing,
     note_trip,
     sensor_crossing,
     silence,
+    untripped,
 )
 
 MOTORS = GRASPER.motors
@@ -74,12 +74,6 @@ _MOTOR_TRAVEL = int(Trip.MOTOR_TRAVEL)
 _SENSOR_MISSING = int(Trip.SENSOR_MISSING)
 
 
-def _untripped() -> NDArray[np.int64]:
-    guard = np.zeros(GUARD_PLACES, np.int64)
-    guard[TRIP_CHANNEL] = NO_CHANNEL
-    return guard
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class GrasperDrive:
     """All that a tick of the grasper's board needs and changes, besides its inputs.
@@ -91,7 +85,7 @@ class GrasperDrive:
         gains: Gains of each controller, shape (3, 5); holding lowers their limits.
     """
 
-    guard: NDArray[np.int64] = field(default_factory=_untripped)
+    guard: NDArray[np.int64] = field(default_factory=lambda: untripped(GUARD_PLACES))
     limits: NDArray[np.int64] = field(default_factory=lambda: GrasperLimits().as_array())
     control_state: NDArray[np.float64] = field(default_factory=lambda: np.zeros((MOTORS, 4)))
     gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros((MOTORS, len(GAIN_NAMES))))
@@ -232,6 +226,23 @@ def first_crossing(
         if code != NONE:
             return k, code, channel, value, limit, late_us
     return len(rows), NONE, NO_CHANNEL, 0, 0, 0
+
+
+@numba.njit(cache=True)
+def run_ticks(
+    rows: NDArray[np.int32],
+    targets: NDArray[np.int32],
+    guard: NDArray[np.int64],
+    limits: NDArray[np.int64],
+    control_state: NDArray[np.float64],
+    gains: NDArray[np.float64],
+) -> None:
+    """Do a tick behind every row, for benches whose inputs do not follow the motors.
+
+    Targets are of shape (n, 3).
+    """
+    for k in range(len(rows)):
+        grasper_tick(rows[k], targets[k], guard, limits, control_state, gains)
 
 
 def _limits_of(wire: Sequence[int]) -> GrasperLimits:

@@ -31,12 +31,12 @@ from drivers.teensy.watches import (
     STALL_TICKS,
     STATE,
     TICKS,
-    TRIP_CHANNEL,
     judge_by_time,
     motor_crossing,
     note_trip,
     sensor_crossing,
     silence,
+    untripped,
 )
 from drivers.teensy.watches import LAST_MOTOR as LAST_MOTOR_OF_WATCH
 
@@ -82,12 +82,6 @@ INT16 = (-(2**15), 2**15 - 1)
 FSR_MAX = 4095
 
 
-def _untripped() -> NDArray[np.int64]:
-    guard = np.zeros(GUARD_PLACES, np.int64)
-    guard[TRIP_CHANNEL] = NO_CHANNEL
-    return guard
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
     """All that a tick of the board needs and changes, besides its inputs.
@@ -99,7 +93,7 @@ class Drive:
         gains: Gains of the controller, shape (5,); holding lowers its limit.
     """
 
-    guard: NDArray[np.int64] = field(default_factory=_untripped)
+    guard: NDArray[np.int64] = field(default_factory=lambda: untripped(GUARD_PLACES))
     limits: NDArray[np.int64] = field(default_factory=lambda: Limits.widest().as_array())
     control_state: NDArray[np.float64] = field(default_factory=new_state)
     gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(GAIN_NAMES)))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.teensy.protocol import (
     STATUS_ARMED,
@@ -60,6 +61,13 @@ _STALLED = int(Trip.STALLED)
 _SENSOR_SATURATED = int(Trip.SENSOR_SATURATED)
 _SENSOR_STALE = int(Trip.SENSOR_STALE)
 _HOLD = int(SafeState.HOLD)
+
+
+def untripped(places: int) -> NDArray[np.int64]:
+    """Return the state of a guard that nothing has tripped, shape (places,)."""
+    guard = np.zeros(places, np.int64)
+    guard[TRIP_CHANNEL] = NO_CHANNEL
+    return guard
 
 
 @numba.njit(cache=True)

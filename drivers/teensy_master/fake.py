@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.device import Device
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, grasper_tick
+from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, run_ticks
 from drivers.teensy_master.driver import TeensyMaster
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
@@ -35,8 +35,7 @@ class TurnedByHand:
         for k, turn_hz in enumerate(TURN_HZ):
             turned = np.sin(2 * np.pi * turn_hz * time_s)
             rows[:, INPUTS - 3 + k] = np.round(MIDDLE + REACH * turned)
-        for row, *target in zip(rows, one, two, three, strict=True):
-            grasper_tick(row, np.array(target, np.int32), *drive.arrays)
+        run_ticks(rows, np.column_stack((one, two, three)), *drive.arrays)
         return rows
 
 

@@ -1,12 +1,17 @@
 """`rig study` on arms: a paper's results on joint torque, wrench, added mass, grasp."""
 
 import os
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.output import JsonFlag, emit_json, progress, show_result
+
+if TYPE_CHECKING:
+    from rig.reports.table import TextTable
 
 arm_studies = typer.Typer(rich_markup_mode=None)
 
@@ -14,12 +19,41 @@ StateFolder = Annotated[
     Path | None, typer.Option("--state", help="Folder of what is done; a cache folder by default.")
 ]
 
+Arms = Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")]
+
+TablesFile = Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")]
+
 FigureFolder = Annotated[Path | None, typer.Option("--figures", help="Folder for the figures.")]
 
 
 def _from_page(drawn: list[Path], out: Path | None) -> list[str]:
     """Return the places of figures from where a page will be."""
     return [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
+
+
+def _show(
+    study: object,
+    lines: Sequence[str],
+    tables: "Sequence[TextTable]",
+    page: Callable[[Sequence[str]], str],
+    drawn: list[Path],
+    out: Path | None,
+    json: bool,
+) -> None:
+    """Print a study, write its page with the figures drawn, and print it as JSON if asked.
+
+    Args:
+        study: The study.
+        lines: What is said before its tables.
+        tables: Its tables.
+        page: Makes its page, with figures at the places given.
+        drawn: Figures that were drawn.
+        out: File for the page.
+        json: Whether to print it as JSON.
+    """
+    show_result(lines, tables, out, lambda: page(_from_page(drawn, out)))
+    if json:
+        emit_json(study)
 
 
 def kept_in(state: Path | None, study: str) -> Path:
@@ -39,7 +73,7 @@ def pique(
         list[str] | None,
         typer.Option(help="A further run to test on, with models fitted on the second path."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    out: TablesFile = None,
     figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -56,11 +90,8 @@ def pique(
         )
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.notes(study)]
-    show_result(
-        lines, shown.tables(study), out, lambda: shown.markdown(study, _from_page(drawn, out))
-    )
-    if json:
-        emit_json(study)
+    page = partial(shown.markdown, study)
+    _show(study, lines, shown.tables(study), page, drawn, out, json)
 
 
 @arm_studies.command()
@@ -96,10 +127,10 @@ def excitation(
 
 @arm_studies.command()
 def wrench(
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    seeds: Arms = 20,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    out: TablesFile = None,
     figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -113,21 +144,17 @@ def wrench(
             seeds, kept_in(state, "wrench"), workers, lambda: bar.advance(task)
         )
     drawn = shown.write_figures(figures, study) if figures is not None else []
-
-    def markdown() -> str:
-        return shown.markdown(study, _from_page(drawn, out))
-
-    show_result(shown.NOTES, shown.tables(study), out, markdown)
-    if json:
-        emit_json(study)
+    lines = shown.NOTES
+    page = partial(shown.markdown, study)
+    _show(study, lines, shown.tables(study), page, drawn, out, json)
 
 
 @arm_studies.command()
 def delsol(
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    seeds: Arms = 20,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    out: TablesFile = None,
     figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -139,21 +166,17 @@ def delsol(
         task = bar.add_task("arms", total=seeds)
         study = run_delsol(seeds, kept_in(state, "delsol"), workers, lambda: bar.advance(task))
     drawn = shown.write_figures(figures, study) if figures is not None else []
-
-    def markdown() -> str:
-        return shown.markdown(study, _from_page(drawn, out))
-
-    show_result([shown.NOTE], shown.tables(study), out, markdown)
-    if json:
-        emit_json(study)
+    lines = [shown.NOTE]
+    page = partial(shown.markdown, study)
+    _show(study, lines, shown.tables(study), page, drawn, out, json)
 
 
 @arm_studies.command()
 def zhang(
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")] = 20,
+    seeds: Arms = 20,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
     state: StateFolder = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    out: TablesFile = None,
     figures: FigureFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -167,13 +190,9 @@ def zhang(
         task = bar.add_task("arms", total=seeds)
         study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))
     drawn = write_figures(figures, study) if figures is not None else []
-
-    def markdown() -> str:
-        return shown.markdown(study, _from_page(drawn, out))
-
-    show_result([shown.lead(study), *shown.notes(study)], shown.tables(study), out, markdown)
-    if json:
-        emit_json(study)
+    lines = [shown.lead(study), *shown.notes(study)]
+    page = partial(shown.markdown, study)
+    _show(study, lines, shown.tables(study), page, drawn, out, json)
 
 
 @arm_studies.command()

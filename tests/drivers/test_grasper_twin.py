@@ -16,7 +16,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
-from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, grasper_tick
+from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, run_ticks
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import SimulatedTransport
@@ -50,9 +50,9 @@ class ScriptedGrasper:
         drive: GrasperDrive,
     ) -> NDArray[np.int32]:
         rows = np.zeros((ticks, COLUMNS), np.int32)
-        for row, *target in zip(rows, one, two, three, strict=True):
+        for row in rows:
             row[:INPUTS] = self._next()
-            grasper_tick(row, np.array(target, np.int32), *drive.arrays)
+        run_ticks(rows, np.column_stack((one, two, three)), *drive.arrays)
         return rows
 
     def advance_with_board(
