@@ -6,12 +6,13 @@ so that it is fitted anew beside every candidate.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.arm.base import base_of
+from estimation.arm.base import base_of, closed_base_of
+from estimation.arm.closed_chain import FRICTION, ClosedChain, closed_regressor, parameter_names
 from estimation.arm.motion import LOW_PASS, JointNames, Motion, joint_names
 from estimation.arm.regressor import SIGN_WIDTH, regressor
 from estimation.arm.regressor import names as serial_names
@@ -91,10 +92,7 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
     models = []
     for k, joint in enumerate(arm.joints):
         own = names[k]
-        terms = [
-            *_of_every_joint(own, changes[k]),
-            Term(effect("inertia.missing"), channels={"acceleration": own.acceleration}),
-        ]
+        terms = _of_every_joint(own, changes[k])
         if joint.spring:
             terms.append(Term(effect("spring.position"), channels={"position": own.position}))
         terms += [
@@ -117,6 +115,37 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
     )
 
 
+def closed(chain: ClosedChain, sign_rad_s: float) -> ArmBalances:
+    """Return the balances of an arm with closed loops that pressures drive.
+
+    Its first bodies are those of the actuated joints: their frictions are the joints' own, those of
+    the loops' bodies are shared. Pressures have a zero, so no run has an offset of its own.
+
+    Args:
+        chain: The arm.
+        sign_rad_s: Speed over which Coulomb friction changes sign.
+    """
+    names = tuple(JointNames(k + 1, prismatic=False) for k in range(chain.closure.shape[1]))
+    own = {f"{kind}{joint.number}" for kind in FRICTION for joint in names}
+    base = closed_base_of(chain, sign_rad_s)
+    shared = np.array([parameter_names(chain)[k] not in own for k in base.columns])
+
+    def columns(motion: Motion) -> FloatArray:
+        return closed_regressor(chain, motion, sign_rad_s)[:, :, base.columns]
+
+    changes = _changes(columns, shared, len(names))
+    models = [
+        replace(
+            _model(joint, _of_every_joint(joint, count), f"{chain.name}; {chain.source}"),
+            run_offsets=False,
+        )
+        for joint, count in zip(names, changes, strict=True)
+    ]
+    return ArmBalances(
+        chain.name, tuple(models), names, columns, shared, np.full(len(names), sign_rad_s)
+    )
+
+
 def _of_every_joint(own: JointNames, changes: int) -> list[Term]:
     return [
         Term(effect("arm.links"), channels={"links": own.links}),
@@ -126,6 +155,7 @@ def _of_every_joint(own: JointNames, changes: int) -> list[Term]:
         ),
         Term(effect("friction.viscous"), channels={"speed": own.velocity}),
         Term(effect("arm.friction"), channels={"direction": own.direction}),
+        Term(effect("inertia.missing"), channels={"acceleration": own.acceleration}),
     ]
 
 

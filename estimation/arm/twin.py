@@ -4,14 +4,14 @@ The positions are the measured ones; the torque is the declared model's on them,
 changes sign as sharply as declared, so that what filters do to it is in the twin as in the arm.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.arm.balances import ArmBalances
 from estimation.arm.motion import FINE, joint_channels, motion_of
-from estimation.arm.shared import SharedFit
+from estimation.arm.shared import SharedFit, shared_fit, with_links
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 
@@ -63,6 +63,21 @@ class ArmTwin:
             )
             for run in self.runs
         ]
+
+
+def laid_out(
+    arm: ArmBalances, recordings: Sequence[Recording], discover: Collection[str]
+) -> tuple[list[Recording], ArmTwin]:
+    """Return an arm's runs with what its joints share, fitted where it discovers, and its twin.
+
+    Args:
+        arm: The arm.
+        recordings: Its runs.
+        discover: Names of those that discover; others have no part in the fit.
+    """
+    fitted = shared_fit(arm, [run for run in recordings if run.name in discover])
+    whole = with_links(arm, recordings, fitted)
+    return whole, ArmTwin.of(arm, [run for run in whole if run.name in discover], fitted)
 
 
 def _noise(torque: FloatArray, rate_hz: float) -> FloatArray:

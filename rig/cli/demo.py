@@ -20,11 +20,6 @@ def demo(
     json: JsonFlag = False,
 ) -> None:
     """Record the simulated rig with an effect its model lacks, find that effect, and prove it."""
-    import os
-
-    # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
     from rig.demo import PROTOCOL, run_demo
     from rig.protocol import load_protocol
 

@@ -45,10 +45,6 @@ def diagnose(
 ) -> None:
     """Find the effect that the declared model lacks, and prove it on runs that nobody touched."""
     import json
-    import os
-
-    # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from estimation import model_file
     from estimation.files import write_text_atomic

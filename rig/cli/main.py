@@ -1,5 +1,6 @@
 """The `rig` command: collects the verbs and turns errors into three lines and an exit code."""
 
+import os
 import sys
 from typing import Annotated
 
@@ -26,6 +27,9 @@ from rig.cli.record import record
 from rig.cli.replay import replay
 from rig.cli.stop import stop
 from rig.cli.study import study_app
+
+# before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 app = typer.Typer(
     name="rig",

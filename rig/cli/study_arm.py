@@ -166,7 +166,7 @@ def delsol(
         task = bar.add_task("arms", total=seeds)
         study = run_delsol(seeds, kept_in(state, "delsol"), workers, lambda: bar.advance(task))
     drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = [shown.NOTE]
+    lines = [shown.lead(study), shown.NOTE]
     page = partial(shown.markdown, study)
     _show(study, lines, shown.tables(study), page, drawn, out, json)
 

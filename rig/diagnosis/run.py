@@ -5,8 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from estimation.arm.balances import balances_of
-from estimation.arm.shared import shared_fit, with_links
-from estimation.arm.twin import ArmTwin
+from estimation.arm.twin import laid_out
 from estimation.campaign import Campaign
 from estimation.diagnosis.clock import steady
 from estimation.diagnosis.diagnose import diagnose
@@ -78,15 +77,12 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
-    discover = [r for r in recordings if r.name in sealed.discover]
     arm = balances_of(recordings[0])
     on_stage("building the simulated twin of the declared models")
     if arm is None:
-        twins = twins_of(models, discover)
+        twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     else:
-        fitted = shared_fit(arm, discover)
-        recordings = with_links(arm, recordings, fitted)
-        twin = ArmTwin.of(arm, [r for r in recordings if r.name in sealed.discover], fitted)
+        recordings, twin = laid_out(arm, recordings, sealed.discover)
         twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
     diagnosis, stories = diagnose(
         recordings,

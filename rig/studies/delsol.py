@@ -3,7 +3,7 @@
 Each seed draws an arm; its joints swing one after another by single sinusoids within the paper's
 frequencies (table 1); its closed-chain model is fitted by damped least squares to motion
 differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our way beside
-it adds slip and what the diagnosis of the residual found: a pull by position on joint 1.
+it fits the same points with the effects that the diagnosis named on further runs of the same arm.
 """
 
 from collections.abc import Callable
@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from estimation.arm.closed_chain import closed_jacobians, closed_regressor
-from estimation.arm.effects import on_joint
-from estimation.arm.elements import slip
 from estimation.arm.identification import damped_around
 from estimation.arm.motion import Motion
 from estimation.arm.periodic import periodic_motion
@@ -30,9 +28,10 @@ from rig.simulation.hydraulic_arm import (
     draw,
     measured_torque,
 )
+from rig.studies.delsol_diagnosis import HIGHEST_HZ, JOINTS, Named, diagnosed, found_columns
 from rig.studies.seeds import kept_outcomes
 
-SCHEMA = "rig.study.delsol/1"
+SCHEMA = "rig.study.delsol/2"
 
 TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
 TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
@@ -44,13 +43,10 @@ PEAK_N = 26.096 / 0.1298
 SLIDING_N = 30.0
 """Friction of the rough foam; assumed."""
 
-PAPER, OURS = "paper's method", "with slip and the hoses' pull"
+PAPER, OURS = "paper's method", "with what was found"
 SWINGS = 4
 POSES = 2
-HIGHEST_HZ = 5.0
 DAMPING = 0.3
-SLIP_RAD = (0.01, 0.03, 0.1)
-JOINTS = 5
 WITHIN = 0.25
 LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
 
@@ -80,24 +76,23 @@ class DelSolStudy:
         schema: Name of this layout.
         seeds: The seeds, all reported.
         outcomes: By method, one a seed.
-        hoses_found: Of each seed, the joint whose residual a pull by position explains best, and
-            the share of its residual's variance that it explains.
+        named: What the diagnosis named on each seed's arm.
         provenance: When and from what this was made.
     """
 
     schema: str
     seeds: tuple[int, ...]
     outcomes: dict[str, tuple[Outcome, ...]]
-    hoses_found: tuple[tuple[int, float], ...]
+    named: tuple[tuple[Named, ...], ...]
     provenance: Provenance
 
 
 @dataclass(frozen=True)
 class Seed:
-    """One arm's results by method, and where the hoses were found."""
+    """One arm's results by method, and what the diagnosis named on it."""
 
     outcomes: dict[str, Outcome]
-    hose: tuple[int, float]
+    named: tuple[Named, ...]
 
 
 def run_delsol(
@@ -116,8 +111,8 @@ def run_delsol(
     """
     done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
     by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in (PAPER, OURS)}
-    hoses_found = tuple(seed.hose for seed in done)
-    return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, hoses_found, Provenance.now(0))
+    named = tuple(seed.named for seed in done)
+    return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, named, Provenance.now(0))
 
 
 def _read(held: Any) -> Seed:
@@ -125,8 +120,10 @@ def _read(held: Any) -> Seed:
         method: Outcome(**{**each, "residual_n_m": tuple(each["residual_n_m"])})
         for method, each in held["outcomes"].items()
     }
-    joint, share = held["hose"]
-    return Seed(outcomes, (joint, share))
+    named = (
+        Named(**{**each, "alternatives": tuple(each["alternatives"])}) for each in held["named"]
+    )
+    return Seed(outcomes, tuple(named))
 
 
 def one_seed(seed: int) -> Seed:
@@ -135,14 +132,17 @@ def one_seed(seed: int) -> Seed:
     arm = draw(rng)
     runs = [(m, measured_torque(arm, m, np.zeros((len(m), 3)), rng)) for m in swings(rng)]
     tests = {name: make(arm, rng) for name, make in (("impact", impact), ("sliding", sliding))}
+    named, effects = diagnosed(arm, rng)
+
+    def our_columns(motion: Motion) -> FloatArray:
+        return np.concatenate([paper_columns(motion), found_columns(effects, motion)], axis=2)
+
     outcomes = {}
     for method, columns_of in ((PAPER, paper_columns), (OURS, our_columns)):
         table = np.concatenate([columns_of(motion) for motion, _ in runs])
         torque = np.concatenate([torque for _, torque in runs])
         values = damped_around(table, torque, np.zeros(table.shape[2]), DAMPING)
         left = torque - table @ values
-        if method == PAPER:
-            hose = hoses([motion for motion, _ in runs], left)
         errors = {}
         for name, (motion, seen, force) in tests.items():
             axis = 2 if name == "impact" else 1
@@ -156,7 +156,7 @@ def one_seed(seed: int) -> Seed:
             impact_percent=100 * errors["impact"] / peak,
             sliding_n=errors["sliding"],
         )
-    return Seed(outcomes, hose)
+    return Seed(outcomes, named)
 
 
 def swings(rng: np.random.Generator) -> list[Motion]:
@@ -205,31 +205,6 @@ def _around(pose: FloatArray, joint: int, size_rad: float, frequency_hz: float) 
 def paper_columns(motion: Motion) -> FloatArray:
     """Return the 96 columns of eight links, ten parameters and two frictions each."""
     return closed_regressor(HYDRAULIC, motion, SIGN_RAD_S)
-
-
-def our_columns(motion: Motion) -> FloatArray:
-    """Return the paper's columns, slip of every joint and a pull by position on joint 1."""
-    parts = [paper_columns(motion)]
-    for k in range(JOINTS):
-        slips = [slip(motion.position[:, [k]], threshold) for threshold in SLIP_RAD]
-        parts.append(on_joint(np.hstack(slips), k, JOINTS))
-    turn = motion.position[:, [0]]
-    parts.append(on_joint(np.hstack([turn, turn**3]), 0, JOINTS))
-    return np.concatenate(parts, axis=2)
-
-
-def hoses(motions: list[Motion], left: FloatArray) -> tuple[int, float]:
-    """Return the joint, from 1, whose residual its own position explains best, and the share.
-
-    A pull by position without gravity or friction in it is what hoses do; q and q^3 are tried.
-    """
-    position = np.concatenate([motion.position for motion in motions])
-    shares = []
-    for k in range(JOINTS):
-        columns = np.column_stack([position[:, k], position[:, k] ** 3])
-        fitted = columns @ np.linalg.lstsq(columns, left[:, k], rcond=None)[0]
-        shares.append(1 - np.sum((left[:, k] - fitted) ** 2) / np.sum(left[:, k] ** 2))
-    return int(np.argmax(shares)) + 1, float(np.max(shares))
 
 
 def tip_force(motion: Motion, external: FloatArray) -> FloatArray:

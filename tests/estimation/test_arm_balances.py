@@ -9,7 +9,7 @@ from estimation.arm.balances import balances_of
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import motion_of
 from estimation.arm.shared import shared_fit, with_links
-from estimation.arm.twin import ArmTwin
+from estimation.arm.twin import laid_out
 from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.split import split
@@ -40,9 +40,7 @@ def positions(run: Recording) -> np.ndarray:
 
 def diagnosed(recordings: list[Recording], *joints: int):
     arm, sealed = balances_of(recordings[0]), split(recordings, 0)
-    values = shared_fit(arm, [r for r in recordings if r.name in sealed.discover])
-    whole = with_links(arm, recordings, values)
-    twin = ArmTwin.of(arm, [r for r in whole if r.name in sealed.discover], values)
+    whole, twin = laid_out(arm, recordings, sealed.discover)
     models = [arm.models[j - 1] for j in joints]
     return diagnose(whole, models, sealed, twins={m.balance: lambda *_: twin for m in models})[0]
 

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from rig.cli.study import study_app
 from rig.studies import delsol
+from rig.studies.delsol_diagnosis import PULLS
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
@@ -19,9 +20,11 @@ def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):
     assert ran.exit_code == 0, ran.output
     assert "figures/delsol-forces.svg" in out.read_text()
     found = json.loads(ran.stdout)
-    joint, share = found["hoses_found"][0]
-    assert joint == 1
-    assert share > 0.5
+    pulls = [each for each in found["named"][0] if each["family"] in PULLS]
+    assert [each["joint"] for each in pulls] == [1]
+    assert pulls[0]["after_n_m"] < 0.95 * pulls[0]["before_n_m"]
+    assert {each["joint"] for each in found["named"][0]} == {1, 2, 3, 4, 5}  # friction with memory
+    assert "pull on joint 1 of 1 of 1 arms" in out.read_text()
     (paper,), (ours,) = (found["outcomes"][name] for name in (delsol.PAPER, delsol.OURS))
     assert np.all(np.array(ours["residual_n_m"]) < paper["residual_n_m"])
     assert ours["impact_n"] < paper["impact_n"]
