@@ -1,7 +1,7 @@
 """The noise floor of each balance: what differs between runs that were asked for twice.
 
-Two runs of one motion and load hold the same physics; half of the variance of the difference of
-their residuals is what no model of these variables can explain.
+Two runs of one motion and load hold the same physics, and so do two periods of one path; half of
+the variance of the difference of their residuals is what no model of these variables can explain.
 """
 
 import itertools
@@ -11,6 +11,7 @@ import numpy as np
 
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import Frozen
+from estimation.diagnosis.paths import path_of
 from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray, Recording
 
@@ -23,15 +24,24 @@ LEAST = 200
 
 
 def repeats(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
-    """Return the pairs of runs that were asked for the same motion under the same load."""
-    asked = [r for r in recordings if all(name in r for name in ASKED)]
+    """Return the pairs of runs of the same motion under the same load."""
     return [
         (one.name, other.name)
-        for one, other in itertools.combinations(asked, 2)
-        if len(one) == len(other)
+        for one, other in itertools.combinations(recordings, 2)
+        if len(one) == len(other) and (_of_one_path(one, other) or _asked_alike(one, other))
+    ]
+
+
+def _of_one_path(one: Recording, other: Recording) -> bool:
+    return one.name != path_of(one.name) == path_of(other.name)
+
+
+def _asked_alike(one: Recording, other: Recording) -> bool:
+    return (
+        all(name in one and name in other for name in ASKED)
         and all(float(np.abs(one[name] - other[name]).max()) < SAME for name in ASKED)
         and float(np.ptp(one[ASKED[0]])) > SAME
-    ]
+    )
 
 
 def noise_floors(

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
+from estimation.diagnosis.paths import path_of, split_paths
+from estimation.recording import Recording
 from rig.cli.main import main
 from rig.diagnosis import subject
+from rig.diagnosis.noise import repeats
 from rig.diagnosis.schema import DiagnosisSchema
 from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
 
@@ -49,3 +52,19 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     assert json.loads(out.read_text())["exploratory"] is True
     assert main([*words[:3], "joint.9", *words[4:]]) == 2
     assert "joint.6" in capsys.readouterr().err
+
+
+def test_whole_periods_of_one_path_are_repeats() -> None:
+    time_s = np.arange(1700) / 100
+    angles = [np.sin(time_s * 2 * np.pi / period_s) for period_s in (4.0, 5.0)]
+    paths = [
+        Recording(n, time_s, {"joint_1_angle_rad": a}) for n, a in zip("ab", angles, strict=True)
+    ]
+    pieces, _ = split_paths(paths)
+    lengths = {piece.name: len(piece) for piece in pieces}
+    pairs = repeats(pieces)
+    assert {path_of(name) for pair in pairs for name in pair} == {"a", "b"}
+    assert all(path_of(one) == path_of(other) for one, other in pairs)
+    assert all(lengths[one] == lengths[other] for one, other in pairs)
+    assert len(pairs) == 6 + 3  # four whole periods and three; a rest of a period repeats nothing
+    assert repeats(paths) == []
