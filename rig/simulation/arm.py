@@ -33,6 +33,10 @@ CONTACT_SHARE = 0.1
 CONTACT_DEPTH_M = 0.04
 """Share of the ranges moved while touching a pin, and insertion beyond the middle; assumed."""
 
+GRIP_N_M = 0.055
+"""Torsion at which a pin turns in the gripper instead of passing it on; the thesis writes of a bad
+grip and states no number: set so that its method meets its table 3.3."""
+
 SEED_SPREAD = 0.25
 """Standard deviation of the logarithm of every parameter and hidden strength between arms."""
 
@@ -171,18 +175,64 @@ def contact_motion(rng: np.random.Generator, seconds: float) -> Motion:
 
 def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     """Return spatial wrenches of touching and letting go in turns: up to 7 N, smooth."""
+    waves, touching = _touching(rng, motion)
+    force = waves * (touching * rng.uniform(5, 7) / np.abs(waves).max())[:, None]
+    return _of_tip(motion, force, 0.1 * touching * _torsion(rng, motion))
+
+
+def pin(
+    rng: np.random.Generator,
+    motion: Motion,
+    largest_n: tuple[float, float, float],
+    torsion_n_m: float,
+) -> FloatArray:
+    """Return spatial wrenches of touching a pin in turns, each axis with its own largest force.
+
+    Args:
+        rng: Draws the forces.
+        motion: Motion of the arm.
+        largest_n: Largest force along each axis of the base, N.
+        torsion_n_m: Largest torsion about the shaft, N m.
+    """
+    waves, touching = _touching(rng, motion)
+    force = waves * touching[:, None] * np.array(largest_n) / np.abs(waves).max(axis=0)
+    return _of_tip(motion, force, torsion_n_m * touching * _torsion(rng, motion))
+
+
+def passed_on(motion: Motion, wrench: FloatArray) -> FloatArray:
+    """Return what a pin passes on to what holds it: beyond `GRIP_N_M` it turns in the gripper."""
+    axis, tip = _shaft(motion)
+    torsion = np.einsum("ni,ni->n", wrench[:, 3:] - np.cross(tip, wrench[:, :3]), axis)
+    lost = torsion - np.clip(torsion, -GRIP_N_M, GRIP_N_M)
+    return np.hstack([wrench[:, :3], wrench[:, 3:] - lost[:, None] * axis])
+
+
+def _touching(rng: np.random.Generator, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Return smooth waves along three axes, shape (n, 3), and how far the tip touches, (n,)."""
     time = np.arange(len(motion)) * motion.period_s
-    force = sum(
-        np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6.28, 3))
-        for f in rng.uniform(0.1, 0.7, 5)
-    )
-    touching = np.clip(3 * np.sin(2 * np.pi * 0.08 * time + rng.uniform(0, 6.28)), 0, 1)
-    force = force * (touching * rng.uniform(5, 7) / np.abs(force).max())[:, None]
-    twist = 0.1 * touching * np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
+    waves = np.zeros((len(motion), 3))
+    for f in rng.uniform(0.1, 0.7, 5):
+        waves += np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6.28, 3))
+    touching: FloatArray = np.clip(3 * np.sin(2 * np.pi * 0.08 * time + rng.uniform(0, 6.28)), 0, 1)
+    return waves, touching
+
+
+def _torsion(rng: np.random.Generator, motion: Motion) -> FloatArray:
+    time = np.arange(len(motion)) * motion.period_s
+    wave: FloatArray = np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
+    return wave
+
+
+def _of_tip(motion: Motion, force: FloatArray, twist: FloatArray) -> FloatArray:
+    """Return the spatial wrench of a force at the tip and a torsion about the shaft."""
+    axis, tip = _shaft(motion)
+    return np.hstack([force, np.cross(tip, force) + twist[:, None] * axis])
+
+
+def _shaft(motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Return the shaft's axis and the tip, shape (n, 3) each."""
     tips = np.array([tip_pose(PSM, q[:6])[:3, [2, 3]] for q in motion.position])
-    axis, tip = tips[:, :, 0], tips[:, :, 1]
-    moment = np.cross(tip, force) + twist[:, None] * axis
-    return np.hstack([force, moment])
+    return tips[:, :, 0], tips[:, :, 1]
 
 
 def simulate(

@@ -10,8 +10,10 @@ from rig.cli.study import study_app
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
-from rig.simulation.arm import contact, contact_motion, dahl
-from rig.studies.pique_wrench import ati
+from estimation.arm.tables import PSM
+from estimation.arm.wrench import body_jacobians, spatial_jacobians
+from rig.simulation.arm import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
+from rig.studies.pique_wrench import BODY, TWISTED, ati, in_tip_frame
 
 
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
@@ -22,14 +24,15 @@ def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
     assert "figures/wrench-3-3.svg" in out.read_text()
     found = json.loads(ran.stdout)
     assert found["seeds"] == [0, 1]
-    assert len(found["cells"]) == 9
+    assert len(found["cells"]) == 12
     assert all(len(cell["nrmsd_percent"]) == 2 for cell in found["cells"])
     thesis, ours = (
         np.mean([c["nrmsd_percent"] for c in found["cells"] if ("thesis" in c["method"]) is own])
         for own in (True, False)
     )
     assert ours < thesis
-    assert set(found["fair"]) == {cell["table"] for cell in found["cells"]}
+    assert set(found["fair"]) == {cell["table"] for cell in found["cells"]} - {BODY}
+    assert f"Table {BODY}" in out.read_text()
     assert "| thesis | 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in out.read_text()
 
 
@@ -39,6 +42,31 @@ def test_dahl_friction_turns_over_its_displacement_and_stays_within_one():
     assert np.isclose(friction[1000], 1.0, atol=1e-3)
     assert np.isclose(friction[1050], 1 - 2 * (1 - np.exp(-1)), atol=0.02)
     assert np.abs(friction).max() <= 1
+
+
+def test_a_pin_passes_on_forces_and_no_more_torsion_than_the_grip_holds():
+    rng = np.random.default_rng(3)
+    motion = contact_motion(rng, 20.0)
+    wrench = pin(rng, motion, *TWISTED)
+    assert np.abs(wrench[:, :3]).max(axis=0) == pytest.approx(TWISTED[0], rel=0.3)
+    felt = passed_on(motion, wrench)
+    assert np.array_equal(felt[:, :3], wrench[:, :3])
+    torsion = np.abs(in_tip_frame(felt, motion.position)[:, 5])
+    assert torsion.max() == pytest.approx(GRIP_N_M, rel=1e-6)
+    gentle = pin(rng, motion, TWISTED[0], 0.9 * GRIP_N_M)
+    assert np.allclose(passed_on(motion, gentle), gentle)
+
+
+def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
+    rng = np.random.default_rng(3)
+    motion = contact_motion(rng, 1.0)
+    wrench = rng.normal(size=(len(motion), 6))
+    there = in_tip_frame(wrench, motion.position)
+    at_base, at_tip = (
+        np.einsum("nij,ni->nj", jacobians(PSM, motion.position), each)
+        for jacobians, each in ((spatial_jacobians, wrench), (body_jacobians, there))
+    )
+    assert np.allclose(at_base, at_tip)
 
 
 def test_contact_stays_within_seven_newton_and_the_sensor_close_to_it():
