@@ -64,6 +64,9 @@ ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
 SLOW_TURN = 0.5
 """Share of the usual speed above which a smooth sign of the speed is no sign."""
 
+Spans = Mapping[tuple[str, str], float]
+"""Role and channel to how far runs go there."""
+
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
 
@@ -118,7 +121,7 @@ class Candidate:
             for p, value in zip(self.effect.shape, self.shape, strict=True)
         )
 
-    def shows(self, spans: Mapping[str, float]) -> bool:
+    def shows(self, spans: Spans) -> bool:
         """Say whether runs show it as what it is, and not as something simpler.
 
         A wave of which no run covers a period is a slow change with the angle; a direction that
@@ -126,18 +129,19 @@ class Candidate:
         a campaign lasts is a line, or a step.
 
         Args:
-            spans: Channel to the widest range that a run covers, and speeds to the usual fast one.
+            spans: Role and channel to the widest range that a run covers; of a speed the usual fast
+                one.
         """
         shape = {p.name: x for p, x in zip(self.effect.shape, self.shape, strict=True)}
-        channels = dict(self.channels)
+        span = {role: spans[role, channel] for role, channel in self.channels}
         if "order" in shape:
-            angle = next(channels[role] for role in ANGLE_ROLES if role in channels)
-            return shape["order"] * spans[angle] >= 2 * math.pi
-        slow = "width" in shape and "speed" in channels
-        if slow and shape["width"] > SLOW_TURN * spans[channels["speed"]]:
+            angle = next(role for role in ANGLE_ROLES if role in span)
+            return shape["order"] * span[angle] >= 2 * math.pi
+        if "width" in shape and "speed" in span and shape["width"] > SLOW_TURN * span["speed"]:
             return False
-        clock = channels.get("campaign_clock")
-        return clock is None or "time" not in shape or shape["time"] <= spans[clock]
+        if "campaign_clock" not in span or "time" not in shape:
+            return True
+        return shape["time"] <= span["campaign_clock"]
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""

@@ -64,6 +64,17 @@ class Told:
     place: int
     share: float
 
+    def is_surer_than(self, other: "Told") -> bool:
+        """Say whether it names, better than a finding of another balance, what both show."""
+        mine, others = self.finding, other.finding
+        if same_fault(others, mine) or self.share < 0.5 * other.share:
+            return False
+        if (mine.verdict == "identified") != (others.verdict == "identified"):
+            return mine.verdict == "identified"
+        if mine.verdict == "identified":
+            return self.share > other.share
+        return (mine.confidence or 0.0) > (others.confidence or 0.0)
+
     def is_cause_of(self, other: "Told") -> bool:
         """Say whether a finding of another balance is told by this one already."""
         if same_fault(self.finding, other.finding):
@@ -161,7 +172,7 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
     # a named fault of a sensor speaks for what other balances only show
     found.sort(
         key=lambda told: (
-            not told.finding.family.startswith("sensor."),
+            told.share < ECHO or not told.finding.family.startswith("sensor."),
             told.finding.rmse_after / max(told.finding.rmse_before, 1e-300),
         )
     )
@@ -170,8 +181,9 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
         for k, first in enumerate(kept):
             shown = (first.finding.balance, *first.finding.also_in)
             if told.finding.balance not in shown and first.is_cause_of(told):
-                also = (*first.finding.also_in, told.finding.balance)
-                kept[k] = replace(first, finding=replace(first.finding, also_in=also))
+                lead = told if told.is_surer_than(first) else first
+                also = tuple(b for b in (*shown, told.finding.balance) if b != lead.finding.balance)
+                kept[k] = replace(lead, finding=replace(lead.finding, also_in=also))
                 break
         else:
             kept.append(told)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.bent import bent_losses
+from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.evidence import Losses, leave_one_run_out, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map, variables_of, within
 from estimation.diagnosis.search import Search, Trial
@@ -55,7 +56,10 @@ def searched(search: Search) -> Discovery:
     """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
     found, trials, steps, ranking = search.forwards()
     kept = search.backwards(found)
-    named = [_named(search, [found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
+    stay = [found[j] for j in kept]
+    for k in range(len(stay)):
+        stay[k] = _swapped(search, stay, k)
+    named = [_named(search, stay, k, trials[j]) for k, j in enumerate(kept)]
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
     left = best_map(search.balance, terms, search.gates.draws, search.seed)
@@ -67,21 +71,22 @@ def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> 
     others = [f for j, f in enumerate(found) if j != k]
     mine = search.beside(found, range(len(found)), k)
     own, gain = mine.joint[:, 0, 0], float(mine.gain[0, 0])
-    rivals: dict[str, FloatArray] = {}
-    for rival in search.ranked(others, 0):
-        if rival.family == found[k].family or len(rivals) == 8:
-            continue
-        if rival.gain >= 0.8 * search.gates.rival * gain:
-            best = _polished(search, others, rival.candidates[0])
-            if not best.is_limit:
-                rivals[rival.family] = _losses_beside(search, others, best)
     total = mine.base[:, 0]
-    near = {
-        family: losses
-        for family, losses in rivals.items()
-        if 1 - losses.sum() / total.sum() >= search.gates.rival * gain
-        and runs_agree(losses, own) > search.gates.agree
-    }
+    offered = _rivals(search, others, found[k], gain)
+    rivals = {r.family: _losses_beside(search, others, r) for r in offered}
+    bent = _bent(search, others, [found[k], *offered])
+    near: dict[str, FloatArray] = {}
+    for rival, loosely in zip(offered, bent[1:], strict=True):
+        losses, against = rivals[rival.family], own
+        clearly = 1.0
+        if not _alike(rival, found[k]):
+            losses, against, clearly = loosely, bent[0], search.gates.clearly
+        enough = 1 - losses.sum() / total.sum() >= search.gates.rival * gain
+        proved = runs_agree(total, losses) <= search.gates.agree
+        beaten = against.sum() < clearly * losses.sum()
+        beaten &= runs_agree(losses, against) <= search.gates.agree
+        if enough and proved and not beaten:
+            near[rival.family] = rivals[rival.family]
     terms = [*search.balance.terms, *others]
     flat = best_map(search.balance, terms, 0, search.seed)
     better = (
@@ -98,6 +103,55 @@ def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> 
         _wins(own, list(rivals.values()), search.seed) * (1 - trial.p) * (1 - trial.agree),
         flat if better else None,
     )
+
+
+def _rivals(
+    search: Search, others: Sequence[Candidate], named: Candidate, gain: float
+) -> list[Candidate]:
+    """Return the other families that could do it, each at its own best shape, best first."""
+    found: list[Candidate] = []
+    for rival in search.ranked(others, 0):
+        if rival.family == named.family or len(found) == 8:
+            continue
+        if rival.gain >= 0.8 * search.gates.rival * gain:
+            best = _polished(search, others, rival.candidates[0])
+            if not best.is_limit:
+                found.append(best)
+    return found
+
+
+def _swapped(search: Search, found: Sequence[Candidate], k: int) -> Candidate:
+    """Return an effect, or the one of other variables that does clearly better in any form."""
+    others = [f for j, f in enumerate(found) if j != k]
+    mine = search.beside(found, range(len(found)), k)
+    offered = [
+        r
+        for r in _rivals(search, others, found[k], float(mine.gain[0, 0]))
+        if not _alike(r, found[k]) and not any(related(r, f) for f in others)
+    ]
+    if not offered:
+        return found[k]
+    own, *losses = _bent(search, others, [found[k], *offered])
+    best = min(range(len(offered)), key=lambda i: float(losses[i].sum()))
+    clearly = losses[best].sum() <= search.gates.veto * own.sum()
+    if clearly and runs_agree(own, losses[best]) <= search.gates.agree:
+        return offered[best]
+    return found[k]
+
+
+def _alike(first: Candidate, second: Candidate) -> bool:
+    """Say whether two effects depend on the same channels: only their form tells them apart."""
+    one, other = ({name for _, name in c.channels} for c in (first, second))
+    return one == other
+
+
+def _bent(
+    search: Search, others: Sequence[Candidate], offered: Sequence[Candidate]
+) -> list[FloatArray]:
+    """Return the losses of each run left out, shape (runs,), of effects that may bend."""
+    terms = [*search.balance.terms, *others]
+    left = search.balance.left(terms)
+    return [bent_losses(search.balance, terms, c, left).joint[:, 0, 0] for c in offered]
 
 
 def _polished(search: Search, others: Sequence[Candidate], rival: Candidate) -> Candidate:
