@@ -61,11 +61,17 @@ UNKNOWN = "unknown"
 ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
 """Roles that a wave's order counts the turns of."""
 
+LEAST_PERIODS = 1.2
+"""Periods of a wave that some run must cover, or it is no wave."""
+
 SLOW_TURN = 0.5
 """Share of the usual speed above which a smooth sign of the speed is no sign."""
 
 Spans = Mapping[tuple[str, str], float]
 """Role and channel to how far runs go there."""
+
+EARLY_KNEE = 0.25
+"""Share of the usual speed below which damping that wears off with the speed is a direction."""
 
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
@@ -124,9 +130,10 @@ class Candidate:
     def shows(self, spans: Spans) -> bool:
         """Say whether runs show it as what it is, and not as something simpler.
 
-        A wave of which no run covers a period is a slow change with the angle; a direction that
-        takes half of the usual speed to turn round goes with the speed; what fades more slowly than
-        a campaign lasts is a line, or a step.
+        A wave of which no run covers much more than a period is a slow change with the angle; a
+        direction that takes half of the usual speed to turn round goes with the speed, and damping
+        that is worn off long before it with the direction; what fades more slowly than a campaign
+        lasts is a line, or a step.
 
         Args:
             spans: Role and channel to the widest range that a run covers; of a speed the usual fast
@@ -136,8 +143,10 @@ class Candidate:
         span = {role: spans[role, channel] for role, channel in self.channels}
         if "order" in shape:
             angle = next(role for role in ANGLE_ROLES if role in span)
-            return shape["order"] * span[angle] >= 2 * math.pi
+            return shape["order"] * span[angle] >= LEAST_PERIODS * 2 * math.pi
         if "width" in shape and "speed" in span and shape["width"] > SLOW_TURN * span["speed"]:
+            return False
+        if "knee" in shape and "speed" in span and shape["knee"] < EARLY_KNEE * span["speed"]:
             return False
         if "campaign_clock" not in span or "time" not in shape:
             return True

@@ -67,7 +67,8 @@ class Told:
     def is_surer_than(self, other: "Told") -> bool:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
-        if same_fault(others, mine) or self.share < 0.5 * other.share:
+        told = others.family.startswith("sensor.") and _same_sensor(others, mine)
+        if told or self.share < 0.5 * other.share:
             return False
         if (mine.verdict == "identified") != (others.verdict == "identified"):
             return mine.verdict == "identified"
@@ -197,17 +198,19 @@ def same_fault(first: Finding, second: Finding) -> bool:
     """
     if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
         return False
-    if first.family.startswith("sensor.") and second.family in (
-        first.family,
-        UNKNOWN,
-        *LIKE.get(first.family, ()),
-    ):
+    if _same_sensor(first, second):
         return True
     rates = sorted(r for r in map(_periods_per_turn, (first, second)) if r is not None)
     if len(rates) < 2:
         return False
     times = rates[1] / rates[0]
     return round(times) <= HARMONICS and abs(times / round(times) - 1) < SAME_RATE
+
+
+def _same_sensor(first: Finding, second: Finding) -> bool:
+    """Say whether a second balance shows, by name or unnamed, the sensor's fault of the first."""
+    alike = (first.family, UNKNOWN, *LIKE.get(first.family, ()))
+    return first.family.startswith("sensor.") and second.family in alike
 
 
 def _periods_per_turn(finding: Finding) -> float | None:

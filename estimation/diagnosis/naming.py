@@ -115,7 +115,7 @@ def _rivals(
             continue
         if rival.gain >= 0.8 * search.gates.rival * gain:
             best = _polished(search, others, rival.candidates[0])
-            if not best.is_limit:
+            if search.shows(best):
                 found.append(best)
     return found
 

@@ -126,10 +126,10 @@ class Search:
             terms = self.balance.refined([*self.balance.terms, *found])
             self.balance = replace(self.balance, terms=terms[: -len(found)])
             moved = zip(found, terms[-len(found) :], strict=True)
-            found = [new if self._shows(new) else old for old, new in moved]
+            found = [new if self.shows(new) else old for old, new in moved]
         return found, trials, steps, ranking
 
-    def _shows(self, candidate: Candidate) -> bool:
+    def shows(self, candidate: Candidate) -> bool:
         """Say whether a refined effect still is what its name says."""
         spans = spans_of([candidate], self.balance.runs)
         return candidate.shows(spans) and not candidate.is_limit

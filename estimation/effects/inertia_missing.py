@@ -18,7 +18,6 @@ class Inertia(Proportional):
         "motor": -1,
         "gearbox": -1,
         "cable": 1,
-        "stretch": -1,
         "grasp": -1,
         "joint": 1,
     }

@@ -1,5 +1,7 @@
 """When two balances show one fault."""
 
+from dataclasses import replace
+
 import pytest
 
 from estimation.diagnosis.findings import Told, echoes, findings_of, same_fault
@@ -68,3 +70,20 @@ def test_findings_come_in_the_order_found_however_much_each_explains():
     ]
     listed = findings_of(told, ["motor", "gearbox"])
     assert [f.family for f in listed] == ["friction.drag", "ripple.motor", "sensor.creep"]
+
+
+@pytest.mark.parametrize(
+    ("family", "share", "verdict", "surer"),
+    [
+        ("gravity.payload", 0.9, "identified", True),
+        ("gravity.payload", 0.9, "one_of", False),
+        ("gravity.payload", 0.3, "identified", False),
+        ("sensor.encoder_inl", 0.9, "identified", False),  # what the other names already
+    ],
+)
+def test_what_two_balances_show_is_told_by_the_one_that_names_it_better(
+    family, share, verdict, surer
+):
+    wave = Told(finding("stretch", "sensor.encoder_inl"), {}, None, 0, 0.8)
+    other = Told(replace(finding("cable", family), verdict=verdict), {}, None, 0, share)
+    assert other.is_surer_than(wave) is surer
