@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.diagnosis.bent import bent_losses
-from estimation.diagnosis.candidate import Candidate, related
-from estimation.diagnosis.evidence import Losses, leave_one_run_out, resampled, runs_agree
+from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.evidence import Losses, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map, variables_of, within
+from estimation.diagnosis.rivals import beaten, better, rivals_of, tried
 from estimation.diagnosis.search import Search, Trial
 from estimation.recording import FloatArray
 
@@ -58,7 +58,8 @@ def searched(search: Search) -> Discovery:
     kept = search.backwards(found)
     stay = [found[j] for j in kept]
     for k in range(len(stay)):
-        stay[k] = _swapped(search, stay, k)
+        others = [f for j, f in enumerate(stay) if j != k]
+        stay[k] = _better(search, stay[k], others) or stay[k]
     named = [_named(search, stay, k, trials[j]) for k, j in enumerate(kept)]
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
@@ -66,30 +67,31 @@ def searched(search: Search) -> Discovery:
     return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
 
 
+def _better(search: Search, named: Candidate, others: Sequence[Candidate]) -> Candidate | None:
+    mine = search.beside([named, *others], range(1 + len(others)), 0)
+    rivals = rivals_of(search, others, named, float(mine.gain[0, 0]))
+    return better(search, tried(search, others, named), rivals, others)
+
+
 def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> Named:
     """Ask what else an effect could be, how sure its name is, and whether a map does better."""
     others = [f for j, f in enumerate(found) if j != k]
     mine = search.beside(found, range(len(found)), k)
-    own, gain = mine.joint[:, 0, 0], float(mine.gain[0, 0])
-    total = mine.base[:, 0]
-    offered = _rivals(search, others, found[k], gain)
-    rivals = {r.family: _losses_beside(search, others, r) for r in offered}
-    bent = _bent(search, others, [found[k], *offered])
-    near: dict[str, FloatArray] = {}
-    for rival, loosely in zip(offered, bent[1:], strict=True):
-        losses, against = rivals[rival.family], own
-        clearly = 1.0
-        if not _alike(rival, found[k]):
-            losses, against, clearly = loosely, bent[0], search.gates.clearly
-        enough = 1 - losses.sum() / total.sum() >= search.gates.rival * gain
-        proved = runs_agree(total, losses) <= search.gates.agree
-        beaten = against.sum() < clearly * losses.sum()
-        beaten &= runs_agree(losses, against) <= search.gates.agree
-        if enough and proved and not beaten:
-            near[rival.family] = rivals[rival.family]
+    total, gain = mine.base[:, 0], float(mine.gain[0, 0])
+    own = tried(search, others, found[k])
+    rivals = rivals_of(search, others, found[k], gain)
+    near = [
+        r
+        for r in rivals
+        if 1 - r.losses.sum() / total.sum() >= search.gates.rival * gain
+        and runs_agree(total, r.losses) <= search.gates.agree
+        and not beaten(search, own, r)
+    ]
+    near.sort(key=lambda r: float(r.losses.sum()))
+    wins = _wins(own.losses, [r.losses for r in rivals], search.seed)
     terms = [*search.balance.terms, *others]
     flat = best_map(search.balance, terms, 0, search.seed)
-    better = (
+    withdrawn = (
         flat is not None
         and flat.variables != found[k].effect.any_function_of
         and _vetoes(search, flat, mine)
@@ -99,77 +101,10 @@ def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> 
         found[k],
         trial,
         gain,
-        tuple(sorted(near, key=lambda f: float(near[f].sum()))),
-        _wins(own, list(rivals.values()), search.seed) * (1 - trial.p) * (1 - trial.agree),
-        flat if better else None,
+        tuple(r.candidate.family for r in near),
+        wins * (1 - trial.p) * (1 - trial.agree),
+        flat if withdrawn else None,
     )
-
-
-def _rivals(
-    search: Search, others: Sequence[Candidate], named: Candidate, gain: float
-) -> list[Candidate]:
-    """Return the other families that could do it, each at its own best shape, best first."""
-    found: list[Candidate] = []
-    for rival in search.ranked(others, 0):
-        if rival.family == named.family or len(found) == 8:
-            continue
-        if rival.gain >= 0.8 * search.gates.rival * gain:
-            best = _polished(search, others, rival.candidates[0])
-            if search.shows(best):
-                found.append(best)
-    return found
-
-
-def _swapped(search: Search, found: Sequence[Candidate], k: int) -> Candidate:
-    """Return an effect, or the one of other variables that does clearly better in any form."""
-    others = [f for j, f in enumerate(found) if j != k]
-    mine = search.beside(found, range(len(found)), k)
-    offered = [
-        r
-        for r in _rivals(search, others, found[k], float(mine.gain[0, 0]))
-        if not _alike(r, found[k]) and not any(related(r, f) for f in others)
-    ]
-    if not offered:
-        return found[k]
-    own, *losses = _bent(search, others, [found[k], *offered])
-    best = min(range(len(offered)), key=lambda i: float(losses[i].sum()))
-    clearly = losses[best].sum() <= search.gates.veto * own.sum()
-    if clearly and runs_agree(own, losses[best]) <= search.gates.agree:
-        return offered[best]
-    return found[k]
-
-
-def _alike(first: Candidate, second: Candidate) -> bool:
-    """Say whether two effects depend on the same channels: only their form tells them apart."""
-    one, other = ({name for _, name in c.channels} for c in (first, second))
-    return one == other
-
-
-def _bent(
-    search: Search, others: Sequence[Candidate], offered: Sequence[Candidate]
-) -> list[FloatArray]:
-    """Return the losses of each run left out, shape (runs,), of effects that may bend."""
-    terms = [*search.balance.terms, *others]
-    left = search.balance.left(terms)
-    return [bent_losses(search.balance, terms, c, left).joint[:, 0, 0] for c in offered]
-
-
-def _polished(search: Search, others: Sequence[Candidate], rival: Candidate) -> Candidate:
-    """Return a rival at its own best shape."""
-    if not rival.shape:
-        return rival
-    return search.balance.refined([*search.balance.terms, *others, rival], passes=1)[-1]
-
-
-def _losses_beside(search: Search, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
-    """Return the losses of each run left out with a rival in the winner's place."""
-    terms = [*search.balance.terms, *others]
-    block = search.balance.columns([rival])
-    aims = [r[:, None] for r in search.balance.left(terms)]
-    base = search.balance.base(terms)
-    joint = leave_one_run_out(base, block, [block[0].shape[1]], aims).joint
-    losses: FloatArray = joint[:, 0, 0]
-    return losses
 
 
 def _of_its_form(search: Search, named: Candidate, gain: float, flat: Map) -> bool:

@@ -69,6 +69,8 @@ class Effect(ABC):
             whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        same_as: Families that only that experiment tells from it: where both read the same
+            channels, each is named with the other beside it.
         other_below: Shape parameters at whose lower bound it turns into another effect.
         bends: Roles along which another form than the equation's may be the true one: names are
             compared with forms that bend there.
@@ -86,6 +88,7 @@ class Effect(ABC):
     projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    same_as: ClassVar[tuple[str, ...]] = ()
     at_rest: ClassVar[bool] = False
     other_below: ClassVar[tuple[str, ...]] = ()
     bends: ClassVar[tuple[str, ...]] = ()
