@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from estimation.campaign import Campaign, with_campaign_time
+from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import intervals, lay_out
 from estimation.diagnosis.candidate import pool
@@ -18,7 +19,7 @@ from estimation.diagnosis.findings import causes_of, echoes, findings_of, moved
 from estimation.diagnosis.formula import formulas
 from estimation.diagnosis.frozen import Frozen, errors, freeze, settled, squares
 from estimation.diagnosis.gates import Gates
-from estimation.diagnosis.instruments import instruments
+from estimation.diagnosis.instruments import instruments, stand_in
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.maps import needed_channels, projection
 from estimation.diagnosis.naming import searched
@@ -143,13 +144,16 @@ def _balance(
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
     tried = covered(tried, runs)
+    standing = stand_in(runs, fitted.target)
+    if MOTOR_LOAD not in wanted:  # live, the motor has to do with its own nominal load
+        runs, held = [standing(run) for run in runs], [standing(run) for run in held]
     balance = lay_out(fitted, runs, mapper)
     balance = replace(balance, terms=balance.refined(balance.terms))
     loaded = projection(balance)
     balance = replace(balance, runs=[loaded(run) for run in balance.runs])
     # names are found with regressors free of noise, what is reported and run reads the sensors
     told = instrumented(runs, tried, fitted.target)
-    seen = replace(balance, runs=[told(run) for run in balance.runs], tables_of={})
+    seen = replace(balance, runs=[told(standing(run)) for run in balance.runs], tables_of={})
     twin = None
     if maker is not None:
         source = maker(fitted, discover)

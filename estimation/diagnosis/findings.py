@@ -27,6 +27,10 @@ ECHO, LARGER = 0.3, 3.0
 """A claim that removes less than this share of its balance's squared error is not told from the
 echo of a cause in another balance that removes so many times its share there."""
 
+SHAKEN = ("inertia.missing", UNKNOWN)
+SHAKEN_ECHO, SHAKEN_LARGER = 0.4, 1.5
+"""The same for what any motion faster than usual shows: parts that move, and what has no name."""
+
 SAME_RATE = 0.03
 """Two waves are one when their periods a turn differ by less than this share."""
 
@@ -161,8 +165,10 @@ def echoes(causes: Sequence[Told]) -> dict[str, set[int]]:
     """
     small: dict[str, set[int]] = {}
     for told in causes:
+        shaken = told.finding.family in SHAKEN
+        most, times = (SHAKEN_ECHO, SHAKEN_LARGER) if shaken else (ECHO, LARGER)
         larger = (c for c in causes if c.finding.balance != told.finding.balance)
-        if told.share < ECHO and any(c.share > LARGER * told.share for c in larger):
+        if told.share < most and any(c.share > times * told.share for c in larger):
             small.setdefault(told.finding.balance, set()).add(told.place)
     return small
 

@@ -58,17 +58,31 @@ def projection(runs: Sequence[Run], pool: Sequence[Candidate], target: str) -> C
     wanted = {name for c in pool for role, name in c.channels if role in c.effect.projected_roles}
     found = {name: fitted(runs, name, target) for name in sorted(wanted)}
     fits = {projected(name): fit for name, fit in found.items() if fit}
-    nominal = next((n for n in NOMINAL if n in runs[0].channels), None)
-    load = fitted(runs, target, target, NOMINAL[nominal]) if nominal else None
-    level = _level(runs, load, target) if nominal and load else 0.0
 
     def added(run: Run) -> Run:
         new = {name: as_told(run, fit) for name, fit in fits.items()}
-        if nominal and load:
-            new[nominal] = as_told(run, load) + level
         return replace(run, channels={**run.channels, **new})
 
     return added
+
+
+def stand_in(runs: Sequence[Run], target: str) -> Callable[[Run], Run]:
+    """Return what puts the target, as its own force tells it on this rig, in a nominal one's place.
+
+    Args:
+        runs: Runs it is fitted on, with the channels of `instruments`.
+        target: The balance's target.
+    """
+    nominal = next((n for n in NOMINAL if n in runs[0].channels), None)
+    fit = fitted(runs, target, target, NOMINAL[nominal]) if nominal else None
+    if nominal is None or fit is None:
+        return lambda run: run
+    level = _level(runs, fit, target)
+
+    def put(run: Run) -> Run:
+        return replace(run, channels={**run.channels, nominal: as_told(run, fit) + level})
+
+    return put
 
 
 def _level(runs: Sequence[Run], load: Fit, target: str) -> float:

@@ -53,12 +53,19 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
     assert same_fault(gear, motor)
 
 
-@pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.4, {})])
+@pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.5, {})])
 def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(share, small):
     ripple = Told(finding("motor", "ripple.motor"), {}, None, 0, 0.9)
     inertia = Told(finding("gearbox", "inertia.missing"), {}, None, 0, share)
     told = [ripple, inertia]
     assert echoes(told) == small
+
+
+@pytest.mark.parametrize(("family", "small"), [("inertia.missing", True), ("friction.load", False)])
+def test_what_any_faster_motion_shows_is_sooner_taken_for_an_echo(family, small):
+    lag = Told(finding("motor", "sensor.lag"), {}, None, 0, 0.6)
+    other = Told(finding("gearbox", family), {}, None, 0, 0.35)
+    assert bool(echoes([lag, other])) is small
 
 
 def test_findings_come_in_the_order_found_however_much_each_explains():

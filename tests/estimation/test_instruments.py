@@ -14,7 +14,7 @@ from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import prepare, tables
 from estimation.diagnosis.endogeneity import kept_share
 from estimation.diagnosis.evidence import leave_one_run_out
-from estimation.diagnosis.instruments import instruments, projection
+from estimation.diagnosis.instruments import instruments, projection, stand_in
 from estimation.effects import effect
 from estimation.fitting import fit
 from estimation.model import Term
@@ -142,8 +142,8 @@ def test_the_motors_own_idea_of_its_load_is_fitted_to_the_rig_and_hears_no_other
         model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
         names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
         made = [prepare(r, names, model) for r in runs]
-        added = projection(made, [], model.target)
-        told[shift], spoilt[shift] = added(made[0]).channels[MOTOR_LOAD], made[0]
+        put = stand_in(made, model.target)
+        told[shift], spoilt[shift] = put(made[0]).channels[MOTOR_LOAD], made[0]
     used, true = spoilt[0.0].used, spoilt[0.0].channels["proximal_torque_n_m"]
     nominal = spoilt[0.0].channels[MOTOR_LOAD]
     assert told[0.0][used] == pytest.approx(told[0.05][used], abs=1e-9)
@@ -160,8 +160,8 @@ def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
     model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
     names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
     made = [prepare(r, names, model) for r in runs]
-    told = projection(made, [], model.target)
-    balance = lay_out(model, [told(r) for r in made])
+    put = stand_in(made, model.target)
+    balance = lay_out(model, [put(r) for r in made])
     friction = Candidate.of(Term(effect("friction.load"), -1, {}), [3.0])
     left = balance.left(balance.terms)
     columns = balance.columns([friction])
