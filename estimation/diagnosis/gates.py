@@ -26,6 +26,8 @@ class Gates:
             rig with nothing missing, three seeds, no twins).
         near: An effect that passes is taken before one that gains more and does not, when it has at
             least this share of that gain.
+        some: Least share of squared error removed by what does not help in run after run, for it to
+            be told as something missing.
         kept: Least share of what an effect adds that is left when it is fitted through instruments:
             less, and it is made of the noise of a regressor.
         leftover: Least share that an effect has in what all found in a balance remove together:
@@ -52,6 +54,7 @@ class Gates:
     sure: float = 0.9
     map_floor: float = 0.2
     near: float = 0.7
+    some: float = 0.1
     kept: float = 0.5
     leftover: float = 0.15
     in_motion: float = 0.05
