@@ -141,9 +141,16 @@ class Search:
         drift that stands for how a loop begins. Those that would pass and are made of a regressor's
         noise are left out.
         """
-        told = [t for t in ranked if not self._hangs_on_noise(t, found)]
-        near = (t for t in told if t.gain >= self.gates.near * told[0].gain)
-        return next((t for t in near if t.passes(self.gates)), told[0] if told else None)
+        best: Trial | None = None
+        for trial in ranked:
+            if best is not None and trial.gain < self.gates.near * best.gain:
+                break
+            if self._hangs_on_noise(trial, found):
+                continue
+            if trial.passes(self.gates):
+                return trial
+            best = best or trial
+        return best
 
     def _hangs_on_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
         if not trial.passes(self.gates):
