@@ -25,6 +25,7 @@ from estimation.diagnosis.maps import needed_channels, projection
 from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
+from estimation.diagnosis.shared_sensors import Fault, denied
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Claim, Story
 from estimation.diagnosis.twin import Bootstrap, Twin
@@ -87,6 +88,13 @@ def diagnose(
             failed[model.balance] = error
     if failed and not stories:
         raise next(iter(failed.values()))
+    for model in models:
+        if faults := denied(stories).get(model.balance):
+            on_stage(f"searching the {model.balance} balance without what other balances deny")
+            maker = (twins or {}).get(model.balance)
+            stories[model.balance] = _balance(
+                recordings, model, sealed, gates, executor, maker, faults
+            )
     discovering = [r for r in recordings if r.name in sealed.discover]
     on_stage("opening the confirm runs")
     on_open()
@@ -130,8 +138,12 @@ def _balance(
     gates: Gates,
     executor: Executor | None,
     maker: Maker | None,
+    without: Collection[Fault] = (),
 ) -> Story:
-    """Fit the declared model and search, on the runs that discover; prepare those that confirm."""
+    """Fit the declared model and search, on the runs that discover; prepare those that confirm.
+
+    Candidates for the faults in `without` are left out.
+    """
     discover = [r for r in recordings if r.name in sealed.discover]
     confirm = [r for r in recordings if r.name in sealed.confirm]
     measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
@@ -143,7 +155,11 @@ def _balance(
     mapper = map if executor is None else executor.map
     runs, rested = _usable(discover, wanted, model)
     held, also = _usable(confirm, wanted, model)
-    tried = covered(tried, runs)
+    tried = [
+        c
+        for c in covered(tried, runs)
+        if not any((c.family, channel) in without for _, channel in c.channels)
+    ]
     standing = stand_in(runs, fitted.target)
     if MOTOR_LOAD not in wanted:  # live, the motor has to do with its own nominal load
         runs, held = [standing(run) for run in runs], [standing(run) for run in held]

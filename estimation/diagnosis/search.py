@@ -229,21 +229,27 @@ class Search:
     def _signs_hold(self, terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
         """Say whether amplitudes within their bounds do nearly as well as any amplitudes.
 
-        Also those of the declared effects: what needs a negative friction beside it is refused.
+        What may have either sign must do half as well as with any amplitudes of the declared
+        effects: no negative friction may have to stand beside it.
         """
         own = [p for c in added for p in c.effect.amplitudes]
         together = [*terms, *added]
+        before, after = self.balance.loss(terms), self.balance.loss(together)
+        free = self._free_loss(together)
         if all(p.lower < 0 < p.upper for p in own):
             weights = self.balance.solve(together)[-len(own) :]
-            if not all(
+            inside = all(
                 0.999 * p.lower < w < 0.999 * p.upper for p, w in zip(own, weights, strict=True)
-            ):
-                return False
-        before, after = self.balance.loss(terms), self.balance.loss(together)
-        columns = np.vstack(self.balance.columns(together))
+            )
+            return inside and before - after >= 0.5 * (self._free_loss(terms) - free)
+        return before - after >= 0.8 * max(before - free, 0.0) and after < before
+
+    def _free_loss(self, terms: Sequence[Candidate]) -> float:
+        """Return the squared error with amplitudes of any sign and size."""
+        columns = np.vstack(self.balance.columns(terms))
         aim = np.concatenate(self.balance.target)
-        free = aim - columns @ np.linalg.lstsq(columns, aim, rcond=1e-10)[0]
-        return before - after >= 0.8 * max(before - float(free @ free), 0.0) and after < before
+        left = aim - columns @ np.linalg.lstsq(columns, aim, rcond=1e-10)[0]
+        return float(left @ left)
 
     def _pair(self, ranked: Sequence[Trial]) -> Trial | None:
         """Return the best pair of effects that mask one another, if it passes every gate."""
