@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 config_app = typer.Typer(
     name="config",
@@ -31,7 +31,7 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
 
     settings = load_config(path)
     found = problems(settings)
-    screen = console()
+    screen = results(json)
     for problem in found:
         screen.print(f"{problem.key}: {problem.what}\n  fix: {problem.fix}", markup=False)
     if not found:
@@ -66,4 +66,4 @@ def list_(json: JsonFlag = False) -> None:
         emit_json({"folder": SHIPPED, "configs": found})
         return
     for name, rig in found.items():
-        console().print(f"{name:12} {rig}", markup=False)
+        results(json).print(f"{name:12} {rig}", markup=False)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import console
+from rig.cli.output import results
 
 
 def export(
@@ -29,4 +29,4 @@ def export(
             "Fit one: rig fit PATH --model states --out FILE.npz.",
         )
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
-    console().print(f"Header: {out}", markup=False)
+    results(json=False).print(f"Header: {out}", markup=False)

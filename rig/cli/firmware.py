@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
@@ -30,7 +30,7 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     settings = load_config(config)
     versions = compare(settings)
-    screen = console()
+    screen = results(json)
     screen.print(f"program   {versions.program}", markup=False)
     screen.print(f"sources   {versions.sources}", markup=False)
     screen.print(f"board     {versions.board}", markup=False)
@@ -48,7 +48,7 @@ def build(board: BoardOption = "") -> None:
     from rig.firmware import build_for
 
     where = build_for(board) if board else make()
-    console().print(f"Built {where}.", markup=False)
+    results(json=False).print(f"Built {where}.", markup=False)
 
 
 @firmware_app.command()
@@ -57,4 +57,4 @@ def flash(board: BoardOption = "teensy41") -> None:
     from rig.firmware import flash as write
 
     write(board)
-    console().print("Flashed. Next: rig firmware version", markup=False)
+    results(json=False).print("Flashed. Next: rig firmware version", markup=False)

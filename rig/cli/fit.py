@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -39,7 +39,7 @@ def fit_states(
     kept = campaign.evidence
     estimator = recipe.fit(campaign)
     error = held_out_score(recipe, kept, min(folds, len(kept)), seed) if len(kept) > 1 else None
-    screen = console()
+    screen = results(json_)
     if error is not None:
         screen.print(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
@@ -62,7 +62,7 @@ def fit_network(
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
     estimator = recipe.fit(campaign)
-    screen = console()
+    screen = results(json_)
     screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
     if out is not None:
         estimator.save(out)
@@ -109,7 +109,7 @@ def fit(
     from rig.reports.first_look import parameter_table
     from rig.reports.table import to_rich
 
-    screen = console()
+    screen = results(json_)
     campaign = open_campaign(path, format_)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 
 grasper_app = typer.Typer(
     name="grasper",
@@ -37,7 +37,7 @@ def designs(json: JsonFlag = False) -> None:
         for design in found
     ]
     columns = ["gears", "sun/carrier", "driven", "d2/d1", "area", "extra stages", "remark"]
-    console().print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
+    results(json).print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
     if json:
         emit_json({"designs": found, "most_compact": best})
 
@@ -63,7 +63,7 @@ def record(
         for recording in wrist_campaign(Wrist(pulley_ratio), seed, runs):
             logs.append(write_recording(out / f"{recording.name}.mcap", recording))
             bar.update(task, advance=1, description=recording.name)
-    console().print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
+    results(json).print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
     if json:
         emit_json({"folder": out, "logs": logs})
 
@@ -96,7 +96,7 @@ def follow(
 
     settings = load_config(config or Path("grasper"))
     refuse_problems(settings)
-    screen = console()
+    screen = results(json)
     with progress() as bar:
         task = bar.add_task("following", total=duration)
 
@@ -106,7 +106,7 @@ def follow(
         try:
             axes = follow_master(settings, master, chief_of(), duration, scale, show)
         except KeyboardInterrupt:
-            screen.print("Stopped; the grasper is safe.")
+            remarks().print("Stopped; the grasper is safe.")
             raise
     for moved in axes:
         screen.print(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 
 def grip(
@@ -41,7 +41,7 @@ def grip(
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
     estimator = ModelEstimator(path, SAMPLE_RATE_HZ)
-    screen = console()
+    screen = results(json)
     held = []
     with Session(settings, open_logger(settings)) as session:
         for period in hold_grip(session, estimator, torque, duration):

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console
+from rig.cli.output import JsonFlag, results
 
 
 def live(
@@ -95,7 +95,7 @@ def live(
             half_width=estimator.half_width if estimator else None,
             footer=HELP if keys else "Ctrl-C leaves",
         )
-        show(until(blocks, duration), options, console())
+        show(until(blocks, duration), options, results(json_))
     return 0
 
 
@@ -110,5 +110,5 @@ def _show_grasper(duration: float | None, pace: float, plain: bool, json: bool) 
     options = ShowOptions(
         title="rig live: simulated 3-DOF grasper", channels=CHANNELS, plain=plain, json=json
     )
-    show(until(blocks, duration), options, console())
+    show(until(blocks, duration), options, results(json))
     return 0

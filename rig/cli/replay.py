@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console
+from rig.cli.output import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -64,7 +64,7 @@ def replay(
     blocks = replay_blocks(recording, estimator, speed or None)
     if isinstance(estimator, ModelEstimator) and estimator.model is not None:
         blocks = watched(blocks, estimator.model)
-    summary = show(blocks, options, console())
+    summary = show(blocks, options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
 
@@ -89,7 +89,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
     """Say which run is shown, if there are more, and what speaks against it."""
-    people = console()
+    people = remarks()
     if len(campaign) > 1 and not chosen:
         place = campaign.names.index(recording.name) + 1
         people.print(

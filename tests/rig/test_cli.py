@@ -35,6 +35,23 @@ def test_exit_codes(error, code):
     assert exit_code_of(error) == code
 
 
+RESULTS = ["devices", "cal list", "config check", "config list", "config show", "grasper designs"]
+
+
+@pytest.mark.parametrize("words", RESULTS)
+def test_results_go_where_a_pipe_finds_them(words, capsys):
+    assert main(words.split()) == 0
+    out, err = capsys.readouterr()
+    assert out.strip()
+    assert err == ""
+
+
+@pytest.mark.parametrize("words", RESULTS)
+def test_with_json_stdout_carries_nothing_else(words, capsys):
+    assert main([*words.split(), "--json"]) == 0
+    assert isinstance(json.loads(capsys.readouterr().out), dict)
+
+
 def test_json_has_no_nan_and_no_numpy():
     import numpy as np
 

@@ -28,7 +28,7 @@ def test_a_torque_beyond_the_limits_is_refused(torque, capsys):
 
 def test_a_torque_the_load_cannot_give_is_said(capsys):
     assert main(["grip", "--torque", "0.3", "--duration", "12"]) == 1
-    assert "not reached" in capsys.readouterr().err
+    assert "not reached" in capsys.readouterr().out
 
 
 class Constant:
