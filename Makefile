@@ -65,7 +65,7 @@ firmware:
 	@if command -v $(CXX) >/dev/null 2>&1; then $(MAKE) --no-print-directory -C firmware CXX=$(CXX); \
 	else echo "no C++ compiler ($(CXX)): left out the firmware in the loop" >&2; fi
 
-# the core on an emulated Cortex-M4, held to the contract every driver keeps; optional, and in real time
+# the core on an emulated Cortex-M4, held to the contract every driver keeps; optional
 ARM_CXX ?= arm-none-eabi-g++
 firmware-arm: $(VENV)/.developing
 	@for tool in $(ARM_CXX) qemu-system-arm; do command -v $$tool >/dev/null 2>&1 || { \
