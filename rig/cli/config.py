@@ -36,7 +36,7 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
         screen.print(f"{problem.key}: {problem.what}\n  fix: {problem.fix}", markup=False)
     if not found:
         screen.print(
-            f"{settings.name} is sound: the logger and {len(settings.devices)} further devices."
+            f"{settings.name} is sound. The logger and further devices: {len(settings.devices)}."
         )
     if json:
         emit_json({"name": settings.name, "sound": not found, "problems": found})
