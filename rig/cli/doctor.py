@@ -67,11 +67,14 @@ def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
         screen.print(f"driver      {name:12}{text}", markup=False)
 
 
-def udev() -> None:
+def udev(json: JsonFlag = False) -> None:
     """Print the udev rules that give you the rig's devices; the first lines say how to install."""
     from rig.doctor.udev import udev_rules
 
-    typer.echo(udev_rules(), nl=False)
+    if json:
+        emit_json({"rules": udev_rules()})
+    else:
+        typer.echo(udev_rules(), nl=False)
 
 
 def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:

@@ -42,19 +42,23 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
 
 @firmware_app.command()
-def build(board: BoardOption = "") -> None:
+def build(board: BoardOption = "", json: JsonFlag = False) -> None:
     """Build the firmware: for the simulated rig, or with --board for a Teensy."""
     from rig.firmware import build as make
     from rig.firmware import build_for
 
     where = build_for(board) if board else make()
-    results(json=False).print(f"Built {where}.", markup=False)
+    results(json).print(f"Built {where}.", markup=False)
+    if json:
+        emit_json({"built": where})
 
 
 @firmware_app.command()
-def flash(board: BoardOption = "teensy41") -> None:
+def flash(board: BoardOption = "teensy41", json: JsonFlag = False) -> None:
     """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
     from rig.firmware import flash as write
 
     write(board)
-    results(json=False).print("Flashed. Next: rig firmware version", markup=False)
+    results(json).print("Flashed. Next: rig firmware version", markup=False)
+    if json:
+        emit_json({"flashed": board})

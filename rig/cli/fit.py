@@ -1,7 +1,7 @@
 """`rig fit`: fit a declared model on a campaign."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,6 +9,8 @@ from rig.cli.output import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
+    from estimation.cross_validation import HeldOutError
+    from estimation.model import Model
 
 
 STATE_NODES, THINNED = 12, 24
@@ -101,11 +103,15 @@ def fit(
     ] = None,
     json_: JsonFlag = False,
 ) -> None:
-    """Fit a declared model on all runs and report its error on runs it was not fitted on."""
+    """Fit a declared model on all runs and report its error on runs it was not fitted on.
+
+    `--model grasper` fits the force at each axis of a 3-DOF grasper, in one file.
+    """
     from estimation import model_file
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
     from rig.importers.registry import open_campaign
+    from rig.live.estimator import models_in_use
     from rig.reports.first_look import parameter_table
     from rig.reports.table import to_rich
 
@@ -117,32 +123,51 @@ def fit(
     if model == "network":
         fit_network(campaign, target, surrogate, seed, out, json_)
         return
-    declared = model_file.read(Path(model))
-    fitted = fit_model(declared, campaign, seed=seed)
-    error = held_out_error(declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed)
-    screen.print(to_rich(parameter_table(fitted)))
-    screen.print(
-        f"{fitted.target} on {error.runs} runs not fitted on: rmse {error.rmse:.4g} {fitted.unit},"
-        f" {error.rmse_with_means:.4g} with each run's mean left in."
-    )
+    fitted = []
+    told = []
+    for declared in models_in_use(Path(model)):
+        done = fit_model(declared, campaign, seed=seed)
+        error = held_out_error(
+            declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed
+        )
+        fitted.append(_dated(done))
+        told.append(_told(fitted[-1], error, out))
+        screen.print(to_rich(parameter_table(done)))
+        screen.print(
+            f"{done.target} on {error.runs} runs not fitted on: rmse {error.rmse:.4g} {done.unit},"
+            f" {error.rmse_with_means:.4g} with each run's mean left in."
+        )
     if out is not None:
-        model_file.write(fitted, out)
+        model_file.write_all(fitted, out)
         screen.print(f"Model: {out}", markup=False)
     if json_:
-        parameters = [
-            {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, fitted.target)}
-            | {"estimate": term.values[p.name]}
-            for term in fitted.terms
-            for p in term.parameters
-        ]
-        emit_json(
-            {
-                "model": fitted.name,
-                "target": fitted.target,
-                "unit": fitted.unit,
-                "parameters": parameters,
-                "evidence": fitted.evidence,
-                "held_out": error,
-                "out": out,
-            }
-        )
+        emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
+
+
+def _dated(model: "Model") -> "Model":
+    """Return a fitted model with the time of its fit."""
+    from dataclasses import replace
+    from datetime import UTC, datetime
+
+    assert model.evidence is not None  # noqa: S101  a fit leaves its evidence
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return replace(model, evidence=replace(model.evidence, made_at=now))
+
+
+def _told(model: "Model", error: "HeldOutError", out: Path | None) -> dict[str, Any]:
+    """Return what a machine is told of a fit."""
+    parameters = [
+        {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}
+        | {"estimate": term.values[p.name]}
+        for term in model.terms
+        for p in term.parameters
+    ]
+    return {
+        "model": model.name,
+        "target": model.target,
+        "unit": model.unit,
+        "parameters": parameters,
+        "evidence": model.evidence,
+        "held_out": error,
+        "out": out,
+    }

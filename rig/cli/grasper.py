@@ -76,12 +76,13 @@ def follow(
     ] = None,
     master: Annotated[
         str | None,
-        typer.Option(help="Where the master is, such as usb:16c0:0483; simulated if none."),
+        typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
     ] = None,
     duration: Annotated[float, typer.Option(min=0.5, help="How long, s.")] = 10.0,
     scale: Annotated[
         float, typer.Option(min=0.01, max=2, help="Angle of a joint for an angle of the master.")
     ] = 0.3,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
     json: JsonFlag = False,
 ) -> None:
     """Send the three motors where the master goes, within the limits of the configuration.
@@ -92,7 +93,6 @@ def follow(
     from rig.config import load_config
     from rig.config_check import refuse_problems
     from rig.grasper.following import follow_master
-    from rig.live.grasper import master as chief_of
 
     settings = load_config(config or Path("grasper"))
     refuse_problems(settings)
@@ -104,7 +104,7 @@ def follow(
             bar.update(task, completed=time_s)
 
         try:
-            axes = follow_master(settings, master, chief_of(), duration, scale, show)
+            axes, log = follow_master(settings, master, duration, scale, out, show)
         except KeyboardInterrupt:
             remarks().print("Stopped; the grasper is safe.")
             raise
@@ -115,5 +115,6 @@ def follow(
             f"force up to {moved.largest_force_n:.2f} N",
             markup=False,
         )
+    screen.print(f"Log: {log}", markup=False)
     if json:
-        emit_json({"config": settings.name, "duration_s": duration, "axes": axes})
+        emit_json({"config": settings.name, "duration_s": duration, "axes": axes, "log": log})

@@ -71,7 +71,7 @@ class JsonWriter:
 
     def frame(self, snapshot: Snapshot) -> None:
         """Write an object of kind `frame`."""
-        emit_json(json_frame(snapshot, self._options.lever_m, self._options.half_width))
+        emit_json(json_frame(snapshot, self._options.lever_m, self._options.half_widths))
 
     def summary(self, summary: Summary) -> None:
         """Write an object of kind `summary`."""
@@ -94,7 +94,7 @@ class PlainWriter:
     def frame(self, snapshot: Snapshot) -> None:
         """Write one line."""
         options = self._options
-        _say(self._console, plain_line(snapshot, options.lever_m, options.half_width))
+        _say(self._console, plain_line(snapshot, options.lever_m, options.half_widths))
 
     def summary(self, summary: Summary) -> None:
         """Write what the stream came to."""
@@ -153,7 +153,7 @@ class DisplayWriter:
 
     def _view(self, snapshot: Snapshot) -> View:
         options = self._options
-        return View(snapshot, options.title, options.lever_m, options.footer, options.half_width)
+        return View(snapshot, options.title, options.lever_m, options.footer, options.half_widths)
 
 
 def _say(console: Console, line: str) -> None:
