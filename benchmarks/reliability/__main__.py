@@ -20,6 +20,7 @@ from benchmarks.reliability import faults, fuzz, kills, soak
 from estimation.files import write_text_atomic
 from rig.reports.provenance import Provenance
 
+SEED = 0
 STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
 PARTS = ("soak", "pty", "canopen", "faults", "kills", "fuzz")
@@ -50,9 +51,8 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no part {', '.join(sorted(unknown))}")
     for part in options.parts or PARTS:
-        if part != "fuzz":  # its own command measures it; here it is only told
-            sys.stderr.write(f"{part} ...\n")
-            _keep(part, _MEASURES[part](options))
+        sys.stderr.write(f"{part} ...\n")
+        _keep(part, _MEASURES[part](options))
     earlier = TABLE.read_text() if TABLE.is_file() else ""
     write_text_atomic(TABLE, written(_kept(), earlier))
     sys.stderr.write(f"Written: {TABLE}\n")
@@ -67,7 +67,13 @@ def _kept() -> dict[str, Any]:
 
 def _keep(part: str, figures: dict[str, Any]) -> None:
     STATE.parent.mkdir(exist_ok=True)
-    write_text_atomic(STATE, json.dumps({**_kept(), part: figures}, indent=1) + "\n")
+    write_text_atomic(STATE, json.dumps({**_kept(), part: figures | _made()}, indent=1) + "\n")
+
+
+def _made() -> dict[str, str]:
+    """Return when and from what a part's figures were made."""
+    now = Provenance.now(SEED)
+    return {"made": f"{now.date}, {now.commit}, {now.seed}"}
 
 
 def _faults(options: argparse.Namespace) -> dict[str, Any]:
@@ -110,6 +116,7 @@ _MEASURES = {
     ),
     "faults": _faults,
     "kills": _kills,
+    "fuzz": lambda o: {},  # its own command measures it; here it is only told
 }
 
 
@@ -130,16 +137,16 @@ def written(figures: dict[str, Any], earlier: str) -> str:
     rows = []
     for part, new in parts.items():
         kept = [] if part in measured else _rows(summary, OF_PART[part])
-        rows += kept or [f"| {a} | {b} | {c} | {d} |" for a, b, c, d in new]
+        made = figures.get(part, {}).get("made", "")
+        rows += kept or [f"| {a} | {b} | {c} | {d} | {made} |" for a, b, c, d in new]
     lines = [
         "# Reliability",
         "",
-        "Written by `make soak` and `make fuzz`; each command writes the rows it measured, and the"
-        " last line is the last command's. The machine was shared with other work; a missed goal is"
-        " said as missed.",
+        "Written by `make soak` and `make fuzz`; each command writes the rows it measured. The machine"
+        " was shared with other work; a missed goal is said as missed.",
         "",
-        "| figure | measured | goal | met |",
-        "|---|---|---|---|",
+        "| figure | measured | goal | met | date, commit, seed |",
+        "|---|---|---|---|---|",
         *rows,
         "",
         "## Fuzzed decoders",
@@ -151,7 +158,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
         "|---|---:|---:|---:|---:|---:|---:|",
         *(_decoder_rows(tallies) if fuzzed else _rows(decoders, r"[^|]*\| \d")),
     ]
-    return "\n".join([*lines, "", Provenance.now(seed=0).line(), ""])
+    return "\n".join([*lines, "", Provenance.now(SEED).line(), ""])
 
 
 def _rows(text: str, begins: str) -> list[str]:
