@@ -142,8 +142,8 @@ def written(figures: dict[str, Any], earlier: str) -> str:
     lines = [
         "# Reliability",
         "",
-        "Written by `make soak` and `make fuzz`; each command writes the rows it measured. The machine"
-        " was shared with other work; a missed goal is said as missed.",
+        "Written by `make soak` and `make fuzz`; each command writes the rows it measured. The"
+        " machine was shared with other work; a missed goal is said as missed.",
         "",
         "| figure | measured | goal | met | date, commit, seed |",
         "|---|---|---|---|---|",

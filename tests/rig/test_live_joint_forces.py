@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 
 from estimation import model_file
+from estimation.effects.roles import MOTORS
 from estimation.model_table import ModelFileError
+from estimation.recording import Recording
 from rig.cli.main import main
 from rig.config import SHIPPED, load_config
+from rig.diagnosis.subject import subject
 from rig.live.block import LimitStatus
-from rig.live.joint_forces import JOINTS, interval_of_joints, of_joints
+from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
 from rig.live.model_status import ModelStatus
 from rig.live.options import ShowOptions
 from rig.live.state import Reading, Snapshot, Value
 from rig.live.view import View
+from rig.log.convert import write_recording
 
 MODEL = SHIPPED / "simulated_grasper.model.toml"
 
@@ -90,3 +94,13 @@ def test_the_nearest_limits_are_shown_where_there_is_no_room_for_all():
 def test_the_shipped_model_is_of_the_shipped_configuration():
     assert load_config(Path("grasper")).model_path == MODEL
     assert ShowOptions("x").half_widths == {}
+
+
+def test_logs_of_a_grasper_are_diagnosed_axis_by_axis(tmp_path):
+    time_s = np.arange(200) / 2000
+    names = [f"{axis}_{channel}" for axis in MOTORS for channel in ("current_a", "angle_rad")]
+    columns = {name: np.zeros(200) for name in (*names, *AXES)}
+    write_recording(tmp_path / "one.mcap", Recording("one", time_s, columns))
+    assert [m.balance for m in subject(tmp_path).models] == ["jaw_1", "jaw_2", "yaw"]
+    (one,) = subject(tmp_path, balance="jaw_2").models
+    assert one.target == "jaw_2_force_n"
