@@ -71,7 +71,7 @@ class LiveRecorder:
             started_at_ns=self._start_ns,
             calibrations={session.calibrations.name: session.calibrations.content_hash},
             zeros_before={f"{name}_counts": zero for name, zero in session.zeros.items()},
-            details={"rig_version": __version__, "logger_serial": session.identity.serial},
+            details={"rig_version": __version__, **session.board},
         )
         settings = json.dumps(session.config.logged(), indent=1).encode()
         lines = session.calibrations.to_json().encode()

@@ -15,6 +15,7 @@ from drivers.transport.faulty import Faults
 from rig.cli.main import main
 from rig.config import load_config
 from rig.errors import ExitCode, UsageError
+from rig.firmware import source_hash
 from rig.grasper import following
 from rig.grasper.coupling import GrasperError
 from rig.grasper.follow import setpoints
@@ -104,6 +105,7 @@ def test_three_motors_go_where_the_master_goes(link, capsys):
     log = read_log(Path(told["log"]))
     assert log.end.clean
     assert log.run.conditions == {"trajectory": "follow"}
+    assert int(log.run.details["firmware_build"], 16) == source_hash()
     assert len(log.topics["/rig/sample"]) >= 6000
 
 
