@@ -52,7 +52,11 @@ def record(
     seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
     json: JsonFlag = False,
 ) -> None:
-    """Record the simulated grasper, all joints moving at once, one log a run."""
+    """Record the simulated wrist, its joints coupled as it was built, one log a run.
+
+    All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
+    the simulated grasper, with its board in the loop.
+    """
     from rig.log.convert import write_recording
     from rig.simulation.wrist_plant import Wrist, wrist_campaign
 
