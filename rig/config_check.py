@@ -90,8 +90,10 @@ def _driver_problems(
 def _option_problems(key: str, driver: Driver, options: Mapping[str, Any]) -> list[Problem]:
     """Hold options against the types and ranges of the parameters they become."""
     parameters = list(inspect.signature(driver.open, eval_str=True).parameters.values())[1:]
-    fields: dict[str, Any] = {p.name: (p.annotation, p.default) for p in parameters}
-    rules = ConfigDict(extra="forbid", strict=True)
+    fields: dict[str, Any] = {
+        p.name: (Any if p.annotation is p.empty else p.annotation, p.default) for p in parameters
+    }
+    rules = ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)
     try:
         create_model(driver.name, __config__=rules, **fields).model_validate(options)
     except ValidationError as error:
