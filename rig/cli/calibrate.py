@@ -279,7 +279,11 @@ def _measure(procedure: "Procedure", settings: "Config", how: Keeping) -> list[A
     def tell(step: "Step", number: int, total: int) -> None:
         screen.print(f"{number + 1}/{total} {step.name}", markup=False)
 
-    return carry_out(procedure, operator, bench, tell)
+    try:
+        return carry_out(procedure, operator, bench, tell)
+    except KeyboardInterrupt:
+        screen.print("\nStopped; the rig is safe and nothing was kept.")
+        raise
 
 
 class Asking:

@@ -89,8 +89,6 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         result = app(args=words, standalone_mode=False)
     except typer.Exit as stop:
-        if stop.exit_code == 130:  # what typer makes of Ctrl-C
-            sys.stderr.write("Interrupted.\n")
         return stop.exit_code
     except SystemExit:  # how typer and rich leave when the reader of stdout has left
         return 141
@@ -99,6 +97,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
     except Exception as error:
         return _report(error, words)
+    if result == 130:  # what typer makes of Ctrl-C
+        sys.stderr.write("Interrupted.\n")
     return int(result) if isinstance(result, int) else 0
 
 

@@ -6,8 +6,11 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from estimation.channels import unit_of
 from estimation.model import Model
+from rig.live import text as words
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
+from rig.live.state import Value
 
 NAME = "estimate"
 STALE_DAYS = 180.0
@@ -24,7 +27,7 @@ class ModelStatus:
 
     def __init__(self, models: Sequence[Model], now: datetime | None = None) -> None:
         self._ranges = {
-            model.target: model.evidence.target_range
+            model.target: (*model.evidence.target_range, 2 * model.evidence.rmse_with_means)
             for model in models
             if model.evidence is not None and model.evidence.target_range is not None
         }
@@ -33,14 +36,17 @@ class ModelStatus:
         self._days = max(days) if days else None
 
     def of(self, estimates: Mapping[str, FloatArray]) -> DeviceStatus:
-        """Return the status with new estimates: `suspect` beyond a range, `stale` when too old."""
+        """Return the status with new estimates: `suspect` beyond a range, `stale` when too old.
+
+        Beyond is by more than the estimate's own interval.
+        """
         outside = [
-            f"{name} beyond {low:.3g} to {high:.3g}"
-            for name, (low, high) in self._ranges.items()
-            if name in estimates and _leaves(estimates[name], low, high)
+            _beyond(name, low, high)
+            for name, (low, high, margin) in self._ranges.items()
+            if name in estimates and _leaves(estimates[name], low - margin, high + margin)
         ]
         if outside:
-            return DeviceStatus(NAME, "suspect", "outside what was fitted: " + ", ".join(outside))
+            return DeviceStatus(NAME, "suspect", ", ".join(outside))
         if self._days is None:
             return DeviceStatus(NAME, "ok", "its fit has no date")
         state = "stale" if self._days > STALE_DAYS else "ok"
@@ -66,11 +72,17 @@ def with_model_status(
             close()
 
 
+def _beyond(channel: str, low: float, high: float) -> str:
+    """Return in words that an estimate leaves the range of its fit."""
+    unit = unit_of(channel)
+    ends = words.digits(Value(low), unit), words.with_unit(Value(high), unit)
+    return f"{words.name_of(channel)} beyond its fit, {ends[0]} to {ends[1]}"
+
+
 def _leaves(values: FloatArray, low: float, high: float) -> bool:
-    """Say whether the mean of a block is beyond a range by more than a tenth of it."""
+    """Say whether the mean of a block is beyond a range."""
     known = values[np.isfinite(values)]
-    margin = 0.1 * (high - low)
-    return known.size > 0 and not low - margin <= float(known.mean()) <= high + margin
+    return known.size > 0 and not low <= float(known.mean()) <= high
 
 
 def _days(made_at: str, now: datetime) -> float:

@@ -64,7 +64,8 @@ def test_an_estimate_beyond_what_was_fitted_is_suspect_and_an_old_fit_stale():
     assert status(200, yaw_force_n=0.5).state == "stale"
     beyond = status(200, jaw_1_force_n=5.0)
     assert beyond.state == "suspect"
-    assert "jaw_1_force_n beyond" in beyond.detail
+    assert beyond.detail.startswith("Jaw 1 force beyond its fit, ")
+    assert beyond.detail.endswith(" N")
 
 
 @pytest.mark.parametrize("line", ['made_at = "yesterday"', "target_range = [1.0]"])
