@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.cli.output import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -123,24 +123,29 @@ def fit(
     if model == "network":
         fit_network(campaign, target, surrogate, seed, out, json_)
         return
-    fitted = []
-    told = []
-    for declared in models_in_use(Path(model)):
-        done = fit_model(declared, campaign, seed=seed)
-        error = held_out_error(
-            declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed
-        )
-        fitted.append(_dated(done))
-        told.append(_told(fitted[-1], error, out))
-        screen.print(to_rich(parameter_table(done)))
+    models = models_in_use(Path(model))
+    folds = min(folds, len(campaign.evidence))
+    done = []
+    with progress() as bar:
+        task = bar.add_task("fits", total=2 * len(models))
+        for declared in models:
+            bar.update(task, description=declared.name)
+            fitted = _dated(fit_model(declared, campaign, seed=seed))
+            bar.advance(task)
+            done.append((fitted, held_out_error(declared, campaign, folds=folds, seed=seed)))
+            bar.advance(task)
+    for fitted, error in done:
+        screen.print(to_rich(parameter_table(fitted)))
         screen.print(
-            f"{done.target} on {error.runs} runs not fitted on: rmse {error.rmse:.4g} {done.unit},"
+            f"{fitted.target} on {error.runs} runs not fitted on:"
+            f" rmse {error.rmse:.4g} {fitted.unit},"
             f" {error.rmse_with_means:.4g} with each run's mean left in."
         )
     if out is not None:
-        model_file.write_all(fitted, out)
+        model_file.write_all([fitted for fitted, _ in done], out)
         screen.print(f"Model: {out}", markup=False)
     if json_:
+        told = [_told(fitted, error, out) for fitted, error in done]
         emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
 
 
