@@ -1,8 +1,8 @@
 """Measure how reliable the rig is and write the table.
 
-`python -m benchmarks.reliability [soak pty canopen faults kills fuzz] [--virtual S] [--real S]
-[--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's figures are
-kept in `build/reliability.json`, and the table is written from all that are there. A part that was
+`python -m benchmarks.reliability [soak pty canopen faults kills network fuzz] [--virtual S]
+[--real S] [--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's figures
+are kept in `build/reliability.json`, and the table is written from all that are there. A part that was
 not measured in this checkout keeps the rows it has in the table; one that never was says so.
 """
 
@@ -16,20 +16,21 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reliability import faults, fuzz, kills, soak
+from benchmarks.reliability import faults, fuzz, kills, listening, soak
 from estimation.files import write_text_atomic
 from rig.reports.provenance import Provenance
 
 SEED = 0
 STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
-PARTS = ("soak", "pty", "canopen", "faults", "kills", "fuzz")
+PARTS = ("soak", "pty", "canopen", "faults", "kills", "network", "fuzz")
 OF_PART = {
     "soak": r"firmware core, ",
     "pty": r"firmware process ",
     "canopen": r"EPOS4 fake ",
     "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
     "kills": r"\d+ recorders killed",
+    "network": r"listening ",
     "fuzz": r"fuzzed decoders",
 }
 """How the figures of a part's rows begin."""
@@ -116,6 +117,7 @@ _MEASURES = {
     ),
     "faults": _faults,
     "kills": _kills,
+    "network": lambda o: listening.measure(),
     "fuzz": lambda o: {},  # its own command measures it; here it is only told
 }
 
@@ -130,6 +132,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
         "canopen": _soak_rows(figures.get("canopen"), "canopen"),
         "faults": _fault_rows(figures.get("faults")),
         "kills": _kill_rows(figures.get("kills")),
+        "network": _network_rows(figures.get("network")),
         "fuzz": _fuzz_rows(tallies),
     }
     measured = {*figures, *(["fuzz"] if fuzzed else [])}
@@ -242,6 +245,28 @@ def _kill_rows(k: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
     met = k["most_lost_s"] <= 0.25 and k["count"] >= 200
     what = f"{k['count']} recorders killed: lost, all files repaired, nothing earlier changed"
     return [_row(what, told, "0.25 s in 200", met)]
+
+
+def _network_rows(n: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
+    if n is None:
+        return [("listening sockets", "not measured", "", "**no**")]
+    unasked, asked = n["unasked"], n["asked"]
+    inside = all(listening.is_loopback(address) for address in asked)
+    rigs = ", ".join(listening.CONFIGS)
+    return [
+        _row(
+            f"listening sockets of `rig live` on {rigs}, and of `rig record`",
+            ", ".join(unasked) or "none",
+            "none",
+            not unasked,
+        ),
+        _row(
+            "listening sockets of `rig live --foxglove`",
+            f"{len(asked)}, {'loopback only' if inside else 'not loopback: ' + ', '.join(asked)}",
+            "1, loopback only",
+            len(asked) == 1 and inside,
+        ),
+    ]
 
 
 def _fuzz_rows(tallies: dict[str, fuzz.Tally]) -> list[tuple[str, str, str, str]]:

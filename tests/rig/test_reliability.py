@@ -1,12 +1,14 @@
 """A small share of `make soak` and `make fuzz`, and that the two go on where they stopped."""
 
+import os
 import random
+import socket
 from pathlib import Path
 
 import pytest
 
 from benchmarks.reliability import __main__ as page
-from benchmarks.reliability import fuzz
+from benchmarks.reliability import fuzz, listening
 from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
@@ -88,3 +90,16 @@ def test_a_part_that_was_not_measured_here_keeps_its_rows(
         " median 0.100 s | 0.25 s in 200 | **no** | today, abc, 0 |"
     ]
     assert "not measured" in page.written({}, "")
+
+
+@pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="needs /proc (Linux)")
+def test_what_listens_is_seen_and_told_from_what_does_not() -> None:
+    before = listening.listening(os.getpid())
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        (found,) = listening.listening(os.getpid()) - before
+        assert int(found.split(":")[1], 16) == server.getsockname()[1]
+        assert listening.is_loopback(found)
+        with socket.create_connection(server.getsockname()):
+            assert listening.listening(os.getpid()) - before == {found}
+    assert listening.listening(os.getpid()) == before
+    assert not listening.is_loopback("00000000:1F90")
