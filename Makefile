@@ -45,7 +45,8 @@ BLIND ?=
 blind: $(VENV)/.developing
 	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md $(BLIND)
 
-# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders;
+# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
+# listening sockets;
 # SOAK="soak --virtual 60" for one part or less of it
 SOAK ?=
 soak: $(VENV)/.developing firmware

@@ -1,9 +1,10 @@
 """Measure how reliable the rig is and write the table.
 
 `python -m benchmarks.reliability [soak pty canopen faults kills network fuzz] [--virtual S]
-[--real S] [--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's figures
-are kept in `build/reliability.json`, and the table is written from all that are there. A part that was
-not measured in this checkout keeps the rows it has in the table; one that never was says so.
+[--real S] [--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's
+figures are kept in `build/reliability.json`, and the table is written from all that are there. A
+part that was not measured in this checkout keeps the rows it has in the table; one that never was
+says so.
 """
 
 import argparse
