@@ -114,7 +114,7 @@ def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     if not runs:
         raise NetworkError("There is no closing sample to adapt the estimator with.")
     if isinstance(source, BankEstimator):
-        return _adapted_bank(source, _reduced(source, runs))
+        return adapted_states(source, reduced(source, runs))
     return _adapted_network(source, runs)
 
 
@@ -125,7 +125,7 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
         NetworkError: There is no run, or torch is missing.
     """
     if isinstance(like, BankEstimator):
-        return fit_runs(_reduced(like, runs), like.bank, like.target)
+        return fit_runs(reduced(like, runs), like.bank, like.target)
     rows, truth = (np.concatenate(part) for part in zip(*(r.fitted for r in runs), strict=True))
     nodes = len(like.network.hidden)
     names = (like.network.inputs, like.network.outputs)
@@ -134,7 +134,8 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     return NetworkEstimator(trained.network, like.low_pass)
 
 
-def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
+def reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
+    """Return runs of another instrument as a fit of states takes them."""
     fitted = [run.fitted for run in runs]
     return [
         part
@@ -143,7 +144,8 @@ def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidenc
     ]
 
 
-def _adapted_bank(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
+def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
+    """Return a state estimator adapted to reduced runs, as `adapted` does."""
     stiff = stiffness(source.bank)
 
     def pulled(part: Sequence[RunEvidence]) -> FloatArray:
