@@ -187,6 +187,9 @@ def test_another_instrument_is_refused_unless_told(runs):
     foreign = replace(runs[0], instrument=other)
     with pytest.raises(InstrumentError, match="fitted on Maryland 1"):
         fitted.predict(foreign)
+    again = replace(runs[0], instrument=replace(own, mounting="2"))
+    with pytest.raises(InstrumentError, match=r"Maryland 1 \(mounting 2\)"):
+        fitted.predict(again)
     np.testing.assert_array_equal(
         fitted.for_any_instrument().predict(foreign),
         fitted.predict(replace(foreign, instrument=own)),
