@@ -10,7 +10,8 @@ NOTE = (
     "Proximal torque from the measured current, RMSE in mN m over the closing samples of the runs"
     " not used; fitted anew: on the instrument's other runs alone, in five folds. Of a network the"
     " output layer is adapted. The stiffness of the states' prior was chosen on the instruments of"
-    " the public data that are shown here, so that column is somewhat too good there."
+    " the public data that are shown here, so that column is somewhat too good there; that of the"
+    " networks' on Tool_4_Maryland_L_2 alone."
 )
 
 

@@ -210,6 +210,23 @@ def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_p
     assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
 
 
+def test_a_node_that_hardly_moves_in_the_runs_adapted_with_keeps_its_weight(runs):
+    draw = np.random.default_rng(0)
+    inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[-0.7, -0.2], [0.7, 0.5]])
+    hidden = draw.normal(size=(4, 3))
+    hidden[0] = [1e-3, 0.0, 1.0]  # all but constant
+    target = np.array([[-0.1], [0.4]])
+    source = NetworkEstimator(
+        Network(inputs, (TARGET,), bounds, target, hidden, draw.normal(size=(1, 5)))
+    )
+    found = evidence(source, runs[0])
+    assert found is not None
+    moved = adapted(source, [found])
+    assert isinstance(moved, NetworkEstimator)
+    change = np.abs(moved.network.output - source.network.output)[0]
+    assert change[0] < 0.3 * change.max()
+
+
 def test_settings_are_chosen_by_runs_left_out(runs):
     bank = Bank("motor_current_a")
     recipe = BankRecipe(TARGET, bank)
