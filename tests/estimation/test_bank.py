@@ -196,6 +196,15 @@ def test_another_instrument_is_refused_unless_told(runs):
     )
 
 
+def test_a_file_of_an_older_version_is_told_to_be_fitted_again(fitted, tmp_path, monkeypatch):
+    monkeypatch.setattr(BankEstimator, "SCHEMA", "rig.bank/1")
+    fitted.save(tmp_path / "old.npz")
+    monkeypatch.undo()
+    with pytest.raises(NetworkError, match=r"rig\.bank/1, not rig\.bank/") as refused:
+        load(tmp_path / "old.npz")
+    assert "rig fit" in refused.value.fix
+
+
 def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_path):
     own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
     inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[0.0, 0.0], [1.0, 1.0]])
