@@ -1,6 +1,7 @@
 """The `rig` command: collects the verbs and turns errors into three lines and an exit code."""
 
 import sys
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
@@ -132,4 +133,6 @@ def _report(error: Exception, words: list[str]) -> int:
 
 def run() -> None:
     """Run the command line as the console script does: leave with its exit code."""
+    if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a letter it lacks is no error
+        sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())
