@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.bench_frames import device_stream
 from benchmarks.ratio import Ratio, best_of
 from drivers.framing import FrameStream
-from drivers.teensy.protocol import SAMPLE_DTYPE
+from drivers.teensy.reference import SAMPLE_DTYPE
 from estimation.bank.states import Bank
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_header import header

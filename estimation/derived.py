@@ -6,17 +6,20 @@ first of `X_n_m`; `X_travel_rad` is how far that angle has come since its lowest
 `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` how long ago that
 value was; `X_rise_a` is what the channel `X_a` (any unit) has gained since the motor's angle was
 lowest, and `X_fall_a` how far it is below its highest value of that window; `X_20ms_ago_a` is its
-value that long ago; `gearbox_differential_rad` is the motor's angle behind the gear ratio less the
-spindle's; `motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is
-the time since the campaign's first run began, put beside the measured channels by `Campaign.timed`,
-and live the time since the first sample. Offline they come from a zero-phase filter and a
-noise-robust derivative, live from a causal filter and backward differences: the same names, two
-sources.
+value that long ago, `X_acceleration_20ms_ago_rad_s2` that derivative then;
+`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
+`motor_load_n_m` is the spindle's torque projected from the current, `cable_load_n_m` the same from
+the torque at the jaw, `cable_angle_rad` the jaw's angle from the spindle's and that torque;
+`campaign_time_s` is the time since the campaign's first run began, put beside the measured channels
+by `Campaign.timed`, and live the time since the first sample. Offline they come from a zero-phase
+filter and a noise-robust derivative, live from a causal filter and backward differences: the same
+names, two sources.
 """
 
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +51,21 @@ that sensor is the target, since noise shared by both sides of a balance looks l
 LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 """Regression of proximal torque on current and direction while moving, 49 runs of the public data
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
+
+CABLE_LOAD = "cable_load_n_m"
+"""The spindle's torque as the cable's side knows it, in the same way: nominal ratio times the
+distal torque, and nominal Coulomb friction."""
+
+CABLE_RATIO, CABLE_FRICTION_N_M, CABLE_WIDTH_RAD_S = 2.62, 0.060, 0.15
+"""Regression of proximal on distal torque and direction while moving, runs of the same data."""
+
+CABLE_ANGLE = "cable_angle_rad"
+"""The jaw's angle as the cable's side knows it: nominal ratio times the spindle's angle less the
+distal torque by the nominal stiffness. It stands in for the jaw's encoder where that is the
+target."""
+
+CABLE_TURN, CABLE_YIELD_RAD_N_M = 0.934, 3.56
+"""Regression of the jaw's angle on the spindle's and the distal torque, runs of the same data."""
 
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
@@ -83,12 +101,12 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
             needed.add(_plain(name))
         elif RISE in name:
             needed |= {_plain(name), TURNING}
-        elif (ago := AGO.match(name)) is not None:
-            needed.add(ago["name"] + ago["unit"])
         elif name == MOTOR_LOAD:
             needed |= {"motor_current_a", "motor_angle_rad"}
+        elif name in (CABLE_LOAD, CABLE_ANGLE):
+            needed |= {"distal_torque_n_m", "spindle_angle_rad"}
         elif name != "time_s":
-            needed.add(_differentiated(name)[0])
+            needed.add(_differentiated(_now(name))[0])
     return tuple(sorted(needed))
 
 
@@ -116,6 +134,12 @@ def _parted(channel: str) -> tuple[str, str]:
     return channel.removesuffix(f"_{suffix}"), suffix
 
 
+def _now(name: str) -> str:
+    """Return the channel a channel is the past of, or the channel itself."""
+    ago = AGO.match(name)
+    return name if ago is None else ago["name"] + ago["unit"]
+
+
 def _plain(name: str) -> str:
     return name.replace(FALL, "_").replace(RISE, "_")
 
@@ -138,9 +162,29 @@ def _derive(
     names: Iterable[str],
     sample_rate_hz: float,
     derivative: Operator,
+    tracked: Mapping[str, FloatArray] | None = None,
 ) -> dict[str, FloatArray]:
-    """Return the named channels, from filtered ones without gaps."""
+    """Return the named channels, from filtered ones without gaps.
+
+    Args:
+        filtered: Measured channels.
+        names: Channels wanted.
+        sample_rate_hz: Their rate.
+        derivative: How they are differentiated.
+        tracked: Angle to itself and its two derivatives, shape (n, 3), where they are known.
+    """
     window = _window(sample_rate_hz)
+
+    @cache
+    def differentiated(name: str) -> FloatArray:
+        source, times = _differentiated(name)
+        if times and tracked and source in tracked:
+            return tracked[source][:, times]
+        values = filtered[source]
+        for _ in range(times):
+            values = derivative(values)
+        return values
+
     channels: dict[str, FloatArray] = {}
     for name in names:
         if name == GEARBOX:
@@ -158,20 +202,28 @@ def _derive(
             channel = filtered[_plain(name)]
             channels[name] = channel - channel[lowest(filtered[TURNING], window)]
         elif (ago := AGO.match(name)) is not None:
-            channel = filtered[ago["name"] + ago["unit"]]
-            back = round(1e-3 * int(ago["ms"]) * sample_rate_hz)
-            channels[name] = channel[np.maximum(np.arange(len(channel)) - back, 0)]
+            channels[name] = _delayed(differentiated(_now(name)), ago["ms"], sample_rate_hz)
         elif name == MOTOR_LOAD:
             direction = np.tanh(derivative(filtered["motor_angle_rad"]) / LOAD_WIDTH_RAD_S)
             channels[name] = (
                 LOAD_N_M_A * filtered["motor_current_a"] - LOAD_FRICTION_N_M * direction
             )
+        elif name == CABLE_LOAD:
+            direction = np.tanh(derivative(filtered["spindle_angle_rad"]) / CABLE_WIDTH_RAD_S)
+            carried = CABLE_RATIO * filtered["distal_torque_n_m"]
+            channels[name] = carried + CABLE_FRICTION_N_M * direction
+        elif name == CABLE_ANGLE:
+            stretch = CABLE_YIELD_RAD_N_M * filtered["distal_torque_n_m"]
+            channels[name] = CABLE_TURN * filtered["spindle_angle_rad"] - stretch
         else:
-            source, times = _differentiated(name)
-            channels[name] = filtered[source]
-            for _ in range(times):
-                channels[name] = derivative(channels[name])
+            channels[name] = differentiated(name)
     return channels
+
+
+def _delayed(values: FloatArray, ms: str, sample_rate_hz: float) -> FloatArray:
+    """Return the values of so many ms ago; before the first one, the first one."""
+    back = round(1e-3 * int(ms) * sample_rate_hz)
+    return values[np.maximum(np.arange(len(values)) - back, 0)]
 
 
 def settled_places(
@@ -280,14 +332,11 @@ class CausalChannels:
         self._last_row: FloatArray = np.empty(0)
         self._kept = max(2, _window(sample_rate_hz) if looks_back(self.names) else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
-        derived = {name: _differentiated(name) for name in self.names if tracked}
-        self._tracked = {
-            name: (self.measured.index(angle), times)
-            for name, (angle, times) in derived.items()
-            if times and angle in self.measured and angle.endswith("_angle_rad")
-        }
+        moving = [source for source, times in map(_differentiated, map(_now, self.names)) if times]
+        angles = [name for name in self.measured if tracked and name.endswith("_angle_rad")]
+        self._tracked = {name: self.measured.index(name) for name in angles if name in moving}
         self._tracker = tracker(sample_rate_hz) if self._tracked else None
-        self._motion: dict[int, FloatArray] = {}  # the tracker's state of each measured angle
+        self._motion: dict[str, FloatArray] = {}  # the last angles, speeds and accelerations
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
         """Take the next samples and return the channels for them.
@@ -345,27 +394,31 @@ class CausalChannels:
         )
         derived = _derive(
             dict(zip(self.measured, lined.T, strict=True)),
-            [name for name in self.names if name not in CLOCKS and name not in self._tracked],
+            [name for name in self.names if name not in CLOCKS],
             self._rate_hz,
             self._backward,
+            self._track(filled, first),
         )
         at = ticks[1:] + self._kept - 1  # tick 1 is the first row after the history
         channels = {name: values[at] for name, values in derived.items()}
-        channels |= self._track(filled, first, ticks[1:] - 1)
         return {**channels, "time_s": time} if "time_s" in self.names else channels
 
-    def _track(
-        self, filled: FloatArray, first: bool, at: NDArray[np.int64]
-    ) -> dict[str, FloatArray]:
-        """Return the tracked channels of the samples at some ticks of the gap-free rows."""
+    def _track(self, filled: FloatArray, first: bool) -> dict[str, FloatArray]:
+        """Return angle, speed and acceleration of tracked angles, the history before them."""
         if self._tracker is None:
             return {}
-        motion = {}
-        for column in {column for column, _ in self._tracked.values()}:
+        found = {}
+        for name, column in self._tracked.items():
+            angles = filled[:, column]
             if first:
-                self._motion[column] = self._tracker.start(filled[0, column])
-            motion[column] = self._tracker.track(filled[:, column], self._motion[column])[at]
-        return {name: motion[column][:, times] for name, (column, times) in self._tracked.items()}
+                self._motion[name] = np.repeat(
+                    self._tracker.start(angles[0])[None], self._kept, axis=0
+                )
+            before = self._motion[name]
+            moved = self._tracker.track(angles, before[-1].copy())
+            found[name] = np.vstack([before, moved])
+            self._motion[name] = found[name][-self._kept :]
+        return found
 
     def _backward(self, values: FloatArray) -> FloatArray:
         # the first value is made of one sample too few, and is never handed out

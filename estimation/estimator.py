@@ -75,7 +75,7 @@ def load(path: Path) -> Estimator:
 
     if path.suffix == ".toml":
         return ModelEstimator(read(path))
-    if schema_of(path) == BankEstimator.SCHEMA:
+    if schema_of(path).startswith(BankEstimator.SCHEMA.rpartition("/")[0]):
         return BankEstimator.load(path)
     arrays = read_arrays(path, NetworkEstimator.SCHEMA)
     if "model" in arrays:

@@ -58,13 +58,17 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """Identity of the instrument under test. What is not known is None."""
+    """Identity of the instrument under test. What is not known is None.
+
+    One that was mounted anew has another friction and another zero, so `mounting` tells it apart.
+    """
 
     model: str | None = None
     serial: str | None = None
     lot: str | None = None
     side: str | None = None
     uses: int | None = None
+    mounting: str | None = None
 
 
 class MissingChannelError(EstimationError):

@@ -4,7 +4,9 @@ The motor's friction changes from run to run by more than the fit errs within on
 rig the mean error of a run scatters by 2 mN m. Plain least squares takes every sample as news; here
 the run's offset is a random effect. With equal correlation rho between all errors of a run, the
 generalised least squares of n samples leaves out a share s of each run's means: s = n rho / (1 +
-(n - 1) rho). The share is a setting, as neighbouring samples are no independent news either.
+(n - 1) rho). The share is a setting, as neighbouring samples are no independent news either. What
+runs say of each other by their means is then fitted once more, with few weights: there are fewer
+runs than weights.
 
 Source: generalised least squares of the random-intercept model, N. M. Laird and J. H. Ware,
 "Random-effects models for longitudinal data", Biometrics 38 (1982).
@@ -14,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from estimation.recording import FloatArray
@@ -32,8 +35,32 @@ class Settings:
     offset_share: float = 0.5
 
 
-CHOICES = tuple(Settings(ridge, share) for ridge in (3e-5, 3e-4) for share in (0.0, 0.5))
-"""Settings that `chosen` chooses from."""
+CHOICES = tuple(Settings(ridge, share) for share in (0.8, 0.5, 0.0) for ridge in (1e-4, 1e-5))
+"""Settings that `chosen` chooses from, those that trust the runs' means least first."""
+
+BETWEEN_RIDGE = 1e-2
+"""Penalty of the weights that the runs' means are fitted with; runs are fewer than samples."""
+
+AS_GOOD = 1.02
+"""Squared errors that differ by less are alike, and the first choice is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a fit must know of its columns.
+
+    Attributes:
+        stiffness: How stiffly each weight is held, relative to the ridge penalty, shape (p,).
+        between: Columns that the runs' means are fitted with, the constant first.
+    """
+
+    stiffness: FloatArray
+    between: NDArray[np.int64]
+
+    @classmethod
+    def plain(cls, size: int) -> "Shape":
+        """Return the shape of columns that are all alike."""
+        return cls(np.ones(size), np.arange(1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +71,7 @@ class Normal:
         count: Samples n.
         gram: X'X, shape (p, p).
         cross: X'Y, shape (p, targets).
+        square: Sum of squares of each target, shape (targets,).
         mean: Mean row of X, shape (p,).
         target: Mean row of Y, shape (targets,).
     """
@@ -51,19 +79,27 @@ class Normal:
     count: int
     gram: FloatArray
     cross: FloatArray
+    square: FloatArray
     mean: FloatArray
     target: FloatArray
 
     @classmethod
     def of(cls, design: FloatArray, targets: FloatArray) -> "Normal":
         """Reduce a run's design, shape (n, p), and its targets, shape (n, targets)."""
-        gram, cross = design.T @ design, design.T @ targets
-        return cls(len(design), gram, cross, design.mean(axis=0), targets.mean(axis=0))
+        gram, cross, square = design.T @ design, design.T @ targets, (targets**2).sum(axis=0)
+        return cls(len(design), gram, cross, square, design.mean(axis=0), targets.mean(axis=0))
 
     def only(self, target: int) -> "Normal":
         """Return the share of one target."""
         one = slice(target, target + 1)
-        return Normal(self.count, self.gram, self.cross[:, one], self.mean, self.target[one])
+        return Normal(
+            self.count,
+            self.gram,
+            self.cross[:, one],
+            self.square[one],
+            self.mean,
+            self.target[one],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +111,7 @@ class Pool:
         total: Sum of the rows of X, shape (p,).
         gram: X'X, shape (p, p).
         cross: X'Y, shape (p, targets).
+        square: Sum of squares of each target, shape (targets,).
         between: The share of `gram` that is the runs' means', shape (p, p).
         between_cross: The share of `cross` that is the runs' means', shape (p, targets).
     """
@@ -83,6 +120,7 @@ class Pool:
     total: FloatArray
     gram: FloatArray
     cross: FloatArray
+    square: FloatArray
     between: FloatArray
     between_cross: FloatArray
 
@@ -97,6 +135,7 @@ class Pool:
             counts @ means,
             np.sum([run.gram for run in runs], axis=0),
             np.sum([run.cross for run in runs], axis=0),
+            np.sum([run.square for run in runs], axis=0),
             (means.T * counts) @ means,
             (means.T * counts) @ targets,
         )
@@ -108,6 +147,7 @@ class Pool:
             self.total - part.total,
             self.gram - part.gram,
             self.cross - part.cross,
+            self.square - part.square,
             self.between - part.between,
             self.between_cross - part.between_cross,
         )
@@ -125,39 +165,60 @@ class Pool:
         return np.asarray(found)
 
 
-def solve(pool: Pool, settings: Settings) -> FloatArray:
+def solve(pool: Pool, shape: Shape, settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
 
     A column that does not vary gets no weight.
 
     Args:
         pool: The runs to fit.
+        shape: What the columns are.
         settings: How.
     """
     share, scale = settings.offset_share, pool.spread
-    penalty = np.full(len(scale), settings.ridge * pool.count)
-    penalty[0] = 0.0
-    gram = (pool.gram - share * pool.between) / np.outer(scale, scale) + np.diag(penalty)
-    cross = (pool.cross - share * pool.between_cross) / scale[:, None]
-    return np.asarray(linalg.solve(gram, cross, assume_a="pos") / scale[:, None])
+    penalty = settings.ridge * pool.count * shape.stiffness
+    gram, cross = pool.gram - share * pool.between, pool.cross - share * pool.between_cross
+    weights = _ridge(gram, cross, scale, penalty)
+    few = shape.between
+    rest = pool.cross - pool.gram @ weights
+    held = BETWEEN_RIDGE * pool.count * shape.stiffness[few]
+    weights[few] += _ridge(pool.gram[np.ix_(few, few)], rest[few], scale[few], held)
+    return weights
 
 
-def chosen(whole: Pool, folds: Sequence[Pool]) -> Settings:
+def _ridge(
+    gram: FloatArray, cross: FloatArray, scale: FloatArray, penalty: FloatArray
+) -> FloatArray:
+    """Return weights that are held at zero, but for the first one, shape (p, targets)."""
+    held = np.diag(np.concatenate([[0.0], penalty[1:]]))
+    scaled = gram / np.outer(scale, scale) + held
+    solved = linalg.solve(scaled, cross / scale[:, None], assume_a="pos")
+    return np.asarray(solved / scale[:, None])
+
+
+def chosen(whole: Pool, folds: Sequence[Pool], shape: Shape) -> Settings:
     """Return the settings of the least error on runs left out of the fit in turn.
+
+    Of those that are as good as the best, it is the one that trusts the runs' means least: runs
+    left out at random tell little of runs that are unlike all others.
 
     Args:
         whole: The runs to fit, of one target; nothing else is looked at.
         folds: The same runs in parts.
+        shape: What the columns are.
     """
 
     def loss(settings: Settings) -> float:
         total = 0.0
-        for part in folds:  # the squared error, but for the target's own square
-            weights = solve(whole.without(part), settings)[:, 0]
+        for part in folds:
+            weights = solve(whole.without(part), shape, settings)[:, 0]
             total += float(weights @ part.gram @ weights - 2 * weights @ part.cross[:, 0])
+            total += float(part.square[0])
         return total
 
-    return min(CHOICES, key=loss)
+    losses = [loss(settings) for settings in CHOICES]
+    alike = [loss <= AS_GOOD * min(losses) for loss in losses]
+    return CHOICES[alike.index(True)]
 
 
 def pull(

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.bank.fitting import Normal, Pool, Settings, solve
+from estimation.bank.fitting import Normal, Pool, Settings, Shape, solve
 from estimation.bank.states import Bank, Product
 from estimation.recording import FloatArray
 
@@ -111,7 +111,7 @@ def calibrate(
     sizes = [np.abs(residual) for residual in residuals]
     parts = [design[:, columns] for design in designs]
     runs = [Normal.of(part, size[:, None]) for part, size in zip(parts, sizes, strict=True)]
-    weights = solve(Pool.of(runs), Settings(offset_share=0.0))[:, 0]
+    weights = solve(Pool.of(runs), Shape.plain(len(columns)), Settings(offset_share=0.0))[:, 0]
     size = np.concatenate(sizes)
     least = NARROWEST * float(size.mean())
     width = np.maximum(np.concatenate(parts) @ weights, least)

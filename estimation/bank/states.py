@@ -2,15 +2,16 @@
 
 Everything known about one instant of the drive is a row of filtered channels. From it come the
 states, numbers of order one; products of states, each with a weight of its own; and the ripple, a
-Fourier series in the spindle's angle whose amplitudes depend on load and speed. No channel looks
-back further than `estimation.derived.TRAVEL_WINDOW_S`.
+Fourier series in the spindle's angle whose amplitudes depend on load and speed. Where the wrist
+moves, a second, slower series has amplitudes that depend on its pose: the cables rub elsewhere in
+every pose. No channel looks back further than `estimation.derived.TRAVEL_WINDOW_S`.
 
 States, t the motor's travel since the lowest angle of that window:
 
 - `q` spindle angle, `c` surrogate of the load, `v` speed, `a` acceleration, `i` inverse speed, `d`
   how far the surrogate is below its highest value of the window;
 - `l5` to `l480`: the load so many ms ago. Friction that comes and goes with teeth and balls is in
-  the load now, and less in what it was on other teeth;
+  the load now, and less in what it was on other teeth; `b5` to `b480`: the acceleration then;
 - `k1` to `k4`: min(t, r) / r, r = 1 to 4 rad, and `n1` to `n3`: the same with r in proportion to
   the load. Both are Prandtl's stop operators after a reversal, the elements of a Maxwell-slip model
   of presliding friction; the second ones for friction that grows with the cable's tension. A drive
@@ -33,14 +34,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from estimation.bank.fitting import Shape
 from estimation.derived import GEAR_RATIO, TRAVEL_WINDOW_S, ago_of, fall_of, rise_of
 from estimation.recording import FloatArray
 
 LAGS_MS = (5, 10, 20, 40, 80, 150, 300, 480)
 LAGS = tuple(f"l{ms}" for ms in LAGS_MS)
+PUSHES = tuple(f"b{ms}" for ms in LAGS_MS)
 RISES = ("h2", "h4")
 STATES = (
-    "q", "c", "v", "a", "i", "d", "k1", "k2", "k3", "k4", "n1", "n2", "n3", "p", *RISES, *LAGS,
+    "q", "c", "v", "a", "i", "d", "k1", "k2", "k3", "k4", "n1", "n2", "n3", "p",
+    *RISES, *LAGS, *PUSHES,
 )  # fmt: skip
 CLIPS = ("k1", "k2", "k3", "k4", "n1", "n2", "n3")
 
@@ -64,6 +68,15 @@ RIPPLE_STEP = 0.17
 """Orders of the ripple, a motor turn: 29 multiples of 0.17. A stroke of the rig is 6 turns, so
 orders closer together cannot be told apart."""
 
+WRIST_ORDERS, WRIST_PERIOD_RAD = 20, 3.3
+"""Orders of the wrist's series and its period, a little more than the range of all jaw stops."""
+
+WRIST_POWERS = 5
+"""Powers of the pose, from 0, in its amplitudes: as many as the public data has poses."""
+
+STIFFER = 3.0
+"""Each further factor of a product, or power of the pose, makes its weight so much stiffer."""
+
 Product = tuple[str, ...]
 
 
@@ -73,8 +86,8 @@ def _grid(positions: int, loads: int) -> list[Product]:
 
 NEUTRAL: list[Product] = [
     *_grid(3, 2), ("c",) * 3, ("q",) + ("c",) * 3, ("q",) * 4, ("q",) * 4 + ("c",), ("q",) * 5,
-    ("v",), ("v", "v"), ("c", "v"), ("q", "v"), ("i",), ("c", "i"),
-    ("a",), ("q", "a"), ("v", "a"),
+    ("v",), ("v", "v"), ("c", "v"), ("c", "c", "v"), ("q", "v"), ("i",), ("c", "i"),
+    ("a",), ("q", "a"), ("v", "a"), *[(push,) for push in PUSHES],
     ("d",), ("q", "d"), ("d", "d"),
     *[(lag,) for lag in LAGS],
     *[(lag, state) for lag in ("l20", "l80", "l300") for state in ("q", "v")],
@@ -95,16 +108,23 @@ POSED: list[Product] = [
     for power in (1, 2, 3, 4)
     for rest in [
         *_grid(2, 1), ("c", "c"), ("q", "c", "c"), ("q", "q", "q"), ("v",), ("i",), ("a",),
+        ("c", "v"), ("c", "i"), ("q", "v"), ("d",),
         *[(clip, *load) for clip in ("k1", "k2", "k4", "n1", "n2") for load in [(), ("c",)]],
     ]
 ]  # fmt: skip
 """Products that a wrist's pose adds."""
 
+RUNS: list[Product] = [
+    (), ("c",), ("q",), ("v",), ("c", "c"), ("i",), ("c", "i"), ("c", "v"),
+]  # fmt: skip
+"""Products that the means of runs are fitted with."""
+
 RIPPLE = "ripple"
 
 EFFECTS: dict[str, tuple[str, ...]] = {
     "speed": ("v", "i"),
-    "acceleration": ("a",),
+    "acceleration": ("a", *PUSHES),
+    "acceleration of the last 0.5 s": PUSHES,
     "load of the last 0.5 s": LAGS,
     "fall of the load": ("d",),
     "rise of the load after a reversal": RISES,
@@ -134,7 +154,7 @@ class Bank:
         load = self.surrogate
         now = ("spindle_angle_rad", load, "motor_velocity_rad_s", "motor_acceleration_rad_s2")
         turn = ("motor_travel_rad", "motor_turned_s", fall_of(load), rise_of(load))
-        past = tuple(ago_of(load, ms) for ms in LAGS_MS)
+        past = [ago_of(channel, ms) for channel in (load, now[3]) for ms in LAGS_MS]
         return (*now, *((self.pose,) if self.pose else ()), *turn, *past)
 
     @property
@@ -163,9 +183,24 @@ class Bank:
         return 0 if RIPPLE in self.without else ORDERS
 
     @property
+    def wrist_orders(self) -> int:
+        """Orders of the wrist's series."""
+        return WRIST_ORDERS if self.pose else 0
+
+    @property
     def size(self) -> int:
         """Number of weights."""
-        return len(self.products) + 6 * self.orders
+        return len(self.products) + 6 * self.orders + 2 * WRIST_POWERS * self.wrist_orders
+
+    @cached_property
+    def shape(self) -> Shape:
+        """What a fit must know of the columns."""
+        factors = [len(product) for product in self.products]
+        factors += self.orders * [1, 1, 2, 2, 2, 2]
+        factors += self.wrist_orders * [1 + power for power in range(WRIST_POWERS) for _ in "sc"]
+        stiffness = STIFFER ** (np.array(factors) - 1.0)
+        between = [self.products.index(p) for p in RUNS if p in self.products]
+        return Shape(np.asarray(stiffness), np.array(between))
 
     def design(self, rows: FloatArray) -> FloatArray:
         """Return what the weights multiply, shape (n, size), for rows of channels, (n, channels).
@@ -173,7 +208,14 @@ class Bank:
         A value that is not finite makes its row so.
         """
         design = np.empty((len(rows), self.size))
-        fill(np.ascontiguousarray(rows), LOAD_SCALES[self.surrogate], *self.tables, design)
+        fill(
+            np.ascontiguousarray(rows),
+            LOAD_SCALES[self.surrogate],
+            *self.tables,
+            self.orders,
+            self.wrist_orders,
+            design,
+        )
         return design
 
 
@@ -192,14 +234,16 @@ def fill(
     load_scale: float,
     parents: NDArray[np.int64],
     factors: NDArray[np.int64],
+    orders: int,
+    wrist_orders: int,
     design: FloatArray,
 ) -> None:
-    """Write the products and the ripple of each row of channels."""
-    state = np.zeros(16 + len(LAGS_MS))
-    posed = rows.shape[1] - (JUDGED + 4 + len(LAGS_MS))
+    """Write the products and both series of each row of channels."""
+    lags = len(LAGS_MS)
+    state = np.zeros(16 + 2 * lags)
+    posed = rows.shape[1] - (JUDGED + 4 + 2 * lags)
     since = JUDGED + posed  # the first channel of the turn and the past
     count = len(parents)
-    orders = (design.shape[1] - count) // 6
     for n in range(len(rows)):
         angle, surrogate, speed = rows[n, 0], rows[n, 1], rows[n, 2] / GEAR_RATIO
         load = surrogate / load_scale
@@ -220,20 +264,31 @@ def fill(
         for r in range(2):
             sticking = max(1.0 - travel / (2.0 * r + 2.0), 0.0)
             state[14 + r] = rows[n, since + 3] / load_scale * sticking
-        for lag in range(len(LAGS_MS)):
-            state[16 + lag] = rows[n, since + 4 + lag] / load_scale - 1.0
+        past = rows[n, since + 4 :]
+        for lag in range(lags):
+            state[16 + lag] = past[lag] / load_scale - 1.0
+            state[16 + lags + lag] = past[lags + lag] / ACCELERATION_SCALE_RAD_S2
         out = design[n]
         out[0] = 1.0
         for k in range(1, count):
             out[k] = out[parents[k]] * state[factors[k]]
-        if orders:
-            turn = GEAR_RATIO * RIPPLE_STEP * angle
-            sine, cosine = np.sin(turn), np.cos(turn)
-            s, c = 0.0, 1.0
-            at = count
-            for _ in range(orders):
-                s, c = s * cosine + c * sine, c * cosine - s * sine
-                out[at], out[at + 1] = s, c
-                out[at + 2], out[at + 3] = s * state[1], c * state[1]
-                out[at + 4], out[at + 5] = s * state[2], c * state[2]
-                at += 6
+        at = count
+        turn = GEAR_RATIO * RIPPLE_STEP * angle
+        sine, cosine = np.sin(turn), np.cos(turn)
+        s, c = 0.0, 1.0
+        for _ in range(orders):
+            s, c = s * cosine + c * sine, c * cosine - s * sine
+            out[at], out[at + 1] = s, c
+            out[at + 2], out[at + 3] = s * state[1], c * state[1]
+            out[at + 4], out[at + 5] = s * state[2], c * state[2]
+            at += 6
+        turn = 2.0 * np.pi / WRIST_PERIOD_RAD * angle
+        sine, cosine = np.sin(turn), np.cos(turn)
+        s, c = 0.0, 1.0
+        for _ in range(wrist_orders):
+            s, c = s * cosine + c * sine, c * cosine - s * sine
+            amplitude = 1.0
+            for _ in range(WRIST_POWERS):
+                out[at], out[at + 1] = amplitude * s, amplitude * c
+                amplitude *= state[13]
+                at += 2

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
-from estimation.derived import MOTOR_LOAD
+from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.effects.effect import Effect
 
 JOINTS = range(1, 8)
@@ -42,7 +42,11 @@ _MOTION = {
     "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
 }
 
-_BEHIND_THE_GEAR = _MOTION | {"speed": ("spindle_velocity_rad_s",)}
+_BEHIND_THE_GEAR = _MOTION | {
+    "speed": ("spindle_velocity_rad_s",),
+    # of the jaw, which swings on its cable
+    "acceleration": ("motor_acceleration_rad_s2", "jaw_acceleration_rad_s2"),
+}
 
 CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": _MOTION
@@ -68,8 +72,8 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "cable": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
-        "reading": ("distal_torque_n_m",),
-        "creeping": ("distal_torque_n_m",),
+        "reading": ("distal_torque_n_m", CABLE_LOAD),
+        "creeping": ("distal_torque_n_m", CABLE_LOAD),
         "other_reading": ("motor_current_a",),
         "encoder": ("spindle_angle_rad",),
         "stop": ("jaw_angle_rad",),
@@ -82,7 +86,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
         "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
-        "encoder": ("spindle_angle_rad",),
+        "encoder": ("spindle_angle_rad", CABLE_ANGLE),
         "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION

@@ -10,7 +10,7 @@ learning for instruments of the da Vinci: J. Zhang, N. Yilmaz, U. Tumerdem, P. K
 Research Kit" (2022), where a network of another instrument is trained on with a little data.
 
 The stiffnesses of states were chosen on two instruments of the public data set
-MRDLab/mis-tool-characterization.
+MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryland_L_2.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bank.fitting import Normal, Pool, pull
+from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import rescaled
 from estimation.bank.states import LAGS, Bank
 from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
@@ -34,8 +34,9 @@ Adaptable = BankEstimator | NetworkEstimator
 POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
 
-OUTPUT = 0.1
-"""Stiffness of the weights of a network's output layer."""
+OUTPUT, NODE_SPREAD = 0.1, 0.3
+"""Stiffness of the weights of a network's output layer, and the spread it is relative to: that of a
+logistic node at work. A node that hardly moves in the runs at hand must keep its weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +115,7 @@ def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     if not runs:
         raise NetworkError("There is no closing sample to adapt the estimator with.")
     if isinstance(source, BankEstimator):
-        return _adapted_bank(source, _reduced(source, runs))
+        return adapted_states(source, reduced(source, runs))
     return _adapted_network(source, runs)
 
 
@@ -125,7 +126,7 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
         NetworkError: There is no run, or torch is missing.
     """
     if isinstance(like, BankEstimator):
-        return fit_runs(_reduced(like, runs), like.bank, like.target)
+        return fit_runs(reduced(like, runs), like.bank, like.target)
     rows, truth = (np.concatenate(part) for part in zip(*(r.fitted for r in runs), strict=True))
     nodes = len(like.network.hidden)
     names = (like.network.inputs, like.network.outputs)
@@ -134,7 +135,8 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     return NetworkEstimator(trained.network, like.low_pass)
 
 
-def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
+def reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
+    """Return runs of another instrument as a fit of states takes them."""
     fitted = [run.fitted for run in runs]
     return [
         part
@@ -143,7 +145,8 @@ def _reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidenc
     ]
 
 
-def _adapted_bank(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
+def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEstimator:
+    """Return a state estimator adapted to reduced runs, as `adapted` does."""
     stiff = stiffness(source.bank)
 
     def pulled(part: Sequence[RunEvidence]) -> FloatArray:
@@ -172,7 +175,8 @@ def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> Netw
     prior = np.roll(network.output[0], 1)  # the bias first
     stiff = np.full(len(prior), OUTPUT)
     stiff[0] = 0.0
-    moved = np.roll(pull(normals, prior, Pool.of(normals).spread, stiff), -1)
+    scale = np.full(len(prior), NODE_SPREAD)
+    moved = np.roll(pull(normals, prior, scale, stiff), -1)
     return replace(source, network=replace(network, output=moved[None]), instrument="")
 
 

@@ -55,7 +55,7 @@ class BankEstimator:
         low_pass: Filter of every channel.
     """
 
-    SCHEMA: ClassVar[str] = "rig.bank/2"
+    SCHEMA: ClassVar[str] = "rig.bank/3"
 
     bank: Bank
     target: str
@@ -264,15 +264,15 @@ def fit_runs(
     interval = None
     if len(runs) >= INNER_FOLDS:
         folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
-        settings = settings or chosen(whole, folds)
-        held_out = [solve(whole.without(part), settings)[:, 0] for part in folds]
+        settings = settings or chosen(whole, folds, bank.shape)
+        held_out = [solve(whole.without(part), bank.shape, settings)[:, 0] for part in folds]
         residuals = [
             run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
         ]
         interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
-    weights = solve(whole, settings or Settings())[:, 0]
+    weights = solve(whole, bank.shape, settings or Settings())[:, 0]
     return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
 
 

@@ -107,7 +107,7 @@ def _ints(values: Sequence[int] | np.ndarray) -> str:
 
 
 def _pasts(channels: Sequence[str]) -> list[str]:
-    """Return the measured channels whose last values are kept."""
+    """Return the measured channels and accelerations whose last values are kept."""
     found = [m["name"] + m["unit"] for m in map(AGO.match, channels) if m is not None]
     found += [channel.replace(RISE, "_") for channel in channels if RISE in channel]
     return list(dict.fromkeys(found))
@@ -115,9 +115,20 @@ def _pasts(channels: Sequence[str]) -> list[str]:
 
 def _keep(pasts: Sequence[str], measured: Sequence[str]) -> str:
     return "\n".join(
-        f"    name_keep(&s->past[{k}], s->tick, value[{measured.index(name)}]);"
+        f"    name_keep(&s->past[{k}], s->tick, {_value(name, measured)});"
         for k, name in enumerate(pasts)
     )
+
+
+def _value(channel: str, measured: Sequence[str]) -> str:
+    """Return the expression of a measured channel, a speed or an acceleration."""
+    for suffix, array in ((VELOCITY, "speed"), (ACCELERATION, "acceleration")):
+        angle = channel.replace(suffix, "_angle_rad")
+        if channel.endswith(suffix) and angle in measured:
+            return f"{array}[{measured.index(angle)}]"
+    if channel in measured:
+        return f"value[{measured.index(channel)}]"
+    raise ExportError(f"The channel {channel} cannot be computed in C.")
 
 
 def _channel(
@@ -139,9 +150,7 @@ def _channel(
     def turned() -> str:
         return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
-    if channel in measured:
-        value = f"value[{place(channel)}]"
-    elif channel == GEARBOX:
+    if channel == GEARBOX:
         motor, spindle = place("motor_angle_rad"), place("spindle_angle_rad")
         value = f"value[{motor}] / {GEAR_RATIO} - value[{spindle}]"
     elif channel in windows:
@@ -158,12 +167,8 @@ def _channel(
     elif (past := AGO.match(channel)) is not None:
         ticks = round(1e-3 * int(past["ms"]) * sample_rate_hz)
         value = ago(past["name"] + past["unit"], str(ticks))
-    elif channel.endswith(VELOCITY):
-        value = f"speed[{place(channel.replace(VELOCITY, '_angle_rad'))}]"
-    elif channel.endswith(ACCELERATION):
-        value = f"acceleration[{place(channel.replace(ACCELERATION, '_angle_rad'))}]"
     else:
-        raise ExportError(f"The channel {channel} cannot be computed in C.")
+        value = _value(channel, measured)
     return f"    row[{k}] = (float)({value}); /* {channel} */"
 
 
@@ -202,6 +207,9 @@ def _bank(estimator: BankEstimator) -> str:
         "LIGHTEST": f"{states.LIGHTEST}f",
         "GEAR": f"{GEAR_RATIO}f",
         "TURN": f"{GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
+        "WRIST_ORDERS": str(bank.wrist_orders),
+        "WRIST_POWERS": str(states.WRIST_POWERS),
+        "WRIST_TURN": f"{2 * np.pi / states.WRIST_PERIOD_RAD:.9g}f",
         "POSE": f"row[{states.JUDGED}]" if bank.pose else "0.0f",
         "STATES": str(len(states.STATES)),
         "LAGS": str(len(states.LAGS)),

@@ -104,7 +104,10 @@ static inline name_estimate name_step(name_state *s, const double *measured) {
 """
 
 BANK = """\
-enum { NAME_PRODUCTS = @PRODUCTS@, NAME_ORDERS = @ORDERS@, NAME_WIDTHS = @WIDTH_COUNT@ };
+enum {
+    NAME_PRODUCTS = @PRODUCTS@, NAME_ORDERS = @ORDERS@, NAME_WRIST_ORDERS = @WRIST_ORDERS@,
+    NAME_WIDTHS = @WIDTH_COUNT@
+};
 
 static const uint16_t name_parent[NAME_PRODUCTS] = { @PARENTS@ };
 static const uint8_t name_factor[NAME_PRODUCTS] = { @FACTORS@ };
@@ -131,7 +134,10 @@ static inline name_estimate name_model(const float *row) {
     state[13] = @POSE@;
     for (int r = 0; r < 2; r++)
         state[14 + r] = drive[3] / @LOAD@ * fmaxf(1.0f - travel / (2.0f * r + 2.0f), 0.0f);
-    for (int k = 0; k < @LAGS@; k++) state[16 + k] = past[k] / @LOAD@ - 1.0f;
+    for (int k = 0; k < @LAGS@; k++) {
+        state[16 + k] = past[k] / @LOAD@ - 1.0f;
+        state[16 + @LAGS@ + k] = past[@LAGS@ + k] / @ACCELERATION@;
+    }
     product[0] = 1.0f;
     float total = name_weight[0];
     for (int k = 1; k < NAME_PRODUCTS; k++) {
@@ -146,6 +152,16 @@ static inline name_estimate name_model(const float *row) {
         s = next;
         total += s * (w[0] + w[2] * state[1] + w[4] * state[2]);
         total += c * (w[1] + w[3] * state[1] + w[5] * state[2]);
+    }
+    turn = @WRIST_TURN@ * row[0], sine = sinf(turn), cosine = cosf(turn), s = 0.0f, c = 1.0f;
+    for (int k = 0; k < NAME_WRIST_ORDERS; k++) {
+        float next = s * cosine + c * sine, amplitude = 1.0f;
+        c = c * cosine - s * sine;
+        s = next;
+        for (int power = 0; power < @WRIST_POWERS@; power++, w += 2) {
+            total += amplitude * (w[0] * s + w[1] * c);
+            amplitude *= state[13];
+        }
     }
     float width = 0.0f;
     for (int k = 0; k < NAME_WIDTHS; k++)

@@ -9,9 +9,10 @@ class InstrumentError(EstimationError):
 
 
 def instrument_of(recording: Recording) -> str:
-    """Return the model and serial number of a recording's instrument, empty if not known."""
+    """Return model, serial number and mounting of a recording's instrument, empty if not known."""
     own = recording.instrument
-    return " ".join(part for part in (own.model, own.serial) if part)
+    mounting = own.mounting and f"(mounting {own.mounting})"
+    return " ".join(part for part in (own.model, own.serial, mounting) if part)
 
 
 def require_own(instrument: str, recording: Recording) -> None:

@@ -171,7 +171,11 @@ def read_arrays(path: Path, schema: str) -> dict[str, np.ndarray]:
     """
     arrays, found = _content(path)
     if found != schema:
-        raise NetworkError(f"The file {path} has the layout {found}, not {schema}.")
+        raise NetworkError(
+            f"The file {path} has the layout {found}, not {schema}.",
+            "It is of another kind, or another version of rig wrote it.",
+            "Fit it again: rig fit PATH --model states --out FILE.npz, or --model network.",
+        )
     return arrays
 
 

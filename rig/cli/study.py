@@ -288,7 +288,8 @@ def instruments(
             seed=seed,
             on_row=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    show_result([shown.lead(study)], [shown.table(study)], out, lambda: shown.markdown(study), json)
+    tables = [shown.table(study), shown.drawn_table(study)]
+    show_result([shown.lead(study)], tables, out, lambda: shown.markdown(study), json)
     if json:
         emit_json(study)
 

@@ -12,8 +12,11 @@ import numpy as np
 from estimation.recording import Instrument
 
 FOLDER = re.compile(
-    r"Tool_(?P<tool>\d+)_(?P<model>[A-Za-z]+)_(?P<side>[LR])(?:_(?P<joint>Roll|Pitch)_(?P<step>\d+))?"
+    r"Tool_(?P<tool>\d+)_(?P<model>[A-Za-z]+)_(?P<side>[LR])"
+    r"(?:_(?P<joint>Roll|Pitch)_(?P<step>\d+)|_(?P<mounting>\d+))?"
 )
+"""The number after the side is not explained; the same tool under another number differs in its
+torques by as much as another tool, so it is taken for a mounting."""
 HEADER_TOOL = re.compile(r"tool number (?P<tool>\d+) Lot (?P<lot>\w+(?: \w+)?) with", re.IGNORECASE)
 WRIST_DEG: dict[str, tuple[float, ...]] = {
     "Roll": (-90.0, -45.0, 0.0, 45.0, 90.0),
@@ -77,7 +80,11 @@ def identify(folder: str, stem: str, header: str) -> Identity:
             f"tool {named['tool']} and wins, so the lot is unknown."
         )
     instrument = Instrument(
-        model=named["model"], serial=f"tool {named['tool']}", lot=lot, side=SIDES[named["side"]]
+        model=named["model"],
+        serial=f"tool {named['tool']}",
+        lot=lot,
+        side=SIDES[named["side"]],
+        mounting=named["mounting"],
     )
     return Identity(instrument, conditions, tuple(remarks))
 

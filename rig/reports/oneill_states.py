@@ -33,7 +33,7 @@ def notes(study: StateStudy) -> list[str]:
         f" turn. Nothing looks back further than {TRAVEL_WINDOW_S} s. All closing samples of"
         " held-out runs are scored, against the sensor filtered without lag; live rows have inputs"
         " filtered causally, in fit and in use.",
-        "Which states there are was chosen, out of some 70 sets, with the errors reported here in"
+        "Which states there are was chosen, out of some 150 sets, with the errors reported here in"
         " view: on held-out runs, frequencies and powers of the neutral pose by the command without"
         " lag, and of pitch and roll too. So these rows are somewhat too good; another instrument"
         " is the better judge.",
@@ -77,7 +77,15 @@ def _scaled(row: StateRow | None, value: str = "rmse") -> str:
     if row is None:
         return ""
     number = row.score.rmse if value == "rmse" else getattr(row, value)
-    return f"{SHOWN[row.job.target][2] * number:.2f}"
+    digits = 3 if row.job.target == JAW else 2
+    return f"{SHOWN[row.job.target][2] * number:.{digits}f}"
+
+
+def _worse(row: StateRow | None, first: StateRow) -> str:
+    """Return an error on an unseen condition, and how much worse that is than on unseen runs."""
+    if row is None:
+        return ""
+    return f"{_scaled(row)} ({100 * (row.score.rmse / first.score.rmse - 1):+.0f} %)"
 
 
 def _errors(study: StateStudy, deep: NetworkStudy | None) -> TextTable:
@@ -90,7 +98,8 @@ def _errors(study: StateStudy, deep: NetworkStudy | None) -> TextTable:
         first = by["run-wise"]
         goal = GOALS.get((first.job.pose, first.job.target))
         cells.append([
-            name, _paper_network(first, deep), *(_scaled(by.get(p)) for p in PROTOCOLS),
+            name, _paper_network(first, deep), _scaled(first),
+            *(_worse(by.get(p), first) for p in PROTOCOLS[1:]),
             "" if goal is None else f"{goal:g}", _scaled(first, "run_offset"),
         ])  # fmt: skip
     columns = ["RMSE", "paper's network, runs", "runs", "a frequency (LOFO)"]

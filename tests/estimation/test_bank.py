@@ -1,11 +1,12 @@
 """Estimates from products of physical states: what they are, what they claim, how they adapt."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from estimation.bank.fitting import CHOICES, Normal, Pool, Settings, chosen, solve
+from estimation.bank.fitting import AS_GOOD, CHOICES, Normal, Pool, Settings, Shape, chosen, solve
 from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
 from estimation.campaign import Campaign
 from estimation.derived import ago_of, causal_channels, fall_of, rise_of, zero_phase_channels
@@ -45,30 +46,39 @@ def closing_error(estimator: BankEstimator, run: Recording) -> np.ndarray:
     return np.array([kept["estimate_n_m"] - kept[TARGET], kept["width_n_m"]])
 
 
+@pytest.mark.parametrize("pose", ["", "wrist_roll_rad"])
 @pytest.mark.parametrize("turned_s", [0.2, 0.45, 0.499])
-def test_a_design_is_its_products_of_states_and_a_ripple_in_the_angle(turned_s):
+def test_a_design_is_its_products_of_states_and_its_series_in_the_angle(turned_s, pose):
+    bank, p = Bank("motor_current_a", pose), 0.7 if pose else 0.0
     past = [0.2, 0.21, 0.22, 0.23, 0.24, 0.25, 0.26, 0.27]
-    row = np.array([[-0.2, 0.3, 42.0, 500.0, 2.5, turned_s, 0.05, 0.1, *past]])
+    pushes = [100.0, 200.0, 300.0, 400.0, -100.0, -200.0, -300.0, -400.0]
+    now = [-0.2, 0.3, 42.0, 500.0, *([p] if pose else [])]
+    row = np.array([[*now, 2.5, turned_s, 0.05, 0.1, *past, *pushes]])
     q, c = (-0.2 + 0.5) / 0.5, 0.3 / 0.21 - 1
     v, a, i, d = 42 / 35 - 1, 0.5, 35 / 42, 0.05 / 0.21
     t = 2.5 + 20 * max(turned_s - 0.4, 0) / 0.1  # a turn about to leave the window was long ago
     k = [min(t / r, 1) - 0.5 for r in (1, 2, 3, 4)]
     n = [min(t / (r * 0.3 / 0.21), 1) - 0.5 for r in (1, 2, 3)]
     h = [0.1 / 0.21 * max(1 - t / r, 0) for r in (2, 4)]
-    lags = [load / 0.21 - 1 for load in past]
-    values = [q, c, v, a, i, d, *k, *n, 0.0, *h, *lags]
+    lags = [load / 0.21 - 1 for load in past] + [push / 1000 for push in pushes]
+    values = [q, c, v, a, i, d, *k, *n, p, *h, *lags]
     state = dict(zip(STATES, values, strict=True))
-    design = BANK.design(row)[0]
-    for product, value in zip(BANK.products, design, strict=False):
+    design = bank.design(row)[0]
+    for product, value in zip(bank.products, design, strict=False):
         assert value == pytest.approx(np.prod([state[name] for name in product]), abs=1e-12)
-    turn = 35 * 0.17 * -0.2
-    series = [
-        part * load
-        for order in range(1, BANK.orders + 1)
-        for load in (1.0, c, v)
-        for part in (np.sin(order * turn), np.cos(order * turn))
-    ]
-    np.testing.assert_allclose(design[len(BANK.products) :], series, atol=1e-12)
+
+    def series(orders: int, turn: float, amplitudes: list[float]) -> list[float]:
+        return [
+            amplitude * part
+            for order in range(1, orders + 1)
+            for amplitude in amplitudes
+            for part in (np.sin(order * turn), np.cos(order * turn))
+        ]
+
+    ripple = series(bank.orders, 35 * 0.17 * -0.2, [1.0, c, v])
+    wrist = series(bank.wrist_orders, 2 * np.pi / 3.3 * -0.2, [p**power for power in range(5)])
+    np.testing.assert_allclose(design[len(bank.products) :], ripple + wrist, atol=1e-12)
+    assert len(bank.shape.stiffness) == len(design) == bank.size
 
 
 def test_products_come_after_what_they_are_made_of_and_an_effect_goes_with_all_its_products():
@@ -94,8 +104,11 @@ def test_the_fall_of_a_channel_is_what_it_lacks_to_its_highest_value_of_the_wind
 def test_the_rise_of_a_channel_counts_from_where_the_motor_was_lowest_and_ago_looks_back(runs):
     rise, ago = rise_of("motor_current_a"), ago_of("motor_current_a", 80)
     assert (rise, ago) == ("motor_current_rise_a", "motor_current_80ms_ago_a")
-    for source in (zero_phase_channels, causal_channels):
-        names = [rise, ago, "motor_turned_s", "motor_current_a", "motor_angle_rad"]
+    push = "motor_acceleration_rad_s2"
+    pushed = ago_of(push, 80)
+    assert pushed == "motor_acceleration_80ms_ago_rad_s2"
+    for source in (zero_phase_channels, causal_channels, partial(causal_channels, tracked=True)):
+        names = [rise, ago, "motor_turned_s", "motor_current_a", "motor_angle_rad", push, pushed]
         found = source(runs[0], names)
         current, angle = found["motor_current_a"], found["motor_angle_rad"]
         turns = []
@@ -106,6 +119,8 @@ def test_the_rise_of_a_channel_counts_from_where_the_motor_was_lowest_and_ago_lo
         np.testing.assert_allclose(found["motor_turned_s"][:2000], (places - turns) / 1000)
         np.testing.assert_allclose(found[rise][:2000], current[:2000] - current[turns])
         np.testing.assert_allclose(found[ago][:2000], current[np.maximum(places - 80, 0)])
+        before = found[push][np.maximum(places - 80, 0)]
+        np.testing.assert_allclose(found[pushed][100:2000], before[100:])
 
 
 def test_a_run_s_own_offset_does_not_bend_the_slope():
@@ -116,11 +131,28 @@ def test_a_run_s_own_offset_does_not_bend_the_slope():
         design = np.column_stack([np.ones(400), x])
         runs.append(Normal.of(design, (2 * x + offset)[:, None]))
     plain, mixed = (
-        solve(Pool.of(runs), Settings(ridge=1e-9, offset_share=share))[1, 0]
+        solve(Pool.of(runs), Shape.plain(2), Settings(ridge=1e-9, offset_share=share))[1, 0]
         for share in (0.0, 0.99)
     )
     assert abs(plain - 2) > 1
     assert mixed == pytest.approx(2, abs=0.2)
+
+
+def test_the_means_of_runs_are_fitted_once_more_by_few_weights():
+    draw = np.random.default_rng(0)
+    runs = []
+    for centre in (-2.0, -1.0, 1.0, 2.0):
+        x = centre + draw.normal(size=(400, 1))
+        design = np.column_stack([np.ones(400), x, x**2])
+        runs.append(Normal.of(design, 2 * x + 3 * centre))
+    shape = Shape(np.ones(3), np.array([0, 1]))
+    alone, both = (
+        solve(Pool.of(runs), which, Settings(ridge=1e-9, offset_share=0.99))[:, 0]
+        for which in (Shape.plain(3), shape)
+    )
+    assert alone[1] == pytest.approx(2, abs=0.2)
+    assert both[1] > 3  # the runs' means rise by 5 in 1
+    assert both[2] == alone[2]
 
 
 def test_its_interval_holds_on_a_run_it_has_not_seen(runs):
@@ -155,10 +187,22 @@ def test_another_instrument_is_refused_unless_told(runs):
     foreign = replace(runs[0], instrument=other)
     with pytest.raises(InstrumentError, match="fitted on Maryland 1"):
         fitted.predict(foreign)
+    again = replace(runs[0], instrument=replace(own, mounting="2"))
+    with pytest.raises(InstrumentError, match=r"Maryland 1 \(mounting 2\)"):
+        fitted.predict(again)
     np.testing.assert_array_equal(
         fitted.for_any_instrument().predict(foreign),
         fitted.predict(replace(foreign, instrument=own)),
     )
+
+
+def test_a_file_of_an_older_version_is_told_to_be_fitted_again(fitted, tmp_path, monkeypatch):
+    monkeypatch.setattr(BankEstimator, "SCHEMA", "rig.bank/1")
+    fitted.save(tmp_path / "old.npz")
+    monkeypatch.undo()
+    with pytest.raises(NetworkError, match=r"rig\.bank/1, not rig\.bank/") as refused:
+        load(tmp_path / "old.npz")
+    assert "rig fit" in refused.value.fix
 
 
 def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_path):
@@ -175,6 +219,23 @@ def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_p
     assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
 
 
+def test_a_node_that_hardly_moves_in_the_runs_adapted_with_keeps_its_weight(runs):
+    draw = np.random.default_rng(0)
+    inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[-0.7, -0.2], [0.7, 0.5]])
+    hidden = draw.normal(size=(4, 3))
+    hidden[0] = [1e-3, 0.0, 1.0]  # all but constant
+    target = np.array([[-0.1], [0.4]])
+    source = NetworkEstimator(
+        Network(inputs, (TARGET,), bounds, target, hidden, draw.normal(size=(1, 5)))
+    )
+    found = evidence(source, runs[0])
+    assert found is not None
+    moved = adapted(source, [found])
+    assert isinstance(moved, NetworkEstimator)
+    change = np.abs(moved.network.output - source.network.output)[0]
+    assert change[0] < 0.3 * change.max()
+
+
 def test_settings_are_chosen_by_runs_left_out(runs):
     bank = Bank("motor_current_a")
     recipe = BankRecipe(TARGET, bank)
@@ -186,11 +247,13 @@ def test_settings_are_chosen_by_runs_left_out(runs):
         total = 0.0
         for k in range(3):
             rest = [run.normal for j in range(3) if j != k for run in found[j::3]]
-            weights = solve(Pool.of(rest), settings)[:, 0]
+            weights = solve(Pool.of(rest), bank.shape, settings)[:, 0]
             total += sum(float(np.sum((r.design @ weights - r.truth) ** 2)) for r in found[k::3])
         return total
 
-    assert chosen(whole, folds) == min(CHOICES, key=error)
+    errors = [error(settings) for settings in CHOICES]
+    first = next(k for k, value in enumerate(errors) if value <= AS_GOOD * min(errors))
+    assert chosen(whole, folds, bank.shape) == CHOICES[first]
 
 
 def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, runs):

@@ -42,3 +42,16 @@ def test_the_page_holds_a_row_for_each_choice_of_runs(study):
     page = shown.markdown(study)
     assert "on other" in shown.lead(study)
     assert shown.lead(study) in page
+
+
+def test_every_single_run_and_threes_are_adapted_with(study):
+    one, three = study.drawn
+    assert (one.runs, len(one.rmse_n_m)) == (1, 9)
+    assert (three.runs, len(three.rmse_n_m)) == (3, 40)
+    for row in study.drawn:
+        assert row.rmse_n_m[0] <= row.rmse_n_m[-1] < study.rows[0].result.as_it_is.rmse
+        assert 0 <= row.covered <= 1
+    # the single run of the first row is one of the choices, there scored on every fourth sample
+    wanted = study.rows[0].result.adapted.rmse
+    assert min(abs(error - wanted) for error in one.rmse_n_m) < 0.01 * wanted
+    assert [row[2] for row in shown.drawn_table(study).rows] == ["9", "40"]

@@ -10,6 +10,8 @@ from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
 from rig.studies.oneill_states import StateJob, ablated, run_states
 from tests.estimation.synthetic import campaign
 
+EFFECT = "load of the last 0.5 s"
+
 
 @pytest.fixture(scope="module")
 def study():
@@ -21,7 +23,7 @@ def study():
         kinds = [StateJob("neutral", "current", PROXIMAL, protocol=p) for p in ("run-wise", "lofo")]
         kinds += [StateJob("neutral", "current", JAW, "live")]
         kinds += [StateJob("neutral", "command", t, without=e)
-                  for e in ("", "speed") for t in (PROXIMAL, DISTAL, JAW)]  # fmt: skip
+                  for e in ("", EFFECT) for t in (PROXIMAL, DISTAL, JAW)]  # fmt: skip
         patch.setattr(oneill_states, "jobs", lambda poses: kinds)
         done: list[tuple[int, int]] = []
         found = run_states(
@@ -47,15 +49,15 @@ def test_an_unseen_frequency_is_harder_than_an_unseen_run(study):
 
 def test_what_an_effect_brings_is_seen_by_leaving_it_out(study):
     rows = ablated(study.rows, PROXIMAL)
-    assert set(rows) == {"", "speed"}
-    assert rows[""].score.rmse < rows["speed"].score.rmse
+    assert set(rows) == {"", EFFECT}
+    assert rows[""].score.rmse < rows[EFFECT].score.rmse
 
 
 def test_the_tables_hold_the_rows(study):
     errors, intervals, ablation = shown.tables(study, None)
     assert len(errors.rows) == 5  # three by command, two by current; frequencies in a column
     assert len(intervals.rows) == 6
-    assert [row[0] for row in ablation.rows] == ["nothing", "speed"]
+    assert [row[0] for row in ablation.rows] == ["nothing", EFFECT]
     assert any("No data of experiment 3, pitch" in note for note in shown.notes(study))
     numbers = np.array([[float(cell) for cell in row[1:]] for row in ablation.rows])
     assert np.isfinite(numbers).all()

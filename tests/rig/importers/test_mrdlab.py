@@ -145,6 +145,8 @@ def test_instrument_from_folder_and_header(load):
 def test_the_folder_wins_over_the_header(load):
     recording = load(folder="Tool_5_Maryland_R_2")
     assert (recording.instrument.serial, recording.instrument.side) == ("tool 5", "right")
+    assert recording.instrument.mounting == "2"
+    assert load(folder="Tool_4_Maryland_L_Roll_1").instrument.mounting is None
     assert recording.instrument.lot is None
     assert "names tool 4, lot N10150901 729; the folder names tool 5 and wins" in recording.notes
     assert "check them on this right one" in recording.notes
