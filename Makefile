@@ -45,7 +45,8 @@ BLIND ?=
 blind: $(VENV)/.developing
 	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md $(BLIND)
 
-# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders;
+# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
+# listening sockets;
 # SOAK="soak --virtual 60" for one part or less of it
 SOAK ?=
 soak: $(VENV)/.developing firmware
@@ -65,7 +66,7 @@ firmware:
 	@if command -v $(CXX) >/dev/null 2>&1; then $(MAKE) --no-print-directory -C firmware CXX=$(CXX); \
 	else echo "no C++ compiler ($(CXX)): left out the firmware in the loop" >&2; fi
 
-# the core on an emulated Cortex-M4, held to the contract every driver keeps; optional, and in real time
+# the core on an emulated Cortex-M4, held to the contract every driver keeps; optional
 ARM_CXX ?= arm-none-eabi-g++
 firmware-arm: $(VENV)/.developing
 	@for tool in $(ARM_CXX) qemu-system-arm; do command -v $$tool >/dev/null 2>&1 || { \

@@ -111,7 +111,8 @@ class CalibrationRecord:
         validity: Range and age.
         instrument: Serial number of the instrument it holds for; empty if it holds for any.
         serials: Device to serial number.
-        firmware_hash: Firmware the raw log was made with; empty if none was.
+        firmware_hash: CRC-32 of the sources of the firmware behind the raw log; empty if none was,
+            0 where the board was not built from any.
         raw: Files it was made from.
         code_version: Version of the code that fitted it.
         tared: Whether the zero is measured anew before each run.

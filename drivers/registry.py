@@ -9,11 +9,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from drivers.device import Device
 from drivers.errors import DriverError
 from drivers.transport.faulty import Faults
+
+RateOption = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)]
+"""Type of an option: samples a second."""
+BaudOption = Annotated[int, Field(ge=1200, le=4_000_000)]
+"""Type of an option: bit rate of a serial line."""
 
 DRIVERS = "rig.drivers"
 FAKES = "rig.driver_fakes"
@@ -45,6 +52,7 @@ class Driver:
         name: Short name, as written in a configuration.
         description: One line on the device.
         open: Opens the device by URL; its keyword arguments, all with defaults, are its options.
+            Their annotations, with pydantic's ranges, are what a configuration is held against.
         can: What the device takes of a CAN bus; None where it is not on one.
     """
 

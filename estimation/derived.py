@@ -8,10 +8,12 @@ value was; `X_rise_a` is what the channel `X_a` (any unit) has gained since the 
 lowest, and `X_fall_a` how far it is below its highest value of that window; `X_20ms_ago_a` is its
 value that long ago, `X_acceleration_20ms_ago_rad_s2` that derivative then;
 `gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
-`motor_load_n_m` is the spindle's torque projected from the current; `campaign_time_s` is the time
-since the campaign's first run began, put beside the measured channels by `Campaign.timed`, and live
-the time since the first sample. Offline they come from a zero-phase filter and a noise-robust
-derivative, live from a causal filter and backward differences: the same names, two sources.
+`motor_load_n_m` is the spindle's torque projected from the current, `cable_load_n_m` the same from
+the torque at the jaw, `cable_angle_rad` the jaw's angle from the spindle's and that torque;
+`campaign_time_s` is the time since the campaign's first run began, put beside the measured channels
+by `Campaign.timed`, and live the time since the first sample. Offline they come from a zero-phase
+filter and a noise-robust derivative, live from a causal filter and backward differences: the same
+names, two sources.
 """
 
 import re
@@ -50,6 +52,21 @@ LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 """Regression of proximal torque on current and direction while moving, 49 runs of the public data
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
 
+CABLE_LOAD = "cable_load_n_m"
+"""The spindle's torque as the cable's side knows it, in the same way: nominal ratio times the
+distal torque, and nominal Coulomb friction."""
+
+CABLE_RATIO, CABLE_FRICTION_N_M, CABLE_WIDTH_RAD_S = 2.62, 0.060, 0.15
+"""Regression of proximal on distal torque and direction while moving, runs of the same data."""
+
+CABLE_ANGLE = "cable_angle_rad"
+"""The jaw's angle as the cable's side knows it: nominal ratio times the spindle's angle less the
+distal torque by the nominal stiffness. It stands in for the jaw's encoder where that is the
+target."""
+
+CABLE_TURN, CABLE_YIELD_RAD_N_M = 0.934, 3.56
+"""Regression of the jaw's angle on the spindle's and the distal torque, runs of the same data."""
+
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
 
@@ -86,6 +103,8 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
             needed |= {_plain(name), TURNING}
         elif name == MOTOR_LOAD:
             needed |= {"motor_current_a", "motor_angle_rad"}
+        elif name in (CABLE_LOAD, CABLE_ANGLE):
+            needed |= {"distal_torque_n_m", "spindle_angle_rad"}
         elif name != "time_s":
             needed.add(_differentiated(_now(name))[0])
     return tuple(sorted(needed))
@@ -189,6 +208,13 @@ def _derive(
             channels[name] = (
                 LOAD_N_M_A * filtered["motor_current_a"] - LOAD_FRICTION_N_M * direction
             )
+        elif name == CABLE_LOAD:
+            direction = np.tanh(derivative(filtered["spindle_angle_rad"]) / CABLE_WIDTH_RAD_S)
+            carried = CABLE_RATIO * filtered["distal_torque_n_m"]
+            channels[name] = carried + CABLE_FRICTION_N_M * direction
+        elif name == CABLE_ANGLE:
+            stretch = CABLE_YIELD_RAD_N_M * filtered["distal_torque_n_m"]
+            channels[name] = CABLE_TURN * filtered["spindle_angle_rad"] - stretch
         else:
             channels[name] = differentiated(name)
     return channels

@@ -387,7 +387,11 @@ def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate
 
 
 def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
-    errors = [(run.whole[fitted.target] - estimate(fitted, run.whole))[run.places] for run in runs]
+    targets = [run.whole[fitted.target][run.places] for run in runs]
+    errors = [
+        target - estimate(fitted, run.whole)[run.places]
+        for target, run in zip(targets, runs, strict=True)
+    ]
     samples = sum(len(error) for error in errors)
     squares = sum(float(error @ error) for error in errors)
     centred = sum(float(np.sum((error - error.mean()) ** 2)) for error in errors)
@@ -398,6 +402,7 @@ def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
         rmse_with_means=float(np.sqrt(squares / samples)),
         seed=seed,
         run_spread=_run_spread(fitted, errors),
+        target_range=(float(min(map(np.min, targets))), float(max(map(np.max, targets)))),
     )
 
 

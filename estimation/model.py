@@ -21,7 +21,7 @@ from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED, Samples
 from estimation.units import evaluate
 
-BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw")
+BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw", "jaw_1", "jaw_2")
 """Balance ids of the grasper; besides these, `joint.N` of an arm and `calibration.NAME`."""
 
 
@@ -137,6 +137,9 @@ class Evidence:
         seed: Seed of the bootstrap behind the spreads.
         run_spread: Standard deviation over runs of the logarithm of a run's error, None where a
             single run was fitted or the file does not tell.
+        target_range: Least and greatest value of the target in the fit; None where the file does
+            not tell.
+        made_at: When it was fitted, ISO 8601 with offset from UTC; empty where nobody said.
     """
 
     runs: tuple[str, ...]
@@ -145,6 +148,8 @@ class Evidence:
     rmse_with_means: float
     seed: int
     run_spread: float | None = None
+    target_range: tuple[float, float] | None = None
+    made_at: str = ""
 
 
 @dataclass(frozen=True)

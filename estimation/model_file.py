@@ -19,6 +19,7 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -197,6 +198,10 @@ def _lines(model: Model, within: str = "") -> list[str]:
         ]
         if model.evidence.run_spread is not None:
             lines.append(f"run_spread = {_value(model.evidence.run_spread)}")
+        if model.evidence.target_range is not None:
+            lines.append(f"target_range = {_value(list(model.evidence.target_range))}")
+        if model.evidence.made_at:
+            lines.append(f"made_at = {_value(model.evidence.made_at)}")
     return lines
 
 
@@ -279,4 +284,28 @@ def _evidence(table: Table) -> Evidence:
         rmse_with_means=table.number("rmse_with_means"),
         seed=table.take("seed", int),
         run_spread=table.number("run_spread") if "run_spread" in table.content else None,
+        target_range=_range(table),
+        made_at=_date(table),
     )
+
+
+def _range(table: Table) -> tuple[float, float] | None:
+    if "target_range" not in table.content:
+        return None
+    ends = table.take("target_range", list)
+    if len(ends) != 2 or not all(isinstance(end, int | float) for end in ends):
+        raise ModelFileError(f"{table.where}: target_range is not two numbers.")
+    return float(ends[0]), float(ends[1])
+
+
+def _date(table: Table) -> str:
+    text: str = table.take("made_at", str, "")
+    try:
+        is_date = not text or datetime.fromisoformat(text).tzinfo is not None
+    except ValueError:
+        is_date = False
+    if not is_date:
+        raise ModelFileError(
+            f"{table.where}: made_at = {text!r} is no date, ISO 8601 with offset from UTC."
+        )
+    return text

@@ -1,5 +1,6 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
+import math
 import tomllib
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
@@ -26,6 +28,15 @@ from rig.validation import explain
 SHIPPED = Path(__file__).parent / "configs"
 SIMULATED = SHIPPED / "simulated.toml"
 
+POT_RAD_PER_COUNT = math.radians(300.0) / 4095
+
+
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("a potentiometer of 0 rad a count shows nothing")
+    return value
+
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Torque = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
@@ -33,6 +44,7 @@ Current = Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
 Angle = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Force = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+Turn = Annotated[float, Field(ge=-0.01, le=0.01, allow_inf_nan=False), AfterValidator(_not_zero)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 
 
@@ -200,6 +212,21 @@ class InstrumentSection(_Section):
         return Instrument(**self.model_dump())
 
 
+class MasterSection(_Section):
+    """The master a grasper follows: potentiometers of yaw, pitch and grasp.
+
+    Attributes:
+        url: Where it is, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
+        zero_counts: Counts of the converter at each joint's zero.
+        rad_per_count: Turn of each joint for a count, negative where it is mounted the other way
+            round; a potentiometer of 300 degrees over 12 bits if not said.
+    """
+
+    url: str | None = None
+    zero_counts: tuple[Number, Number, Number] = (2048.0, 2048.0, 2048.0)
+    rad_per_count: tuple[Turn, Turn, Turn] = (POT_RAD_PER_COUNT,) * 3
+
+
 class SimulationSection(_Section):
     """The simulated rig behind a `sim://` logger.
 
@@ -241,6 +268,7 @@ class Config(_Section):
     drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
+    master: MasterSection = MasterSection()
     calibration: str = "reference"
     calibration_store: str | None = None
     serials: dict[str, str] = Field(default_factory=dict)

@@ -1,14 +1,18 @@
 """What a configuration that is well written may still get wrong: drivers, options, CAN buses."""
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 from urllib.parse import parse_qsl
 
+from pydantic import ConfigDict, ValidationError, create_model
+
 from drivers.registry import CanUse, Driver, drivers, fakes
 from rig.config import Config, DeviceSection, LoggerSection, is_simulated
 from rig.errors import UsageError
+from rig.validation import explain
 
 LOGGER = "logger"
 """Name the logger goes under among the devices."""
@@ -67,10 +71,7 @@ def _driver_problems(
     driver = known.get(section.driver)
     if driver is None:
         return [Problem(key, f"There is no driver {section.driver!r}.", _one_of(known))]
-    found = [
-        Problem(key, f"The driver {driver.name} has no option {option!r}.", _one_of(driver.options))
-        for option in sorted(set(section.options) - set(driver.options))
-    ]
+    found = _option_problems(key, driver, section.options)
     if is_simulated(section.url) and driver.name not in fakes():
         what = f"The driver {driver.name} has no fake."
         found.append(Problem(key, what, "Write the url of the device in place of sim://."))
@@ -84,6 +85,21 @@ def _driver_problems(
             )
         )
     return found
+
+
+def _option_problems(key: str, driver: Driver, options: Mapping[str, Any]) -> list[Problem]:
+    """Hold options against the types and ranges of the parameters they become."""
+    parameters = list(inspect.signature(driver.open, eval_str=True).parameters.values())[1:]
+    fields: dict[str, Any] = {
+        p.name: (Any if p.annotation is p.empty else p.annotation, p.default) for p in parameters
+    }
+    rules = ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)
+    try:
+        create_model(driver.name, __config__=rules, **fields).model_validate(options)
+    except ValidationError as error:
+        what = f"Options of the driver {driver.name}: {explain(error, fields)}"
+        return [Problem(key, what, _one_of(fields))]
+    return []
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +179,7 @@ def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
 
 
 def _one_of(names: Mapping[str, Any]) -> str:
-    return f"Choose one of: {', '.join(names)}." if names else "It has no options."
+    return f"Choose from: {', '.join(names)}." if names else "It has no options."
 
 
 def _key(name: str) -> str:

@@ -22,6 +22,7 @@ class ExitCode(IntEnum):
     DATA = 5
     BUG = 70
     INTERRUPTED = 130
+    UNREAD = 141
 
 
 class RigError(Exception):

@@ -15,6 +15,8 @@ from rig.logger import open_logger
 from rig.machines.choose import machine_of
 
 SOURCES = Path(__file__).parents[1] / "firmware"
+STDERR = 2
+"""Where tools say what they do: stdout is for results."""
 BOARDS = ("teensy35", "teensy41", "teensy41-grasper")
 
 
@@ -162,7 +164,7 @@ def _require(tool: str, fix: str) -> None:
 
 
 def _run(command: list[str]) -> None:
-    done = subprocess.run(command, check=False)  # noqa: S603
+    done = subprocess.run(command, check=False, stdout=STDERR)  # noqa: S603
     if done.returncode:
         raise FirmwareToolError(
             f"{command[0]} failed with exit code {done.returncode}.",

@@ -260,8 +260,7 @@ def _new_log(
         zeros_before=_mean_counts(before),
         details={
             "rig_version": __version__,
-            "firmware_version": session.identity.firmware_version,
-            "logger_serial": session.identity.serial,
+            **session.board,
             **_clock_residuals(session),
         },
     )

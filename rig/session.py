@@ -110,6 +110,15 @@ class Session:
         return self._logger.counters.as_dict()
 
     @property
+    def board(self) -> dict[str, str]:
+        """Who the board is, as a log and a calibration keep it."""
+        return {
+            "logger_serial": self.identity.serial,
+            "firmware_version": self.identity.firmware_version,
+            "firmware_build": f"{self.identity.build_hash:08x}",
+        }
+
+    @property
     def spindle_angle_rad(self) -> float:
         """Where the spindle stood in the newest sample, rad."""
         return self.here[0]

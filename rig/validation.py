@@ -24,7 +24,7 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
             message = "there is no such key" + (f"; did you mean {near[0]!r}?" if near else "")
         elif problem["loc"] and isinstance(problem["input"], (int, float)):
             message += f", given {problem['input']}{_unit(str(problem['loc'][-1]))}"
-        sentences.append(f"{path}: {message}.")
+        sentences.append(f"{path}: {message}" + ("" if message.endswith("?") else "."))
     return " ".join(sentences)
 
 

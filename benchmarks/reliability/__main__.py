@@ -1,9 +1,10 @@
 """Measure how reliable the rig is and write the table.
 
-`python -m benchmarks.reliability [soak pty canopen faults kills fuzz] [--virtual S] [--real S]
-[--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's figures are
-kept in `build/reliability.json`, and the table is written from all that are there. A part that was
-not measured in this checkout keeps the rows it has in the table; one that never was says so.
+`python -m benchmarks.reliability [soak pty canopen faults kills network fuzz] [--virtual S]
+[--real S] [--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's
+figures are kept in `build/reliability.json`, and the table is written from all that are there. A
+part that was not measured in this checkout keeps the rows it has in the table; one that never was
+says so.
 """
 
 import argparse
@@ -16,19 +17,21 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reliability import faults, fuzz, kills, soak
+from benchmarks.reliability import faults, fuzz, kills, listening, soak
 from estimation.files import write_text_atomic
 from rig.reports.provenance import Provenance
 
+SEED = 0
 STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
-PARTS = ("soak", "pty", "canopen", "faults", "kills", "fuzz")
+PARTS = ("soak", "pty", "canopen", "faults", "kills", "network", "fuzz")
 OF_PART = {
     "soak": r"firmware core, ",
     "pty": r"firmware process ",
     "canopen": r"EPOS4 fake ",
     "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
     "kills": r"\d+ recorders killed",
+    "network": r"listening ",
     "fuzz": r"fuzzed decoders",
 }
 """How the figures of a part's rows begin."""
@@ -50,9 +53,8 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no part {', '.join(sorted(unknown))}")
     for part in options.parts or PARTS:
-        if part != "fuzz":  # its own command measures it; here it is only told
-            sys.stderr.write(f"{part} ...\n")
-            _keep(part, _MEASURES[part](options))
+        sys.stderr.write(f"{part} ...\n")
+        _keep(part, _MEASURES[part](options))
     earlier = TABLE.read_text() if TABLE.is_file() else ""
     write_text_atomic(TABLE, written(_kept(), earlier))
     sys.stderr.write(f"Written: {TABLE}\n")
@@ -67,7 +69,13 @@ def _kept() -> dict[str, Any]:
 
 def _keep(part: str, figures: dict[str, Any]) -> None:
     STATE.parent.mkdir(exist_ok=True)
-    write_text_atomic(STATE, json.dumps({**_kept(), part: figures}, indent=1) + "\n")
+    write_text_atomic(STATE, json.dumps({**_kept(), part: figures | _made()}, indent=1) + "\n")
+
+
+def _made() -> dict[str, str]:
+    """Return when and from what a part's figures were made."""
+    now = Provenance.now(SEED)
+    return {"made": f"{now.date}, {now.commit}, {now.seed}"}
 
 
 def _faults(options: argparse.Namespace) -> dict[str, Any]:
@@ -110,6 +118,8 @@ _MEASURES = {
     ),
     "faults": _faults,
     "kills": _kills,
+    "network": lambda o: listening.measure(),
+    "fuzz": lambda o: {},  # its own command measures it; here it is only told
 }
 
 
@@ -123,6 +133,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
         "canopen": _soak_rows(figures.get("canopen"), "canopen"),
         "faults": _fault_rows(figures.get("faults")),
         "kills": _kill_rows(figures.get("kills")),
+        "network": _network_rows(figures.get("network")),
         "fuzz": _fuzz_rows(tallies),
     }
     measured = {*figures, *(["fuzz"] if fuzzed else [])}
@@ -130,16 +141,16 @@ def written(figures: dict[str, Any], earlier: str) -> str:
     rows = []
     for part, new in parts.items():
         kept = [] if part in measured else _rows(summary, OF_PART[part])
-        rows += kept or [f"| {a} | {b} | {c} | {d} |" for a, b, c, d in new]
+        made = figures.get(part, {}).get("made", "")
+        rows += kept or [f"| {a} | {b} | {c} | {d} | {made} |" for a, b, c, d in new]
     lines = [
         "# Reliability",
         "",
-        "Written by `make soak` and `make fuzz`; each command writes the rows it measured, and the"
-        " last line is the last command's. The machine was shared with other work; a missed goal is"
-        " said as missed.",
+        "Written by `make soak` and `make fuzz`; each command writes the rows it measured. The"
+        " machine was shared with other work; a missed goal is said as missed.",
         "",
-        "| figure | measured | goal | met |",
-        "|---|---|---|---|",
+        "| figure | measured | goal | met | date, commit, seed |",
+        "|---|---|---|---|---|",
         *rows,
         "",
         "## Fuzzed decoders",
@@ -151,7 +162,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
         "|---|---:|---:|---:|---:|---:|---:|",
         *(_decoder_rows(tallies) if fuzzed else _rows(decoders, r"[^|]*\| \d")),
     ]
-    return "\n".join([*lines, "", Provenance.now(seed=0).line(), ""])
+    return "\n".join([*lines, "", Provenance.now(SEED).line(), ""])
 
 
 def _rows(text: str, begins: str) -> list[str]:
@@ -235,6 +246,28 @@ def _kill_rows(k: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
     met = k["most_lost_s"] <= 0.25 and k["count"] >= 200
     what = f"{k['count']} recorders killed: lost, all files repaired, nothing earlier changed"
     return [_row(what, told, "0.25 s in 200", met)]
+
+
+def _network_rows(n: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
+    if n is None:
+        return [("listening sockets", "not measured", "", "**no**")]
+    unasked, asked = n["unasked"], n["asked"]
+    inside = all(listening.is_loopback(address) for address in asked)
+    rigs = ", ".join(listening.CONFIGS)
+    return [
+        _row(
+            f"listening sockets of `rig live` on {rigs}, and of `rig record`",
+            ", ".join(unasked) or "none",
+            "none",
+            not unasked,
+        ),
+        _row(
+            "listening sockets of `rig live --foxglove`",
+            f"{len(asked)}, {'loopback only' if inside else 'not loopback: ' + ', '.join(asked)}",
+            "1, loopback only",
+            len(asked) == 1 and inside,
+        ),
+    ]
 
 
 def _fuzz_rows(tallies: dict[str, fuzz.Tally]) -> list[tuple[str, str, str, str]]:

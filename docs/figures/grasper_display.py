@@ -1,38 +1,61 @@
 """Draw the live display of the simulated 3-DOF grasper as an SVG, `docs/figures/grasper.svg`.
 
-Run as `python docs/figures/grasper_display.py [TARGET]`.
+Run as `python docs/figures/grasper_display.py [TARGET]`. It is `rig live -c grasper` while the
+grasp is held.
 """
 
 import io
 import re
 import sys
+from contextlib import closing
 from pathlib import Path
 
 from rich.console import Console
 
 from estimation.files import write_text_atomic
-from rig.live.grasper import CHANNELS, master_session
-from rig.live.replay import replay_blocks
+from rig.config import SHIPPED, load_config
+from rig.live.estimator import estimators_of, half_widths_of
+from rig.live.joint_forces import JOINTS, with_joint_forces
+from rig.live.keys import HELP
+from rig.live.model_status import with_model_status
+from rig.live.session_blocks import session_blocks
 from rig.live.state import LiveState
 from rig.live.view import View
+from rig.logger import open_logger
+from rig.machines.choose import machine_of
+from rig.protocol import load_protocol
 
 TARGET = Path(__file__).with_name("grasper.svg")
-SHOWN_S = 5.0
+MODEL = SHIPPED / "simulated_grasper.model.toml"
+HELD_N = 1.0
 
 
 def draw() -> str:
     """Return the display while the grasp is held, as SVG."""
-    state = LiveState(CHANNELS)
-    for block in replay_blocks(master_session(), None, speed=None):
-        state.feed(block)
-        if block.time_s[-1] > SHOWN_S:
-            break
+    config = load_config(Path("grasper"))
+    rate_hz = machine_of(config).profile.rate_hz
+    estimators = estimators_of(MODEL, rate_hz)
+    plans = [plan for plan in load_protocol("grasper").any_plans() if "grasp-hold" in plan.name]
+    blocks = with_model_status(
+        with_joint_forces(session_blocks(config, lambda: open_logger(config), plans, estimators)),
+        [estimator.model for estimator in estimators if estimator.model is not None],
+    )
+    state = LiveState(JOINTS)
+    held = 0
+    with closing(blocks):
+        for block in blocks:
+            state.feed(block)
+            held += bool(block.columns["grasp_force_n"].mean() > HELD_N)
+            if held > 10:
+                break
     console = Console(
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,
         color_system="truecolor",
     )  # fmt: skip
-    console.print(View(state.snapshot(), "rig live: simulated 3-DOF grasper", lever_m=0.01))
-    svg = console.export_svg(title="rig live --grasper", unique_id="grasper")
+    title = f"rig live: {config.name}"
+    known = half_widths_of(estimators)
+    console.print(View(state.snapshot(), title, lever_m=0.01, footer=HELP, half_widths=known))
+    svg = console.export_svg(title="rig live -c grasper", unique_id="grasper")
     # the fonts rich names are fetched from the network; any monospaced one will do
     return re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL)
 

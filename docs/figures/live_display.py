@@ -80,7 +80,7 @@ def draw() -> str:
     """Return the display of the last moment as SVG."""
     recording, estimator = synthetic_recording(), CurrentTimesConstant()
     state = LiveState((estimator.target_channel,))
-    for block in with_devices(replay_blocks(recording, estimator, speed=None)):
+    for block in with_devices(replay_blocks(recording, [estimator], speed=None)):
         state.feed(block)
     console = Console(
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,
@@ -91,7 +91,7 @@ def draw() -> str:
         "rig live, synthetic recording",
         lever_m=0.012,
         footer="t tare  m mark  r record  q leaves",
-        half_width=0.014,
+        half_widths={estimator.target_channel: 0.014},
     )
     console.print(view)
     svg = console.export_svg(title="rig live", unique_id="live")

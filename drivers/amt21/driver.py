@@ -1,15 +1,17 @@
 """The driver of an AMT21: it is asked for every sample, at a steady rate."""
 
 import math
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from drivers.amt21 import protocol
 from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
 from drivers.polling import PollSchedule
-from drivers.registry import Driver
+from drivers.registry import BaudOption, Driver, RateOption
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
@@ -156,10 +158,10 @@ class Amt21:
 
 def open_amt21(
     url: str,
-    address: int = protocol.DEFAULT_ADDRESS,
+    address: Annotated[int, Field(ge=0, le=252, multiple_of=4)] = protocol.DEFAULT_ADDRESS,
     multi_turn: bool = False,
-    rate_hz: float = 200.0,
-    baud_rate: int = 2_000_000,
+    rate_hz: RateOption = 200.0,
+    baud_rate: BaudOption = 2_000_000,
 ) -> Amt21:
     """Open the encoder on a serial adapter.
 

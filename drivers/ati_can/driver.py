@@ -1,10 +1,11 @@
 """The driver of a NETCANOEM: it is asked for every sample, at a steady rate."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drivers.ati_can import protocol
 from drivers.ati_can.wrench import wrench_of
@@ -13,7 +14,7 @@ from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.polling import PollSchedule
-from drivers.registry import CanUse, Driver
+from drivers.registry import CanUse, Driver, RateOption
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 
@@ -249,9 +250,9 @@ class AtiCan:
 
 def open_ati_can(
     url: str,
-    base: int = protocol.DEFAULT_BASE,
-    calibration: int = 0,
-    rate_hz: float = 200.0,
+    base: Annotated[int, Field(ge=0, le=127)] = protocol.DEFAULT_BASE,
+    calibration: Annotated[int, Field(ge=0, le=15)] = 0,
+    rate_hz: RateOption = 200.0,
 ) -> AtiCan:
     """Open the sensor on a CAN bus.
 

@@ -1,9 +1,11 @@
 """The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
 
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drivers.ati_net import protocol
 from drivers.ati_net.sequence import RecordSequence
@@ -185,7 +187,7 @@ class AtiNet:
         return flags
 
 
-def open_ati_net(url: str, rate_hz: float = 1000.0) -> AtiNet:
+def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 1000.0) -> AtiNet:
     """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
 
     Args:

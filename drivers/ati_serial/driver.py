@@ -1,16 +1,18 @@
 """The driver of a digital F/T: its calibration is read and put in force, then it streams."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drivers.ati_net.protocol import AXES, N_M_PER_UNIT, N_PER_UNIT
 from drivers.ati_serial import protocol
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
-from drivers.registry import Driver
+from drivers.registry import BaudOption, Driver, RateOption
 from drivers.sliding import SlidingFrames
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -259,12 +261,12 @@ def _flags(gauges: NDArray[np.int64], bad: NDArray[np.bool_]) -> NDArray[np.uint
 
 def open_ati_serial(
     url: str,
-    calibration: int = 1,
-    rate_hz: float = 7000.0,
-    baud_rate: int = 1_250_000,
+    calibration: Annotated[int, Field(ge=1, le=16)] = 1,
+    rate_hz: RateOption = 7000.0,
+    baud_rate: BaudOption = 1_250_000,
     matrix_by_rows: bool = True,
-    force_unit: int = 0,
-    torque_unit: int = 0,
+    force_unit: Annotated[int, Field(ge=0, le=6)] = 0,
+    torque_unit: Annotated[int, Field(ge=0, le=6)] = 0,
     lock_answers: bool = True,
 ) -> AtiSerial:
     """Open the sensor on an RS-485 adapter, 8 bits, even parity.

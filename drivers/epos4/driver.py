@@ -5,9 +5,10 @@ drive notices and takes its power stage out of force by itself.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
@@ -541,7 +542,10 @@ def _link(bus: CanBus, node_id: int) -> "CanopenLink":
 
 
 def open_epos4(
-    url: str, node_id: int = 1, rate_hz: float = 1000.0, host_timeout_ms: int = 250
+    url: str,
+    node_id: Annotated[int, Field(ge=1, le=126)] = 1,
+    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 1000.0,
+    host_timeout_ms: Annotated[int, Field(ge=0, le=65535)] = 250,
 ) -> Epos4:
     """Open the drive on a CAN bus.
 

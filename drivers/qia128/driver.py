@@ -1,13 +1,16 @@
 """The driver of a QIA128: its calibration is read from it, then it streams."""
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.qia128 import protocol
-from drivers.registry import Driver
+from drivers.registry import BaudOption, Driver, RateOption
 from drivers.sliding import SlidingFrames
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -177,10 +180,10 @@ class Qia128:
 
 def open_qia128(
     url: str,
-    rated_load: float = 1.0,
+    rated_load: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
     unit: str = "1",
-    rate_hz: float = RATE_HZ,
-    baud_rate: int = 320_000,
+    rate_hz: RateOption = RATE_HZ,
+    baud_rate: BaudOption = 320_000,
     serial: str = "",
 ) -> Qia128:
     """Open the amplifier on a serial adapter.

@@ -1,7 +1,9 @@
 """The logger on a CAN bus as a device among others."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from drivers.errors import LinkError
 from drivers.registry import CanUse, Driver
@@ -15,6 +17,10 @@ class TeensyCanDevice(TeensyDevice):
     """The logger's stream over CAN; all else as over USB."""
 
     name = "teensy-can"
+
+
+Identifier = Annotated[int, Field(ge=1, le=0x7FF)]
+"""An 11-bit identifier; 0 is the bus' network management."""
 
 
 def open_can_transport(url: str, host_id: int = HOST_ID, board_id: int = BOARD_ID) -> CanTransport:
@@ -31,7 +37,9 @@ def open_can_transport(url: str, host_id: int = HOST_ID, board_id: int = BOARD_I
     return CanTransport(open_can(url), host_id, board_id)
 
 
-def open_teensy_can(url: str, host_id: int = HOST_ID, board_id: int = BOARD_ID) -> TeensyCanDevice:
+def open_teensy_can(
+    url: str, host_id: Identifier = HOST_ID, board_id: Identifier = BOARD_ID
+) -> TeensyCanDevice:
     """Open the logger on a CAN bus, its inputs in raw counts.
 
     Args:

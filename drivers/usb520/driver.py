@@ -1,11 +1,14 @@
 """The driver of a USB520 in its text mode: it cannot be asked, only listened to."""
 
+from typing import Annotated
+
 import numpy as np
+from pydantic import Field
 
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
-from drivers.registry import Driver
+from drivers.registry import BaudOption, Driver
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
@@ -142,7 +145,11 @@ class Usb520:
         return value, unit
 
 
-def open_usb520(url: str, rate_hz: float = 10.0, baud_rate: int = 115_200) -> Usb520:
+def open_usb520(
+    url: str,
+    rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0,
+    baud_rate: BaudOption = 115_200,
+) -> Usb520:
     """Open the amplifier's virtual serial port.
 
     Args:

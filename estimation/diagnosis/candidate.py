@@ -61,8 +61,17 @@ UNKNOWN = "unknown"
 ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
 """Roles that a wave's order counts the turns of."""
 
+LEAST_PERIODS = 1.2
+"""Periods of a wave that some run must cover, or it is no wave."""
+
 SLOW_TURN = 0.5
 """Share of the usual speed above which a smooth sign of the speed is no sign."""
+
+Spans = Mapping[tuple[str, str], float]
+"""Role and channel to how far runs go there."""
+
+EARLY_KNEE = 0.25
+"""Share of the usual speed below which damping that wears off with the speed is a direction."""
 
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
@@ -118,26 +127,30 @@ class Candidate:
             for p, value in zip(self.effect.shape, self.shape, strict=True)
         )
 
-    def shows(self, spans: Mapping[str, float]) -> bool:
+    def shows(self, spans: Spans) -> bool:
         """Say whether runs show it as what it is, and not as something simpler.
 
-        A wave of which no run covers a period is a slow change with the angle; a direction that
-        takes half of the usual speed to turn round goes with the speed; what fades more slowly than
-        a campaign lasts is a line, or a step.
+        A wave of which no run covers much more than a period is a slow change with the angle; a
+        direction that takes half of the usual speed to turn round goes with the speed, and damping
+        that is worn off long before it with the direction; what fades more slowly than a campaign
+        lasts is a line, or a step.
 
         Args:
-            spans: Channel to the widest range that a run covers, and speeds to the usual fast one.
+            spans: Role and channel to the widest range that a run covers; of a speed the usual fast
+                one.
         """
         shape = {p.name: x for p, x in zip(self.effect.shape, self.shape, strict=True)}
-        channels = dict(self.channels)
+        span = {role: spans[role, channel] for role, channel in self.channels}
         if "order" in shape:
-            angle = next(channels[role] for role in ANGLE_ROLES if role in channels)
-            return shape["order"] * spans[angle] >= 2 * math.pi
-        slow = "width" in shape and "speed" in channels
-        if slow and shape["width"] > SLOW_TURN * spans[channels["speed"]]:
+            angle = next(role for role in ANGLE_ROLES if role in span)
+            return shape["order"] * span[angle] >= LEAST_PERIODS * 2 * math.pi
+        if "width" in shape and "speed" in span and shape["width"] > SLOW_TURN * span["speed"]:
             return False
-        clock = channels.get("campaign_clock")
-        return clock is None or "time" not in shape or shape["time"] <= spans[clock]
+        if "knee" in shape and "speed" in span and shape["knee"] < EARLY_KNEE * span["speed"]:
+            return False
+        if "campaign_clock" not in span or "time" not in shape:
+            return True
+        return shape["time"] <= span["campaign_clock"]
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the signed columns of one whole run, shape (n, amplitudes)."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.candidate import Candidate, Spans
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -152,14 +152,14 @@ def covered(wanted: Sequence[Candidate], runs: Sequence[Run]) -> list[Candidate]
     return [c for c in wanted if c.shows(spans)]
 
 
-def spans_of(wanted: Sequence[Candidate], runs: Sequence[Run]) -> dict[str, float]:
-    """Return the widest range that a run covers of each channel that candidates read.
+def spans_of(wanted: Sequence[Candidate], runs: Sequence[Run]) -> Spans:
+    """Return the widest range that a run covers of each role and channel that candidates read.
 
     Of a speed it is the median over the runs of the 95th percentile of its size, of the campaign's
     clock the campaign's length.
     """
-    of_role = {channel: role for c in wanted for role, channel in c.channels}
-    return {channel: _span(channel, role, runs) for channel, role in of_role.items()}
+    played = {part for c in wanted for part in c.channels}
+    return {(role, channel): _span(channel, role, runs) for role, channel in played}
 
 
 def _span(channel: str, role: str, runs: Sequence[Run]) -> float:

@@ -10,13 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import linalg, stats
 
 from estimation.recording import FloatArray
 
 RIDGE = 1e-9
 """Pull towards zero, a share of a column's power: settles columns that the fitted runs lack."""
 
+
+TOLD_BY_OTHERS = 0.1
+"""A run is scored when of every direction of the base the others hold at least this share."""
 
 FEW = 4
 """Up to so many columns a block, sums over samples are faster than many small matrix products."""
@@ -51,6 +54,9 @@ def leave_one_run_out(
 ) -> Losses:
     """Score every block of columns, each together with the base, on each run left out.
 
+    A run without which the base cannot be told, such as the only one whose load changes, says
+    nothing about a block: it counts alike with and without one.
+
     Args:
         base: Base columns of each run, shape (n, p).
         blocks: Columns of all blocks side by side, shape (n, sum of sizes).
@@ -62,12 +68,27 @@ def leave_one_run_out(
     blocks = _scaled(blocks)
     joint = np.empty((len(base), len(sizes), targets[0].shape[1]))
     alone = _held_out(base, [b[:, :0] for b in base], 0, targets, ridge)
+    deciding = _deciding(base)
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(int) if sizes else np.empty(0, int)
     for size in sorted(set(sizes)):
         which = np.flatnonzero(np.asarray(sizes) == size)
         at = (starts[which][:, None] + np.arange(size)).ravel()
         joint[:, which] = _held_out(base, [b[:, at] for b in blocks], size, targets, ridge)
+    for r, aim in enumerate(targets):
+        if deciding[r]:
+            alone[r] = joint[r] = np.einsum("ns,ns->s", aim, aim)
     return Losses(alone[:, 0], joint)
+
+
+def _deciding(base: Sequence[FloatArray]) -> NDArray[np.bool_]:
+    """Say of each run whether some direction of the base is told by hardly any other."""
+    if not base[0].shape[1]:
+        return np.zeros(len(base), bool)
+    grams = [b.T @ b for b in base]
+    pull = RIDGE * np.eye(base[0].shape[1])
+    whole = np.sum(grams, axis=0) + pull
+    least = [linalg.eigh(whole - g, whole, eigvals_only=True)[0] for g in grams]
+    return np.array(least) < TOLD_BY_OTHERS
 
 
 def _scaled(columns: Sequence[FloatArray]) -> list[FloatArray]:

@@ -27,6 +27,10 @@ ECHO, LARGER = 0.3, 3.0
 """A claim that removes less than this share of its balance's squared error is not told from the
 echo of a cause in another balance that removes so many times its share there."""
 
+SHAKEN = ("inertia.missing", UNKNOWN)
+SHAKEN_ECHO, SHAKEN_LARGER = 0.4, 1.5
+"""The same for what any motion faster than usual shows: parts that move, and what has no name."""
+
 SAME_RATE = 0.03
 """Two waves are one when their periods a turn differ by less than this share."""
 
@@ -63,6 +67,18 @@ class Told:
     story: Story
     place: int
     share: float
+
+    def is_surer_than(self, other: "Told") -> bool:
+        """Say whether it names, better than a finding of another balance, what both show."""
+        mine, others = self.finding, other.finding
+        told = others.family.startswith("sensor.") and _same_sensor(others, mine)
+        if told or self.share < 0.5 * other.share:
+            return False
+        if (mine.verdict == "identified") != (others.verdict == "identified"):
+            return mine.verdict == "identified"
+        if mine.verdict == "identified":
+            return self.share > other.share
+        return (mine.confidence or 0.0) > (others.confidence or 0.0)
 
     def is_cause_of(self, other: "Told") -> bool:
         """Say whether a finding of another balance is told by this one already."""
@@ -149,8 +165,10 @@ def echoes(causes: Sequence[Told]) -> dict[str, set[int]]:
     """
     small: dict[str, set[int]] = {}
     for told in causes:
+        shaken = told.finding.family in SHAKEN
+        most, times = (SHAKEN_ECHO, SHAKEN_LARGER) if shaken else (ECHO, LARGER)
         larger = (c for c in causes if c.finding.balance != told.finding.balance)
-        if told.share < ECHO and any(c.share > LARGER * told.share for c in larger):
+        if told.share < most and any(c.share > times * told.share for c in larger):
             small.setdefault(told.finding.balance, set()).add(told.place)
     return small
 
@@ -161,7 +179,7 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
     # a named fault of a sensor speaks for what other balances only show
     found.sort(
         key=lambda told: (
-            not told.finding.family.startswith("sensor."),
+            told.share < ECHO or not told.finding.family.startswith("sensor."),
             told.finding.rmse_after / max(told.finding.rmse_before, 1e-300),
         )
     )
@@ -170,8 +188,9 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
         for k, first in enumerate(kept):
             shown = (first.finding.balance, *first.finding.also_in)
             if told.finding.balance not in shown and first.is_cause_of(told):
-                also = (*first.finding.also_in, told.finding.balance)
-                kept[k] = replace(first, finding=replace(first.finding, also_in=also))
+                lead = told if told.is_surer_than(first) else first
+                also = tuple(b for b in (*shown, told.finding.balance) if b != lead.finding.balance)
+                kept[k] = replace(lead, finding=replace(lead.finding, also_in=also))
                 break
         else:
             kept.append(told)
@@ -185,17 +204,19 @@ def same_fault(first: Finding, second: Finding) -> bool:
     """
     if not SENSORS.get(first.balance, set()) & SENSORS.get(second.balance, set()):
         return False
-    if first.family.startswith("sensor.") and second.family in (
-        first.family,
-        UNKNOWN,
-        *LIKE.get(first.family, ()),
-    ):
+    if _same_sensor(first, second):
         return True
     rates = sorted(r for r in map(_periods_per_turn, (first, second)) if r is not None)
     if len(rates) < 2:
         return False
     times = rates[1] / rates[0]
     return round(times) <= HARMONICS and abs(times / round(times) - 1) < SAME_RATE
+
+
+def _same_sensor(first: Finding, second: Finding) -> bool:
+    """Say whether a second balance shows, by name or unnamed, the sensor's fault of the first."""
+    alike = (first.family, UNKNOWN, *LIKE.get(first.family, ()))
+    return first.family.startswith("sensor.") and second.family in alike
 
 
 def _periods_per_turn(finding: Finding) -> float | None:

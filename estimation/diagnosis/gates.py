@@ -15,16 +15,26 @@ class Gates:
         most: Effects added to a balance at most.
         surrogates: Number of surrogates.
         rival: A rival has at least this share of the winner's gain.
+        clearly: A rival of other variables is beaten by an effect that leaves less than this share
+            of the error that the rival leaves, both in any form: less may be a matter of how well
+            their regressors are known.
         veto: A map withdraws a name when it leaves at most this share of the name's error.
         form: A map of no other variables than the name's own does so only when the name removes
             less than this share of what the map removes: no formula has the true form.
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
+        near: An effect that passes is taken before one that gains more and does not, when it has at
+            least this share of that gain.
+        some: Least share of squared error removed by what does not help in run after run, for it to
+            be told as something missing.
         kept: Least share of what an effect adds that is left when it is fitted through instruments:
             less, and it is made of the noise of a regressor.
         leftover: Least share that an effect has in what all found in a balance remove together:
             what a name's form leaves of its own cause is no second cause.
+        in_motion: What removes less than this share of the squared error in motion on the confirm
+            runs must not add to that over all samples. At rest friction holds any torque, and what
+            is clear in motion may be wrong there.
         parameters: Named parameters of the whole model at most, or None for no limit.
         akin: Whether an effect may be added beside one that looks alike: where a model must
             predict well rather than be named surely.
@@ -38,12 +48,16 @@ class Gates:
     most: int = 4
     surrogates: int = 199
     rival: float = 0.5
+    clearly: float = 0.97
     veto: float = 0.9
     form: float = 0.8
     sure: float = 0.9
     map_floor: float = 0.2
+    near: float = 0.7
+    some: float = 0.1
     kept: float = 0.5
     leftover: float = 0.15
+    in_motion: float = 0.05
     parameters: int | None = None
     akin: bool = False
     balances: int = 1

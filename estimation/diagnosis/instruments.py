@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.derived import measured_channels
+from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, measured_channels
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.least_squares import least_squares
@@ -22,6 +22,15 @@ SPEED, ACCELERATION, ANGLE = (
     "motor_acceleration_rad_s2",
     "motor_angle_rad",
 )
+NOMINAL = {
+    MOTOR_LOAD: "motor_current_a",
+    CABLE_LOAD: "distal_torque_n_m",
+    CABLE_ANGLE: "distal_torque_n_m",
+}
+"""Channels that stand for the target of their balance by nominal numbers, and the force they are
+made from. A search takes the target as that force and the motion tell it on this rig; as other
+forces tell it, it would hold what the balance lacks."""
+
 FORCES = ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m")
 
 Fit = tuple[tuple[str, ...], FloatArray]
@@ -47,13 +56,39 @@ def projection(runs: Sequence[Run], pool: Sequence[Candidate], target: str) -> C
         target: The balance's target, which is no instrument.
     """
     wanted = {name for c in pool for role, name in c.channels if role in c.effect.projected_roles}
-    fits = {name: fit for name in sorted(wanted) if (fit := fitted(runs, name, target))}
+    found = {name: fitted(runs, name, target) for name in sorted(wanted)}
+    fits = {projected(name): fit for name, fit in found.items() if fit}
 
     def added(run: Run) -> Run:
-        new = {projected(name): as_told(run, fit) for name, fit in fits.items()}
+        new = {name: as_told(run, fit) for name, fit in fits.items()}
         return replace(run, channels={**run.channels, **new})
 
     return added
+
+
+def stand_in(runs: Sequence[Run], target: str) -> Callable[[Run], Run]:
+    """Return what puts the target, as its own force tells it on this rig, in a nominal one's place.
+
+    Args:
+        runs: Runs it is fitted on, with the channels of `instruments`.
+        target: The balance's target.
+    """
+    nominal = next((n for n in NOMINAL if n in runs[0].channels), None)
+    fit = fitted(runs, target, target, NOMINAL[nominal]) if nominal else None
+    if nominal is None or fit is None:
+        return lambda run: run
+    level = _level(runs, fit, target)
+
+    def put(run: Run) -> Run:
+        return replace(run, channels={**run.channels, nominal: as_told(run, fit) + level})
+
+    return put
+
+
+def _level(runs: Sequence[Run], load: Fit, target: str) -> float:
+    """Return how much higher the target is than its projection, which has no zero of its own."""
+    above = [(run.channels[target] - as_told(run, load))[run.kept] for run in runs]
+    return float(np.mean(np.concatenate(above)))
 
 
 def as_told(run: Run, fit: Fit) -> FloatArray:
@@ -62,24 +97,27 @@ def as_told(run: Run, fit: Fit) -> FloatArray:
     return instrument_columns(run.channels, forces) @ weights
 
 
-def fitted(runs: Sequence[Run], name: str, target: str) -> Fit | None:
+def fitted(runs: Sequence[Run], name: str, target: str, force: str | None = None) -> Fit | None:
     """Fit a channel's projection; None where there is nothing to project it on.
+
+    In place of a nominal load, which is off by the friction that is looked for, the target is
+    projected, on what that load is not made from.
 
     Args:
         runs: Runs with the channels of `instruments`.
         name: The channel.
         target: The balance's target, which is no instrument.
+        force: The only force to project on; None for all that are neither channel nor target.
     """
     there = set.intersection(*(set(run.channels) for run in runs))
     own = {name, *measured_channels([name]), target}
-    forces = tuple(f for f in FORCES if f in there and f not in own)
+    forces = tuple(f for f in FORCES if f in there and f not in own and force in (f, None))
     if not {SPEED, ACCELERATION, ANGLE} <= there or not forces:
         return None
     columns, aims = [], []
     for run in runs:
-        table = np.column_stack([instrument_columns(run.channels, forces), run.channels[name]])[
-            run.kept
-        ]
+        aim = run.channels[target if name in NOMINAL else name]
+        table = np.column_stack([instrument_columns(run.channels, forces), aim])[run.kept]
         table -= table.mean(axis=0)
         columns.append(table[:, :-1])
         aims.append(table[:, -1])

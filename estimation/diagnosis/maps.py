@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.derived import measured_channels
+from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, measured_channels
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
@@ -47,7 +47,7 @@ PROJECTED = {
 model's estimate stands in, since a sensor held against its own residual finds its own noise."""
 
 SPEEDS = ("spindle_velocity_rad_s", "jaw_velocity_rad_s")
-LOADS = ("proximal_torque_n_m", "distal_torque_n_m", "motor_load_n_m")
+LOADS = ("proximal_torque_n_m", "distal_torque_n_m", MOTOR_LOAD, CABLE_LOAD)
 
 BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",), "cable": ("current",)}
 """Variables that reach a balance only through its load, and would stand for that load; and the
@@ -143,7 +143,7 @@ def variables_of(effect: Candidate, balance: Balance) -> tuple[str, ...]:
     # of two on one channel the last but history
     by_channel = {channel: name for name, channel in known.items() if name != "history"}
     by_channel |= dict.fromkeys(SPEEDS, "velocity") | dict.fromkeys(LOADS, "load")
-    by_channel["jaw_angle_rad"] = "jaw_angle"
+    by_channel |= dict.fromkeys(("jaw_angle_rad", CABLE_ANGLE), "jaw_angle")
     for _, channel in effect.channels:
         if "_drive_" in channel:  # a motor behind the coupling of an arm's wrist
             by_channel[channel] = "motor_angle" if channel.endswith("_angle_rad") else "velocity"

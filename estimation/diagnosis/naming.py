@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.evidence import Losses, leave_one_run_out, resampled, runs_agree
+from estimation.diagnosis.evidence import Losses, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map, variables_of, within
+from estimation.diagnosis.rivals import beaten, better, rivals_of, tried
 from estimation.diagnosis.search import Search, Trial
 from estimation.recording import FloatArray
 
@@ -55,36 +56,42 @@ def searched(search: Search) -> Discovery:
     """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
     found, trials, steps, ranking = search.forwards()
     kept = search.backwards(found)
-    named = [_named(search, [found[j] for j in kept], k, trials[j]) for k, j in enumerate(kept)]
+    stay = [found[j] for j in kept]
+    for k in range(len(stay)):
+        others = [f for j, f in enumerate(stay) if j != k]
+        stay[k] = _better(search, stay[k], others) or stay[k]
+    named = [_named(search, stay, k, trials[j]) for k, j in enumerate(kept)]
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
     left = best_map(search.balance, terms, search.gates.draws, search.seed)
     return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
 
 
+def _better(search: Search, named: Candidate, others: Sequence[Candidate]) -> Candidate | None:
+    mine = search.beside([named, *others], range(1 + len(others)), 0)
+    rivals = rivals_of(search, others, named, float(mine.gain[0, 0]))
+    return better(search, tried(search, others, named), rivals, others)
+
+
 def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> Named:
     """Ask what else an effect could be, how sure its name is, and whether a map does better."""
     others = [f for j, f in enumerate(found) if j != k]
     mine = search.beside(found, range(len(found)), k)
-    own, gain = mine.joint[:, 0, 0], float(mine.gain[0, 0])
-    rivals: dict[str, FloatArray] = {}
-    for rival in search.ranked(others, 0):
-        if rival.family == found[k].family or len(rivals) == 8:
-            continue
-        if rival.gain >= 0.8 * search.gates.rival * gain:
-            best = _polished(search, others, rival.candidates[0])
-            if not best.is_limit:
-                rivals[rival.family] = _losses_beside(search, others, best)
-    total = mine.base[:, 0]
-    near = {
-        family: losses
-        for family, losses in rivals.items()
-        if 1 - losses.sum() / total.sum() >= search.gates.rival * gain
-        and runs_agree(losses, own) > search.gates.agree
-    }
+    total, gain = mine.base[:, 0], float(mine.gain[0, 0])
+    own = tried(search, others, found[k])
+    rivals = rivals_of(search, others, found[k], gain)
+    near = [
+        r
+        for r in rivals
+        if 1 - r.losses.sum() / total.sum() >= search.gates.rival * gain
+        and runs_agree(total, r.losses) <= search.gates.agree
+        and not beaten(search, own, r)
+    ]
+    near.sort(key=lambda r: float(r.losses.sum()))
+    wins = _wins(own.losses, [r.losses for r in rivals], search.seed)
     terms = [*search.balance.terms, *others]
     flat = best_map(search.balance, terms, 0, search.seed)
-    better = (
+    withdrawn = (
         flat is not None
         and flat.variables != found[k].effect.any_function_of
         and _vetoes(search, flat, mine)
@@ -94,28 +101,10 @@ def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> 
         found[k],
         trial,
         gain,
-        tuple(sorted(near, key=lambda f: float(near[f].sum()))),
-        _wins(own, list(rivals.values()), search.seed) * (1 - trial.p) * (1 - trial.agree),
-        flat if better else None,
+        tuple(r.candidate.family for r in near),
+        wins * (1 - trial.p) * (1 - trial.agree),
+        flat if withdrawn else None,
     )
-
-
-def _polished(search: Search, others: Sequence[Candidate], rival: Candidate) -> Candidate:
-    """Return a rival at its own best shape."""
-    if not rival.shape:
-        return rival
-    return search.balance.refined([*search.balance.terms, *others, rival], passes=1)[-1]
-
-
-def _losses_beside(search: Search, others: Sequence[Candidate], rival: Candidate) -> FloatArray:
-    """Return the losses of each run left out with a rival in the winner's place."""
-    terms = [*search.balance.terms, *others]
-    block = search.balance.columns([rival])
-    aims = [r[:, None] for r in search.balance.left(terms)]
-    base = search.balance.base(terms)
-    joint = leave_one_run_out(base, block, [block[0].shape[1]], aims).joint
-    losses: FloatArray = joint[:, 0, 0]
-    return losses
 
 
 def _of_its_form(search: Search, named: Candidate, gain: float, flat: Map) -> bool:

@@ -15,7 +15,7 @@ from estimation.diagnosis.balance import Balance, lay_out
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Mapper, Run, prepare, tables
 from estimation.diagnosis.evidence import leave_one_run_out
-from estimation.diagnosis.instruments import projection
+from estimation.diagnosis.instruments import projection, stand_in
 from estimation.model import Model
 from estimation.recording import Recording
 
@@ -113,8 +113,8 @@ def largest_fall(
         seed: Seed of the twin.
     """
     runs = [coarse(prepare(recording, channels, model)) for recording in twin(seed)]
-    told = projection(runs, pool, model.target)
-    balance: Balance = lay_out(model, [told(run) for run in runs])
+    told, standing = projection(runs, pool, model.target), stand_in(runs, model.target)
+    balance: Balance = lay_out(model, [told(standing(run)) for run in runs])
     table = tables(balance.runs, pool, balance.demean)
     aims = [r[:, None] for r in balance.left(balance.terms)]
     sizes = [len(c.effect.amplitudes) for c in pool]

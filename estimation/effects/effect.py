@@ -69,7 +69,11 @@ class Effect(ABC):
             whose noise the columns could take out of a residual. A model that runs reads them.
         confused_with: Ids of effects that look alike when the excitation is poor.
         told_apart_by: The experiment that tells them apart.
+        same_as: Families that only that experiment tells from it: where both read the same
+            channels, each is named with the other beside it.
         other_below: Shape parameters at whose lower bound it turns into another effect.
+        bends: Roles along which another form than the equation's may be the true one: names are
+            compared with forms that bend there.
         any_function_of: Variables of which any function, whatever its form, is this effect: a map
             of them is no other name.
         at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
@@ -84,8 +88,10 @@ class Effect(ABC):
     projected_roles: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    same_as: ClassVar[tuple[str, ...]] = ()
     at_rest: ClassVar[bool] = False
     other_below: ClassVar[tuple[str, ...]] = ()
+    bends: ClassVar[tuple[str, ...]] = ()
     any_function_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:

@@ -28,6 +28,8 @@ class Capstan(Pointwise):
         ),
     )
     confused_with = ("friction.load", "friction.position")
+    same_as = ("friction.load",)  # what its two directions differ by is within the ratio
+    bends = ("load",)
     told_apart_by = "the same motion at another angle of wrap, such as another pose of the wrist"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -21,6 +21,7 @@ class Drag(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("drag", "target / speed / speed", "loss at one rad/s", lower=0.0),)
     confused_with = ("friction.viscous", "sensor.delay")
+    bends = ("speed",)
     told_apart_by = "a staircase of constant speeds up to the highest"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -24,6 +24,8 @@ class LoadFriction(Pointwise):
         Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
     )
     confused_with = ("friction.position", "friction.capstan", "friction.load_viscous")
+    same_as = ("friction.capstan",)
+    bends = ("load",)
     told_apart_by = "the same motion against two stiffnesses, and free"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

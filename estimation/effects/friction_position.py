@@ -29,6 +29,7 @@ class PositionFriction(Pointwise):
         Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
     )
     confused_with = ("friction.load", "friction.capstan", "spring.position")
+    bends = ("position",)
     told_apart_by = "a slow sweep without load, in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -27,6 +27,7 @@ class Stribeck(Pointwise):
         Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
     )
     confused_with = ("friction.coulomb", "hysteresis.presliding", "sensor.delay")
+    bends = ("speed",)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -25,6 +25,7 @@ class ViscousAsymmetry(Pointwise):
         ),
     )
     confused_with = ("friction.coulomb_asymmetry", "friction.drag")
+    bends = ("speed",)
     told_apart_by = "a staircase of constant speeds in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -2,15 +2,28 @@
 
 from typing import ClassVar
 
+import numba
+
 from estimation.effects.effect import Parameter, Remembering
 from estimation.effects.hysteresis_bouc_wen import walk_loop
+from estimation.effects.transmission_relaxation import SETTLED
+from estimation.recording import FloatArray
+
+
+@numba.njit(cache=True)
+def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Walk; the state is that of `walk_loop`."""
+    if not state[0]:
+        state[0], state[1] = 1.0, shape[2] * now[0, 0]
+    walk_loop(now, shape, state, rows)
 
 
 class Twist(Remembering):
     """What wires that rub on each other keep back of a cable's or a shaft's deflection.
 
     Equation: deflection lost = F z; dz / d load = (1 - |z|^n (1 + sign(z d load)) / 2) / reach,
-    n being the sharpness, z = 0 at the start.
+    n being the sharpness. A run starts as loaded in one go from settled times its first load,
+    where z = 0.
 
     Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with
     beta = gamma, the load in the place of the deflection.
@@ -24,8 +37,9 @@ class Twist(Remembering):
     shape = (
         Parameter("reach", "load", "load from the loop's middle to its end", 1e-3, 1.0, points=9),
         Parameter("sharpness", "1", "how sharp its corners are", 1.0, 4.0, points=3),
+        SETTLED,
     )
-    walk = walk_loop
+    walk = _walk
     rest = (0.0, 0.0, 0.0)
     confused_with = ("hysteresis.presliding", "transmission.backlash", "transmission.relaxation")
     told_apart_by = "loads that swell and shrink slowly, and the same ten times slower"

@@ -14,7 +14,13 @@ class Inertia(Proportional):
     """
 
     id = "inertia.missing"
-    balances: ClassVar = {"motor": -1, "gearbox": -1, "cable": 1, "grasp": -1, "joint": 1}
+    balances: ClassVar = {
+        "motor": -1,
+        "gearbox": -1,
+        "cable": 1,
+        "grasp": -1,
+        "joint": 1,
+    }
     roles: ClassVar = {"acceleration": "motor_acceleration_rad_s2"}
     amplitudes = (Parameter("inertia", "target / acceleration", "moment of inertia", lower=0.0),)
     confused_with = ("sensor.delay", "sensor.lag")

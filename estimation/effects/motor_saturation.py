@@ -24,6 +24,7 @@ class Saturation(Pointwise):
     )
     shape = (Parameter("knee", "current", "current at which the magnet saturates", 0.05, 5.0),)
     confused_with = ("sensor.gain_nonlinear", "friction.load")
+    bends = ("current",)
     told_apart_by = "stall at several currents of both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -11,14 +11,17 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
-from estimation.derived import MOTOR_LOAD
+from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.effects.effect import Effect
 
 JOINTS = range(1, 8)
 """Joints of the arm that may act on one another."""
 
 AXES = ("grasp", "pitch", "yaw")
-"""Axes of a wristed grasper, each with a motor of its own."""
+"""Axes of a wristed grasper, as what is done with them shows them."""
+
+MOTORS = ("yaw", "jaw_1", "jaw_2")
+"""The same grasper's axes as its motors turn them."""
 
 ANGLES = ("position", "travel", "motor_angle", "output_angle", "encoder", "stop", "tilt")
 """Roles that the angle of an axis plays where it has no other encoder."""
@@ -39,7 +42,11 @@ _MOTION = {
     "other_angle": ("wrist_pitch_rad", "wrist_roll_rad"),
 }
 
-_BEHIND_THE_GEAR = _MOTION | {"speed": ("spindle_velocity_rad_s",)}
+_BEHIND_THE_GEAR = _MOTION | {
+    "speed": ("spindle_velocity_rad_s",),
+    # of the jaw, which swings on its cable
+    "acceleration": ("motor_acceleration_rad_s2", "jaw_acceleration_rad_s2"),
+}
 
 CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": _MOTION
@@ -65,8 +72,8 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "cable": _BEHIND_THE_GEAR
     | {
         "load": ("distal_torque_n_m",),
-        "reading": ("distal_torque_n_m",),
-        "creeping": ("distal_torque_n_m",),
+        "reading": ("distal_torque_n_m", CABLE_LOAD),
+        "creeping": ("distal_torque_n_m", CABLE_LOAD),
         "other_reading": ("motor_current_a",),
         "encoder": ("spindle_angle_rad",),
         "stop": ("jaw_angle_rad",),
@@ -79,7 +86,7 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "reading": ("distal_torque_n_m", "spindle_angle_rad"),
         "creeping": ("distal_torque_n_m",),
         "other_reading": ("proximal_torque_n_m", "motor_current_a"),
-        "encoder": ("spindle_angle_rad",),
+        "encoder": ("spindle_angle_rad", CABLE_ANGLE),
         "stop": ("spindle_angle_rad",),
     },
     "grasp": _MOTION
@@ -145,7 +152,7 @@ def _moving(position: str, velocity: str, acceleration: str) -> Mapping[str, tup
 
 def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
     """Return the roles in the balance of one axis of a wrist, from its own motor's current."""
-    others = [other for other in AXES if other != axis]
+    others = [other for other in (AXES if axis in AXES else MOTORS) if other != axis]
     current, angle = f"{axis}_current_a", f"{axis}_angle_rad"
     return _MOTION | {
         "speed": (f"{axis}_velocity_rad_s",),
@@ -173,7 +180,7 @@ def _known(kind: str, number: str) -> list[Mapping[str, tuple[str, ...]]]:
         if number in PARTS:
             return [CHANNELS[PARTS[number]]]
         return [_ENCODER if number == "encoder" else _SENSOR]
-    if kind not in AXES:
+    if kind not in (*AXES, *MOTORS):
         return [CHANNELS[kind]]
     own = _of_axis(kind)
     if kind not in CHANNELS:
@@ -233,7 +240,7 @@ def _side(effect: Effect, kind: str, number: str) -> int | None:
         return effect.balances.get(PARTS[number])
     if kind == "calibration":
         return (OF_ENCODER if number == "encoder" else OF_SENSOR).get(effect.id)
-    if kind in AXES:  # an axis of the wrist is like the grasp unless stated
+    if kind in (*AXES, *MOTORS):  # an axis of the wrist is like the grasp unless stated
         return effect.balances.get(kind, effect.balances.get("grasp"))
     return effect.balances.get(kind)
 

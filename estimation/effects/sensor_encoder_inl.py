@@ -12,9 +12,9 @@ class EncoderNonlinearity(Pointwise):
     """An encoder off its centre (order 1), a tilted magnet (2), unequal phases (4, or its lines).
 
     Equation: error = a sin(order angle) + b cos(order angle). In the balances of angles only: the
-    motor's or the spindle's encoder in the gearbox's, the spindle's in the stretch's. The jaw's own
-    encoder is the target there, and the waves of an angle add up to the angle itself; its error
-    shows over the spindle's angle, its order times the ratio of the two.
+    motor's or the spindle's encoder in the gearbox's, the spindle's or the jaw's in the stretch's.
+    The jaw's own encoder is the target there, and the waves of an angle add up to the angle itself,
+    so its error is taken over what spindle and load say of that angle.
 
     Source: integral non-linearity of magnetic angle encoders by harmonics of the turn, as their
     makers' data sheets give it.

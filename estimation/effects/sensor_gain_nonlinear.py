@@ -31,6 +31,7 @@ class NonlinearGain(Pointwise):
         "spring.position",
         "sensor.creep",
     )
+    bends = ("reading",)
     told_apart_by = "reference weights over the sensor's whole range, both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -27,10 +27,17 @@ def walk_lag(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatA
                 share = gone / part if part > 0.0 else 1.0
                 state[3 + k] = state[3 + k] * (1.0 - gone) + change * share
                 time *= SLOWER
+        else:
+            for k in range(rows.shape[1]):
+                state[3 + k] = (1.0 - shape[1]) * load
         state[0], state[1], state[2] = 1.0, clock, load
         for k in range(rows.shape[1]):
             rows[i, k] = state[3 + k]
 
+
+SETTLED = Parameter(
+    "settled", "1", "share of the first load that it has settled under", 0, 1, linear=True, points=2
+)
 
 SLOWER = 8.0
 """Ratio of the times of neighbouring elements of a Prony series."""
@@ -39,7 +46,8 @@ SLOWER = 8.0
 class Relaxation(Remembering):
     """The standard linear solid: what a cable has not yet yielded of its final deflection.
 
-    Equation: deflection lost = c (load - x); dx/dt = (load - x) / time, x = load at the start.
+    Equation: deflection lost = c (load - x); dx/dt = (load - x) / time, x = settled times the load
+    at the start: a run may begin soon after its load has come.
 
     Source: the standard linear solid of Zener 1948.
     """
@@ -50,7 +58,10 @@ class Relaxation(Remembering):
     amplitudes = (
         Parameter("compliance", "target / load", "compliance that comes with time", lower=0.0),
     )
-    shape = (Parameter("time", "clock", "time after which 63 % of it has come", 0.02, 30.0),)
+    shape = (
+        Parameter("time", "clock", "time after which 63 % of it has come", 0.02, 30.0),
+        SETTLED,
+    )
     walk = walk_lag
     rest = (0.0, 0.0, 0.0, 0.0)
     confused_with = ("hysteresis.presliding", "sensor.creep", "sensor.drift", "sensor.lag")

@@ -3,14 +3,14 @@
 from typing import ClassVar
 
 from estimation.effects.effect import Parameter, Remembering
-from estimation.effects.transmission_relaxation import walk_lag
+from estimation.effects.transmission_relaxation import SETTLED, walk_lag
 
 
 class Prony(Remembering):
     """Two terms of a Prony series.
 
     Equation: deflection lost = sum c_k (load - x_k); dx_k/dt = (load - x_k) / time_k,
-    x_k = load at the start, time_2 = 8 time_1.
+    x_k = settled times the load at the start, time_2 = 8 time_1.
 
     Source: the generalised Maxwell model (Wiechert 1893), its relaxation as a Prony series.
     """
@@ -23,7 +23,7 @@ class Prony(Remembering):
         Parameter("fast", "target / load", "compliance that comes soon", lower=0.0),
         Parameter("slow", "target / load", "compliance that comes later", lower=0.0),
     )
-    shape = (Parameter("time", "clock", "time of the faster part", 0.02, 5.0, points=9),)
+    shape = (Parameter("time", "clock", "time of the faster part", 0.02, 5.0, points=9), SETTLED)
     walk = walk_lag
     rest = (0.0, 0.0, 0.0, 0.0, 0.0)
     confused_with = ("hysteresis.presliding", "sensor.creep", "sensor.drift", "sensor.lag")

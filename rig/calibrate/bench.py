@@ -113,10 +113,7 @@ class RigBench:
             instrument=self._config.instrument.identity(),
             calibrations={session.calibrations.name: session.calibrations.content_hash},
         )
-        details: dict[str, float | str] = {
-            "firmware_version": str(session.identity.firmware_version),
-            "logger_serial": session.identity.serial,
-        }
+        details: dict[str, float | str] = {**session.board}
         counts = np.concatenate([reading.counts for reading in readings])
         return Measurement(recording, counts, details)
 

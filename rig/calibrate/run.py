@@ -85,7 +85,7 @@ def keep(
             validity=Validity(result.low, result.high, signature.days),
             instrument=signature.instrument,
             serials=signature.serials,
-            firmware_hash=str(details.get("firmware_version", "")),
+            firmware_hash=str(details.get("firmware_build", "")),
             raw=raw,
             code_version=__version__,
             tared=result.tared,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import console, emit_json, progress, to_json
+from rig.cli.output import emit_json, progress, results, to_json
 
 
 def adapt(
@@ -45,7 +45,7 @@ def adapt(
             seed=seed,
             on_run=lambda run: bar.advance(task),
         )
-    screen = console()
+    screen = results(str(json) == "-")
     screen.print(to_rich(shown.table(result)))
     if out is not None:
         new.save(out)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
@@ -82,7 +82,7 @@ def add(
     kept = _store(store)
     hashes = {record.channel: kept.add(record) for record in made}
     for name, digest in hashes.items():
-        console().print(f"{digest}  {name}", markup=False)
+        results(json).print(f"{digest}  {name}", markup=False)
     if json:
         emit_json({"store": kept.folder, "added": hashes})
 
@@ -93,7 +93,7 @@ def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     kept = _store(store)
     active = {record.content_hash for record in kept.active().values()}
     records = kept.records()
-    screen = console()
+    screen = results(json)
     screen.print(f"Store {kept.folder}", markup=False)
     for r in records:  # lines, not a table: a terminal would cut the hashes off
         mark = "*" if r.content_hash in active else " "
@@ -124,12 +124,12 @@ def show(
 
     found = _store(store).get(record)
     for name, value in _flat(found).items():
-        console().print(f"{name}: {value}", markup=False)
+        results(json).print(f"{name}: {value}", markup=False)
     if figure is not None:
         if not found.figure_svg:
             raise UsageError(f"The record {found.content_hash} has no figure.")
         write_text_atomic(figure, found.figure_svg)
-        console().print(f"Figure: {figure}", markup=False)
+        results(json).print(f"Figure: {figure}", markup=False)
     if json:
         emit_json({"hash": found.content_hash, "record": found})
 
@@ -146,9 +146,9 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
         if left.get(name) != right.get(name)
     }
     for name, change in changes.items():
-        console().print(f"{name}: {change['first']} -> {change['second']}", markup=False)
+        results(json).print(f"{name}: {change['first']} -> {change['second']}", markup=False)
     if not changes:
-        console().print("The two are the same record.")
+        results(json).print("The two are the same record.")
     if json:
         emit_json({"first": a.content_hash, "second": b.content_hash, "changes": changes})
 
@@ -166,7 +166,7 @@ def use(
     chosen = kept.use(record, _now(), by)
     old = before.get(chosen.key)
     was = old.content_hash if old else None
-    console().print(
+    results(json).print(
         f"{chosen.channel}: {chosen.content_hash} in place of {was or 'none'}.", markup=False
     )
     if json:
@@ -203,9 +203,9 @@ def check(
         verdicts += _range_verdicts(log, active)
     for v in verdicts:
         word = "error" if v.is_error else "warning"
-        console().print(f"{word}: {v.channel} {v.record}: {v.message} ({v.rule})", markup=False)
+        results(json).print(f"{word}: {v.channel} {v.record}: {v.message} ({v.rule})", markup=False)
     bad = any(v.is_error for v in verdicts)
-    console().print(f"{len(active)} active, {len(verdicts)} remarks.")
+    results(json).print(f"{len(active)} active, {len(verdicts)} remarks.")
     if json:
         emit_json({"store": kept.folder, "ok": not bad, "verdicts": verdicts})
     return int(bad)
@@ -228,7 +228,7 @@ def diagnose(
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
-    screen = console()
+    screen = remarks()
     asked = of_calibration(declared_by_record(_store(store).get(record)))
     looks = Ledger(ledger or default_ledger())
     done = run_diagnosis(
@@ -238,6 +238,7 @@ def diagnose(
         seed=seed,
         on_stage=lambda what: screen.print(f"{what} ..."),
     )
+    screen = results(json)
     for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
         screen.print(line, markup=False)
     if json:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.procedure import Operator, Procedure, Step
@@ -263,7 +263,7 @@ def _measure(procedure: "Procedure", settings: "Config", how: Keeping) -> list[A
     from rig.calibrate.bench import RigBench
     from rig.logger import open_logger
 
-    screen = console()
+    screen = remarks()
     operator: Operator
     if settings.is_simulated:
         from rig.calibrate.hands import SimulatedHands
@@ -279,7 +279,11 @@ def _measure(procedure: "Procedure", settings: "Config", how: Keeping) -> list[A
     def tell(step: "Step", number: int, total: int) -> None:
         screen.print(f"{number + 1}/{total} {step.name}", markup=False)
 
-    return carry_out(procedure, operator, bench, tell)
+    try:
+        return carry_out(procedure, operator, bench, tell)
+    except KeyboardInterrupt:
+        screen.print("\nStopped; the rig is safe and nothing was kept.")
+        raise
 
 
 class Asking:
@@ -302,9 +306,11 @@ class Asking:
         from calibration.procedure import AbortedError
 
         if step.instruction:
-            console().print(step.instruction, markup=False)
+            screen = remarks()
+            screen.print(step.instruction, markup=False)
+            screen.print("Enter when done, q to stop: ", end="")
             try:
-                answer = input("Enter when done, q to stop: ")
+                answer = input()
             except EOFError:
                 answer = "q"
             if answer.strip().lower().startswith("q"):
@@ -374,7 +380,7 @@ def _now() -> str:
 
 
 def _show(kept: "Kept", how: Keeping) -> None:
-    screen = console()
+    screen = results(how.json)
     for digest, record in kept.records.items():
         screen.print(f"{digest}  {record.channel} from {record.input}", markup=False)
         deviations = [row[k] ** 0.5 for k, row in enumerate(record.fit.covariance)]

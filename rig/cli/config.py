@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 config_app = typer.Typer(
     name="config",
@@ -31,12 +31,12 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
 
     settings = load_config(path)
     found = problems(settings)
-    screen = console()
+    screen = results(json)
     for problem in found:
         screen.print(f"{problem.key}: {problem.what}\n  fix: {problem.fix}", markup=False)
     if not found:
         screen.print(
-            f"{settings.name} is sound: the logger and {len(settings.devices)} further devices."
+            f"{settings.name} is sound. The logger and further devices: {len(settings.devices)}."
         )
     if json:
         emit_json({"name": settings.name, "sound": not found, "problems": found})
@@ -66,4 +66,4 @@ def list_(json: JsonFlag = False) -> None:
         emit_json({"folder": SHIPPED, "configs": found})
         return
     for name, rig in found.items():
-        console().print(f"{name:12} {rig}", markup=False)
+        results(json).print(f"{name:12} {rig}", markup=False)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
     from rig.demo import Demo
@@ -31,8 +31,7 @@ def demo(
     now = datetime.now()
     chosen = seed if seed is not None else int(now.timestamp()) % 1000
     folder = out or Path("logs") / f"demo-{now:%Y-%m-%d-%H%M%S}"
-    screen = console()
-    screen.print(f"rig demo, seed {chosen}: everything goes to {folder}", markup=False)
+    remarks().print(f"rig demo, seed {chosen}: everything goes to {folder}", markup=False)
     total = sum(plan.target_angle_rad.size for plan in load_protocol(PROTOCOL).plans())
     with progress() as bar:
         task = bar.add_task("samples", total=total)
@@ -43,10 +42,11 @@ def demo(
             bar.update(task, completed=sum(done.values()), description=name)
 
         result = run_demo(
-            folder, chosen, lambda text: screen.print(f"- {text}", markup=False), count
+            folder, chosen, lambda text: bar.console.print(f"- {text}", markup=False), count
         )
+    shown = results(json)
     for line in _told(result):
-        screen.print(line, markup=False)
+        shown.print(line, markup=False)
     if json:
         emit_json(result.to_json())
 

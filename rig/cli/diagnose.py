@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import console, emit_json, plain
+from rig.cli.output import emit_json, plain, remarks, results
 
 
 def diagnose(
@@ -63,7 +63,7 @@ def diagnose(
     from rig.reports.provenance import Provenance
     from rig.reports.render import write_report
 
-    screen = console()
+    working = remarks()
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_)
         done = run_diagnosis(
@@ -73,10 +73,11 @@ def diagnose(
             seed=seed,
             executor=executor,
             quick=quick,
-            on_stage=lambda what: screen.print(f"{what} ..."),
+            on_stage=lambda what: working.print(f"{what} ..."),
         )
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
+    screen = results(json_ == Path("-"))
     for line in sentences(done.diagnosis):
         screen.print(line, markup=False)
     for note in done.diagnosis.notes:

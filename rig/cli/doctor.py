@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 ConfigOption = Annotated[
     Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
@@ -21,7 +21,7 @@ def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
     from rig.doctor.examine import examine
     from rig.doctor.finding import Level, worst
 
-    screen = console()
+    screen = results(json)
     found = []
     for finding in examine(load_config(config)):
         found.append(finding)
@@ -53,7 +53,7 @@ def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
             {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
         )
         return
-    screen = console()
+    screen = results(json)
     for port in ports:
         where = f"usb:{port.usb}" if port.usb else "not on USB"
         screen.print(f"port        {port.path}  {where}  {port.name}", markup=False)
@@ -67,11 +67,14 @@ def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
         screen.print(f"driver      {name:12}{text}", markup=False)
 
 
-def udev() -> None:
+def udev(json: JsonFlag = False) -> None:
     """Print the udev rules that give you the rig's devices; the first lines say how to install."""
     from rig.doctor.udev import udev_rules
 
-    typer.echo(udev_rules(), nl=False)
+    if json:
+        emit_json({"rules": udev_rules()})
+    else:
+        typer.echo(udev_rules(), nl=False)
 
 
 def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:
@@ -85,7 +88,7 @@ def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     settings = load_config(config)
     refuse_problems(settings)
-    screen = console()
+    screen = results(json)
     done = []
     for check in checks(settings):
         done.append(check)

@@ -5,13 +5,14 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import console
+from rig.cli.output import JsonFlag, emit_json, results
 
 
 def export(
     model: Annotated[Path, typer.Argument(help="Estimator of rig fit or rig adapt, .npz.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The header, such as grip.h.")],
     rate: Annotated[float, typer.Option(help="Rate at which it will be called, Hz.")] = 1000.0,
+    json: JsonFlag = False,
 ) -> None:
     """Write an estimator as a self-contained C header, for firmware."""
     from estimation.estimator import load
@@ -29,4 +30,6 @@ def export(
             "Fit one: rig fit PATH --model states --out FILE.npz.",
         )
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
-    console().print(f"Header: {out}", markup=False)
+    results(json).print(f"Header: {out}", markup=False)
+    if json:
+        emit_json({"header": out})

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
@@ -30,7 +30,7 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     settings = load_config(config)
     versions = compare(settings)
-    screen = console()
+    screen = results(json)
     screen.print(f"program   {versions.program}", markup=False)
     screen.print(f"sources   {versions.sources}", markup=False)
     screen.print(f"board     {versions.board}", markup=False)
@@ -42,19 +42,23 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
 
 @firmware_app.command()
-def build(board: BoardOption = "") -> None:
+def build(board: BoardOption = "", json: JsonFlag = False) -> None:
     """Build the firmware: for the simulated rig, or with --board for a Teensy."""
     from rig.firmware import build as make
     from rig.firmware import build_for
 
     where = build_for(board) if board else make()
-    console().print(f"Built {where}.", markup=False)
+    results(json).print(f"Built {where}.", markup=False)
+    if json:
+        emit_json({"built": where})
 
 
 @firmware_app.command()
-def flash(board: BoardOption = "teensy41") -> None:
+def flash(board: BoardOption = "teensy41", json: JsonFlag = False) -> None:
     """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
     from rig.firmware import flash as write
 
     write(board)
-    console().print("Flashed. Next: rig firmware version", markup=False)
+    results(json).print("Flashed. Next: rig firmware version", markup=False)
+    if json:
+        emit_json({"flashed": board})

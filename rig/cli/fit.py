@@ -1,14 +1,16 @@
 """`rig fit`: fit a declared model on a campaign."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
+    from estimation.cross_validation import HeldOutError
+    from estimation.model import Model
 
 
 STATE_NODES, THINNED = 12, 24
@@ -39,7 +41,7 @@ def fit_states(
     kept = campaign.evidence
     estimator = recipe.fit(campaign)
     error = held_out_score(recipe, kept, min(folds, len(kept)), seed) if len(kept) > 1 else None
-    screen = console()
+    screen = results(json_)
     if error is not None:
         screen.print(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
@@ -62,7 +64,7 @@ def fit_network(
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
     estimator = recipe.fit(campaign)
-    screen = console()
+    screen = results(json_)
     screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
     if out is not None:
         estimator.save(out)
@@ -101,15 +103,19 @@ def fit(
     ] = None,
     json_: JsonFlag = False,
 ) -> None:
-    """Fit a declared model on all runs and report its error on runs it was not fitted on."""
+    """Fit a declared model on all runs and report its error on runs it was not fitted on.
+
+    `--model grasper` fits the force at each axis of a 3-DOF grasper, in one file.
+    """
     from estimation import model_file
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
     from rig.importers.registry import open_campaign
+    from rig.live.estimator import models_in_use
     from rig.reports.first_look import parameter_table
     from rig.reports.table import to_rich
 
-    screen = console()
+    screen = results(json_)
     campaign = open_campaign(path, format_)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
@@ -117,32 +123,56 @@ def fit(
     if model == "network":
         fit_network(campaign, target, surrogate, seed, out, json_)
         return
-    declared = model_file.read(Path(model))
-    fitted = fit_model(declared, campaign, seed=seed)
-    error = held_out_error(declared, campaign, folds=min(folds, len(campaign.evidence)), seed=seed)
-    screen.print(to_rich(parameter_table(fitted)))
-    screen.print(
-        f"{fitted.target} on {error.runs} runs not fitted on: rmse {error.rmse:.4g} {fitted.unit},"
-        f" {error.rmse_with_means:.4g} with each run's mean left in."
-    )
+    models = models_in_use(Path(model))
+    folds = min(folds, len(campaign.evidence))
+    done = []
+    with progress() as bar:
+        task = bar.add_task("fits", total=2 * len(models))
+        for declared in models:
+            bar.update(task, description=declared.name)
+            fitted = _dated(fit_model(declared, campaign, seed=seed))
+            bar.advance(task)
+            done.append((fitted, held_out_error(declared, campaign, folds=folds, seed=seed)))
+            bar.advance(task)
+    for fitted, error in done:
+        screen.print(to_rich(parameter_table(fitted)))
+        screen.print(
+            f"{fitted.target} on {error.runs} runs not fitted on:"
+            f" rmse {error.rmse:.4g} {fitted.unit},"
+            f" {error.rmse_with_means:.4g} with each run's mean left in."
+        )
     if out is not None:
-        model_file.write(fitted, out)
+        model_file.write_all([fitted for fitted, _ in done], out)
         screen.print(f"Model: {out}", markup=False)
     if json_:
-        parameters = [
-            {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, fitted.target)}
-            | {"estimate": term.values[p.name]}
-            for term in fitted.terms
-            for p in term.parameters
-        ]
-        emit_json(
-            {
-                "model": fitted.name,
-                "target": fitted.target,
-                "unit": fitted.unit,
-                "parameters": parameters,
-                "evidence": fitted.evidence,
-                "held_out": error,
-                "out": out,
-            }
-        )
+        told = [_told(fitted, error, out) for fitted, error in done]
+        emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
+
+
+def _dated(model: "Model") -> "Model":
+    """Return a fitted model with the time of its fit."""
+    from dataclasses import replace
+    from datetime import UTC, datetime
+
+    assert model.evidence is not None  # noqa: S101  a fit leaves its evidence
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return replace(model, evidence=replace(model.evidence, made_at=now))
+
+
+def _told(model: "Model", error: "HeldOutError", out: Path | None) -> dict[str, Any]:
+    """Return what a machine is told of a fit."""
+    parameters = [
+        {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}
+        | {"estimate": term.values[p.name]}
+        for term in model.terms
+        for p in term.parameters
+    ]
+    return {
+        "model": model.name,
+        "target": model.target,
+        "unit": model.unit,
+        "parameters": parameters,
+        "evidence": model.evidence,
+        "held_out": error,
+        "out": out,
+    }

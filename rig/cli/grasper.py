@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 
 grasper_app = typer.Typer(
     name="grasper",
@@ -37,7 +37,7 @@ def designs(json: JsonFlag = False) -> None:
         for design in found
     ]
     columns = ["gears", "sun/carrier", "driven", "d2/d1", "area", "extra stages", "remark"]
-    console().print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
+    results(json).print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
     if json:
         emit_json({"designs": found, "most_compact": best})
 
@@ -52,7 +52,11 @@ def record(
     seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
     json: JsonFlag = False,
 ) -> None:
-    """Record the simulated grasper, all joints moving at once, one log a run."""
+    """Record the simulated wrist, its joints coupled as it was built, one log a run.
+
+    All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
+    the simulated grasper, with its board in the loop.
+    """
     from rig.log.convert import write_recording
     from rig.simulation.wrist_plant import Wrist, wrist_campaign
 
@@ -63,7 +67,7 @@ def record(
         for recording in wrist_campaign(Wrist(pulley_ratio), seed, runs):
             logs.append(write_recording(out / f"{recording.name}.mcap", recording))
             bar.update(task, advance=1, description=recording.name)
-    console().print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
+    results(json).print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
     if json:
         emit_json({"folder": out, "logs": logs})
 
@@ -76,12 +80,13 @@ def follow(
     ] = None,
     master: Annotated[
         str | None,
-        typer.Option(help="Where the master is, such as usb:16c0:0483; simulated if none."),
+        typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
     ] = None,
     duration: Annotated[float, typer.Option(min=0.5, help="How long, s.")] = 10.0,
     scale: Annotated[
         float, typer.Option(min=0.01, max=2, help="Angle of a joint for an angle of the master.")
     ] = 0.3,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
     json: JsonFlag = False,
 ) -> None:
     """Send the three motors where the master goes, within the limits of the configuration.
@@ -92,11 +97,10 @@ def follow(
     from rig.config import load_config
     from rig.config_check import refuse_problems
     from rig.grasper.following import follow_master
-    from rig.live.grasper import master as chief_of
 
     settings = load_config(config or Path("grasper"))
     refuse_problems(settings)
-    screen = console()
+    screen = results(json)
     with progress() as bar:
         task = bar.add_task("following", total=duration)
 
@@ -104,9 +108,9 @@ def follow(
             bar.update(task, completed=time_s)
 
         try:
-            axes = follow_master(settings, master, chief_of(), duration, scale, show)
+            axes, log = follow_master(settings, master, duration, scale, out, show)
         except KeyboardInterrupt:
-            screen.print("Stopped; the grasper is safe.")
+            remarks().print("Stopped; the grasper is safe.")
             raise
     for moved in axes:
         screen.print(
@@ -115,5 +119,6 @@ def follow(
             f"force up to {moved.largest_force_n:.2f} N",
             markup=False,
         )
+    screen.print(f"Log: {log}", markup=False)
     if json:
-        emit_json({"config": settings.name, "duration_s": duration, "axes": axes})
+        emit_json({"config": settings.name, "duration_s": duration, "axes": axes, "log": log})

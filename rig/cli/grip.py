@@ -5,7 +5,10 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
+
+REACHED_RATIO = 0.1
+"""The mean estimate of the second half is this near to the torque, as a share of it."""
 
 
 def grip(
@@ -23,7 +26,7 @@ def grip(
 
     The rig moves: the jaw goes to and fro a little against its load motor. Exit code 1 when the
     sensor, which nothing is controlled by, is further from the torque than the estimate's interval,
-    or the load motor cannot give that torque.
+    or the torque was not reached: the load motor cannot give it, or the time was too short.
     """
     import numpy as np
 
@@ -41,7 +44,7 @@ def grip(
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
     estimator = ModelEstimator(path, SAMPLE_RATE_HZ)
-    screen = console()
+    screen = results(json)
     held = []
     with Session(settings, open_logger(settings)) as session:
         for period in hold_grip(session, estimator, torque, duration):
@@ -55,9 +58,12 @@ def grip(
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
     allowed = estimator.half_width
-    is_reached = late[-1].load_a < most_a
-    if not is_reached:
+    has_load = late[-1].load_a < most_a
+    is_reached = has_load and abs(estimate_n_m - torque) <= REACHED_RATIO * torque
+    if not has_load:
         screen.print(f"The load is at its most, {most_a:g} A: the torque was not reached.")
+    elif not is_reached:
+        screen.print(f"The torque was not reached in {duration:g} s; give it a longer --duration.")
     agrees = allowed is None or abs(sensor_n_m - torque) <= allowed
     shown = "unknown" if allowed is None else f"{allowed * 1e3:.1f} mN m"
     screen.print(

@@ -1,11 +1,11 @@
-"""`rig live`: grip torque in the terminal."""
+"""`rig live`: grip torque, or the forces of a grasper, in the terminal."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console
+from rig.cli.output import JsonFlag, results
 
 
 def live(
@@ -32,17 +32,13 @@ def live(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder of recordings that a key starts.")
     ] = Path("logs"),
-    grasper: Annotated[
-        bool,
-        typer.Option("--grasper", help="The simulated 3-DOF grasper: grasp, pitch, yaw force."),
-    ] = False,
     foxglove: Annotated[
         bool, typer.Option("--foxglove", help="Also serve it to Foxglove, on this computer only.")
     ] = False,
     foxglove_port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 8765,
     json_: JsonFlag = False,
 ) -> int:
-    """Show grip torque, estimate against sensor, as the rig measures it.
+    """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
     A simulated rig plays a first look unless told otherwise; a real rig is never moved
     without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
@@ -50,8 +46,10 @@ def live(
     """
     from rig.config import load_config
     from rig.config_check import refuse_problems
-    from rig.live.estimator import ModelEstimator
+    from rig.live.estimator import estimators_of, half_widths_of, shown_channels
+    from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
+    from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
@@ -61,8 +59,6 @@ def live(
     from rig.machines.choose import machine_of
     from rig.protocol import load_protocol
 
-    if grasper:
-        return _show_grasper(duration, pace, plain, json_)
     settings = load_config(config)
     refuse_problems(settings)
     machine = machine_of(settings)
@@ -70,45 +66,34 @@ def live(
         protocol = machine.first_look(settings)
     plans = load_protocol(protocol).any_plans() if protocol else []
     model_path = model or settings.model_path
-    estimator = ModelEstimator(model_path, machine.profile.rate_hz) if model_path else None
+    estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
+    models = [estimator.model for estimator in estimators if estimator.model is not None]
     with pressed_keys() as keys:
         blocks = session_blocks(
             settings,
             lambda: open_logger(settings, pace=pace or None),
             plans,
-            estimator,
+            estimators,
             keys or no_keys,
             out,
         )
-        if estimator is not None and estimator.model is not None:
-            blocks = watched(blocks, estimator.model)
+        blocks = with_joint_forces(blocks)
+        if models:
+            blocks = with_model_status(blocks, models)
+        if len(models) == 1:
+            blocks = watched(blocks, models[0])
         if foxglove:
             from rig.live.foxglove import published
 
             blocks = published(blocks, foxglove_port)
         options = ShowOptions(
             title=f"rig live: {settings.name}",
-            channels=(estimator.target_channel,) if estimator else machine.shown,
+            channels=shown_channels(estimators, machine.shown),
             lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
             plain=plain,
             json=json_,
-            half_width=estimator.half_width if estimator else None,
+            half_widths=half_widths_of(estimators),
             footer=HELP if keys else "Ctrl-C leaves",
         )
-        show(until(blocks, duration), options, console())
-    return 0
-
-
-def _show_grasper(duration: float | None, pace: float, plain: bool, json: bool) -> int:
-    from rig.live.grasper import CHANNELS, master_session
-    from rig.live.options import ShowOptions
-    from rig.live.replay import replay_blocks
-    from rig.live.run import show
-    from rig.live.until import until
-
-    blocks = replay_blocks(master_session(), None, speed=pace or None)
-    options = ShowOptions(
-        title="rig live: simulated 3-DOF grasper", channels=CHANNELS, plain=plain, json=json
-    )
-    show(until(blocks, duration), options, console())
+        show(until(blocks, duration), options, results(json_))
     return 0

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
@@ -111,7 +111,7 @@ def export(
         emit_json({"written": written, "calibrations": names})
     else:
         for target in written:
-            console().print(f"wrote {target}")
+            results(json).print(f"wrote {target}")
 
 
 def _other_calibrations(
@@ -144,7 +144,7 @@ def _other_calibrations(
         rows = log.topics[COUNTS].rows
         verdicts = [v for r in found for v in judge_range(r, rows[r.input])]
         for verdict in refuse_errors(verdicts):
-            console().print(f"{verdict.channel}: {verdict.message}", markup=False)
+            remarks().print(f"{verdict.channel}: {verdict.message}", markup=False)
     return made
 
 
@@ -197,7 +197,7 @@ def _described(log: "LogFile") -> dict[str, Any]:
 def _show_info(log: dict[str, Any]) -> None:
     from rich.table import Table
 
-    screen = console()
+    screen = results(json=False)
     run, end = log["run"], log["end"]
     screen.print(f"{log['path']}  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
     if run is not None:
@@ -232,7 +232,7 @@ def _date(started_at_ns: int | None) -> str:
 
 
 def _show_report(report: "LogReport") -> None:
-    screen = console()
+    screen = results(json=False)
     screen.print(f"{report.verdict.value:10}  {report.path}")
     for topic in report.topics:
         screen.print(f"  {topic.topic}: {topic.received} of {topic.expected} samples")
@@ -248,7 +248,7 @@ def _show_report(report: "LogReport") -> None:
 
 
 def _show_repair(report: "RepairReport") -> None:
-    screen = console()
+    screen = results(json=False)
     if report.repaired is None:
         screen.print(f"{report.original} is not damaged; nothing was written.")
         return

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 
 
 def loop(
@@ -50,7 +50,7 @@ def loop(
 
     if not sim:
         raise UsageError("The loop moves the simulated rig only.", fix="Type `rig loop --sim`.")
-    screen = console()
+    screen = results(json)
     now = datetime.now()
     number = seed if seed is not None else int(now.timestamp()) % 1000
     hidden = chosen(hide, number)
@@ -58,7 +58,7 @@ def loop(
         simulation={"seed": number, "hidden": hidden, "plant": "declared"}
     )
     folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
-    screen.print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
+    remarks().print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
     first = load_protocol(protocol) if protocol else None
     made: list[Round] = []
     with engine(workers, scheduler) as executor, progress() as bar:
@@ -76,16 +76,18 @@ def loop(
             seed=number,
             executor=executor,
             quick=quick,
-            on_stage=lambda text: screen.print(f"- {text}", markup=False),
+            on_stage=lambda text: bar.console.print(f"- {text}", markup=False),
             on_progress=count,
         ):
             made.append(one)
+            bar.stop()
             for line in sentences(one.done.diagnosis):
                 screen.print(line, markup=False)
             report = folder / f"round-{one.number}"
             where = write_report(report / "diagnosis.html", page(one.done, Provenance.now(number)))
             screen.print(f"Report: {where}", markup=False)
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
+            bar.start()
     told = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
     screen.print(f"What was hidden: {told or 'nothing'}.", markup=False)
     if json:

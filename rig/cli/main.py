@@ -90,11 +90,15 @@ def main(arguments: list[str] | None = None) -> int:
         result = app(args=words, standalone_mode=False)
     except typer.Exit as stop:
         return stop.exit_code
+    except SystemExit:  # how typer and rich leave when the reader of stdout has left
+        return 141
     except KeyboardInterrupt:
         sys.stderr.write("Interrupted.\n")
         return 130
     except Exception as error:
         return _report(error, words)
+    if result == 130:  # what typer makes of Ctrl-C
+        sys.stderr.write("Interrupted.\n")
     return int(result) if isinstance(result, int) else 0
 
 

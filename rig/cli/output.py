@@ -1,4 +1,7 @@
-"""What the command line writes: one JSON object on stdout for machines, the rest on stderr."""
+"""What the command line writes: results on stdout, progress, remarks and errors on stderr.
+
+With `--json` stdout carries JSON alone, and what a result says to people goes to stderr.
+"""
 
 import json
 import math
@@ -17,20 +20,38 @@ if TYPE_CHECKING:
 
     from rig.reports.table import TextTable
 
+PIPE_WIDTH = 240
+"""Columns of a table where nobody's window limits it."""
+
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
 
 
-def console() -> "Console":
-    """Return the console for people: it writes to stderr."""
+def results(json: bool) -> "Console":
+    """Return the console for results: stdout, or stderr where stdout carries JSON.
+
+    A pipe has no width: tables keep their columns there.
+    """
+    from rich.console import Console
+
+    screen = Console(stderr=json, highlight=False, soft_wrap=True)
+    if not screen.is_terminal:
+        screen.width = PIPE_WIDTH
+    return screen
+
+
+def remarks() -> "Console":
+    """Return the console for progress and remarks: stderr."""
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def progress() -> "Progress":
-    """Return a progress bar on stderr; silent where stderr is not a terminal."""
-    from rich.console import Console
+    """Return a progress bar on stderr, silent where that is no terminal.
+
+    What is said while it runs goes through its `console`, which prints above it.
+    """
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -39,14 +60,14 @@ def progress() -> "Progress":
         TimeRemainingColumn,
     )
 
-    stderr = Console(stderr=True)
+    screen = remarks()
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
-        console=stderr,
-        disable=not stderr.is_terminal,
+        console=screen,
+        disable=not screen.is_terminal,
     )
 
 
@@ -55,6 +76,7 @@ def show_result(
     tables: Iterable["TextTable"],
     out: Path | None,
     markdown: Callable[[], str],
+    json: bool,
 ) -> None:
     """Show a result to people, and write it where they asked for a file.
 
@@ -63,6 +85,7 @@ def show_result(
         tables: Shown below.
         out: File for the Markdown, or None for none.
         markdown: Returns the file's text.
+        json: Whether stdout is to carry JSON.
 
     Raises:
         OSError: The file cannot be written.
@@ -70,7 +93,7 @@ def show_result(
     from estimation.files import write_text_atomic
     from rig.reports.table import to_rich
 
-    screen = console()
+    screen = results(json)
     for line in lines:
         screen.print(line, markup=False)
     for table in tables:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress
+from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 
 
 def record(
@@ -43,7 +43,7 @@ def record(
     from rig.session import Session
     from rig.watching import watch_runs
 
-    screen = console()
+    screen = remarks()
     if resume is not None:
         if (protocol, config, out, seed) != (None, None, None, None):
             raise UsageError(
@@ -65,7 +65,7 @@ def record(
     watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
-    results: list[RunResult] = []
+    recorded: list[RunResult] = []
     try:
         with Session(settings, open_logger(settings)) as session, progress() as bar:
             samples = sum(run.samples for run in todo)
@@ -77,19 +77,20 @@ def record(
 
             for result in record_campaign(session, todo, folder, notes=notes, on_progress=show):
                 done += result.expected
-                results.append(result)
+                recorded.append(result)
                 if watch is not None and (news := watch.after(result.path)):
-                    screen.print(f"[yellow]{news}[/yellow]")
+                    bar.console.print(news, style="yellow", markup=False)
                 if result.drifted or not result.complete:
-                    screen.print(f"[yellow]{result.name}: {result.remark}[/yellow]")
+                    text = f"{result.name}: {result.remark}"
+                    bar.console.print(text, style="yellow", markup=False)
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
         raise
-    bad = [result.name for result in results if result.drifted or not result.complete]
-    screen.print(
-        f"{len(results)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
+    bad = [result.name for result in recorded if result.drifted or not result.complete]
+    results(json).print(
+        f"{len(recorded)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
     )
     if json:
-        told = {"folder": folder, "runs": results, "look_at": bad}
+        told = {"folder": folder, "runs": recorded, "look_at": bad}
         emit_json(told if watch is None else {**told, "models": watch.to_json()})
     return 1 if bad else 0

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console
+from rig.cli.output import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
-    from rig.live.replay import EstimateStream
+    from rig.live.estimator import ModelEstimator
 
 
 def replay(
@@ -40,7 +40,9 @@ def replay(
     """
     from rig.errors import ExitCode, UsageError
     from rig.importers.registry import open_campaign
-    from rig.live.estimator import ModelEstimator
+    from rig.live.estimator import half_widths_of, shown_channels
+    from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
+    from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
     from rig.live.replay import replay_blocks
     from rig.live.run import show
@@ -52,19 +54,23 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_campaign(log, format_), run, quiet=json_)
-    estimator = _estimator(model, recording, any_instrument) if model else None
-    target = estimator.target_channel if estimator else "distal_torque_n_m"
+    estimators = _estimators(model, recording, any_instrument) if model else []
+    usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(
         title=f"rig replay {recording.name}",
-        channels=(target,),
+        channels=shown_channels(estimators, usual),
+        half_widths=half_widths_of(estimators),
         lever_m=lever_mm / 1e3,
         plain=plain,
         json=json_,
     )
-    blocks = replay_blocks(recording, estimator, speed or None)
-    if isinstance(estimator, ModelEstimator) and estimator.model is not None:
-        blocks = watched(blocks, estimator.model)
-    summary = show(blocks, options, console())
+    blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None))
+    models = [estimator.model for estimator in estimators if estimator.model is not None]
+    if models:
+        blocks = with_model_status(blocks, models)
+    if len(models) == 1:
+        blocks = watched(blocks, models[0])
+    summary = show(blocks, options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
 
@@ -89,7 +95,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
     """Say which run is shown, if there are more, and what speaks against it."""
-    people = console()
+    people = remarks()
     if len(campaign) > 1 and not chosen:
         place = campaign.names.index(recording.name) + 1
         people.print(
@@ -102,12 +108,12 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _estimator(path: Path, recording: "Recording", any_instrument: bool) -> "EstimateStream":
-    """Read a model file and begin a stream of its estimates at the recording's rate."""
+def _estimators(path: Path, recording: "Recording", any_instrument: bool) -> "list[ModelEstimator]":
+    """Read a model file and begin the streams of its estimates at the recording's rate."""
     from estimation.estimators.instrument import require_own
-    from rig.live.estimator import ModelEstimator
+    from rig.live.estimator import estimators_of
 
-    estimator = ModelEstimator(path, recording.sample_rate_hz)
+    estimators = estimators_of(path, recording.sample_rate_hz)
     if not any_instrument:
-        require_own(estimator.instrument, recording)
-    return estimator
+        require_own(estimators[0].instrument, recording)
+    return estimators

@@ -1,7 +1,7 @@
 """`rig stop`: take the motors out of force, and say so only once the board has said so."""
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, remarks, results
 
 
 def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
@@ -17,18 +17,18 @@ def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
     from rig.machines.choose import machine_of
 
     settings = load_config(config)
-    screen = console()
     try:
         with TeensyLogger(open_logger(settings), machine_of(settings).profile) as logger:
             logger.disarm()
     except DriverError as error:
+        screen = remarks()
         screen.print(f"{settings.name}: UNKNOWN. Take the motors for live.", markup=False)
         for word, text in (("why", f"{error.what} {error.why}"), ("fix", error.fix)):
             screen.print(f"  {word}: {text}", markup=False)
         if json:
             emit_json({"state": "unknown", "why": str(error)})
         return int(ExitCode.SAFETY)
-    screen.print(f"{settings.name}: disarmed, and it has said so.", markup=False)
+    results(json).print(f"{settings.name}: disarmed, and it has said so.", markup=False)
     if json:
         emit_json({"state": "disarmed"})
     return 0

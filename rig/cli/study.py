@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, console, emit_json, progress, show_result
+from rig.cli.output import JsonFlag, emit_json, progress, results, show_result
 from rig.cli.study_arm import StateFolder, arm_studies, kept_in
 
 if TYPE_CHECKING:
@@ -99,10 +99,10 @@ def oneill(
         ]
         return shown.markdown(result.study, more, placed)
 
-    show_result(lines, tables, out, markdown)
+    show_result(lines, tables, out, markdown, json)
     if report is not None:
         page = write_report(report / "oneill.html", shown.page(result, more))
-        console().print(f"Report: {page}", markup=False)
+        results(json).print(f"Report: {page}", markup=False)
     if json:
         found = {"networks": deep, "states": physical, "kinds": every_kind or None}
         emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
@@ -224,7 +224,7 @@ def zhao(
         return shown.markdown(study, haptics, names)
 
     lines = [shown.lead(study), *shown.notes(study)]
-    show_result(lines, shown.tables(study, haptics), out, markdown)
+    show_result(lines, shown.tables(study, haptics), out, markdown, json)
     if json:
         cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
         found = {dof: lacking.findings for dof, lacking in study.lacking.items()}
@@ -255,7 +255,7 @@ def loop(
             data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
         )
     lines = [shown.lead(study), *shown.notes(study)]
-    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study))
+    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study), json)
     if json:
         emit_json(study)
 
@@ -289,7 +289,7 @@ def instruments(
             on_row=lambda done, total: bar.update(task, completed=done, total=total),
         )
     tables = [shown.table(study), shown.drawn_table(study)]
-    show_result([shown.lead(study)], tables, out, lambda: shown.markdown(study))
+    show_result([shown.lead(study)], tables, out, lambda: shown.markdown(study), json)
     if json:
         emit_json(study)
 

@@ -49,9 +49,9 @@ def _show(
         page: Makes its page, with figures at the places given.
         drawn: Figures that were drawn.
         out: File for the page.
-        json: Whether to print it as JSON.
+        json: Whether it goes to stdout as JSON.
     """
-    show_result(lines, tables, out, lambda: page(_from_page(drawn, out)))
+    show_result(lines, tables, out, lambda: page(_from_page(drawn, out)), json)
     if json:
         emit_json(study)
 
@@ -120,7 +120,7 @@ def excitation(
         title = f"# Excitation of the {study.arm}"
         return f"{title}\n\n{to_markdown(table(study))}\n{study.provenance.line()}\n"
 
-    show_result([], [table(study)], out, markdown)
+    show_result([], [table(study)], out, markdown, json)
     if json:
         emit_json(study)
 
@@ -227,6 +227,6 @@ def payload(
         text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
         return f"{text}\n{found.provenance.line()}\n"
 
-    show_result([], [table(found)], out, markdown)
+    show_result([], [table(found)], out, markdown, json)
     if json:
         emit_json(found)

@@ -19,6 +19,9 @@ REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
 """Those that declare the kinematics of a grasper with three degrees of freedom."""
 
+GRASPER = Path("grasper")
+"""Shipped models of the force at each axis of such a grasper, from its motor's current."""
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -60,8 +63,8 @@ def subject(
         return Subject(open_campaign(path, format_name), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
-    of_wrist = {m.balance for m in _shipped(WRIST)}
-    if balance is not None and not balance.startswith("joint.") and balance not in of_wrist:
+    of_grasper = {m.balance for m in (*_shipped(WRIST), *model_file.read_all(GRASPER))}
+    if balance is not None and not balance.startswith("joint.") and balance not in of_grasper:
         models = declared_models(None, balance)
         return Subject(open_campaign(path, format_name), models)
     campaign = open_campaign(path, format_name)
@@ -69,9 +72,11 @@ def subject(
     arm = None if first is None else balances_of(first)
     if arm is not None:
         return Subject(campaign, _of(arm.models, balance))
-    angles = {m.target for m in _shipped(WRIST)}
-    names = WRIST if first is not None and angles <= set(first.columns) else REFERENCE_RIG
-    return Subject(campaign, _of(_shipped(names), balance))
+    there = set() if first is None else set(first.columns)
+    for models in (_shipped(WRIST), model_file.read_all(GRASPER)):
+        if {model.target for model in models} <= there:
+            return Subject(campaign, _of(models, balance))
+    return Subject(campaign, _of(_shipped(REFERENCE_RIG), balance))
 
 
 def of_calibration(declared: Declared, balance: str | None = None) -> Subject:

@@ -1,8 +1,9 @@
 """A session in which the grasper follows its master, and what its motors did."""
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from rig.config import Config, DeviceSection, is_simulated
 from rig.devices import open_section
 from rig.errors import UsageError
 from rig.grasper.follow import LEAD_S, setpoints
-from rig.grasper.master import Master
+from rig.grasper.master import master_of
+from rig.live.recorder import LiveRecorder
 from rig.logger import open_logger
 from rig.machines.grasper import AXES
 from rig.reading import Reading
@@ -53,23 +55,25 @@ class Followed:
 def follow_master(
     config: Config,
     url: str | None,
-    chief: Master,
     duration_s: float,
     scale: float,
+    folder: Path,
     on_time: Callable[[float], None] = lambda time_s: None,
-) -> list[Followed]:
-    """Let the grasper follow its master for a while; whatever ends it, the rig is disarmed.
+) -> tuple[list[Followed], Path]:
+    """Let the grasper follow its master for a while, into a log.
+
+    Whatever ends it, the rig is disarmed and the log closed.
 
     Args:
         config: Of a grasper.
-        url: Where the master is; a simulated grasper has a simulated one if not said.
-        chief: What its counts mean.
+        url: Where the master is; where the configuration says if none.
         duration_s: How long.
         scale: Angle of a joint for an angle of the master.
+        folder: Where the log goes.
         on_time: Told how long it has followed, s.
 
     Returns:
-        What yaw, jaw 1 and jaw 2 did.
+        What yaw, jaw 1 and jaw 2 did, and the log.
 
     Raises:
         UsageError: The configuration is of another kind of rig, or nobody said where the master is.
@@ -83,6 +87,7 @@ def follow_master(
             "Only the 3-DOF grasper has a master.",
             'Name a configuration with [logger] profile = "grasper".',
         )
+    url = url or config.master.url
     if url is None and not config.is_simulated:
         raise UsageError("Where is the master?", fix="Write for example --master usb:16c0:0483.")
     section = DeviceSection(driver=DRIVER, url=url or SIMULATED_URL)
@@ -91,15 +96,22 @@ def follow_master(
             "A simulated master does not move a real grasper.", fix="Say where the real one is."
         )
     followed = [Followed(axis) for axis in AXES]
-    with closing(open_section(section)) as master, Session(config, open_logger(config)) as session:
+    with ExitStack() as stack:
+        master = stack.enter_context(closing(open_section(section)))
+        session = stack.enter_context(Session(config, open_logger(config)))
         session.take_zeros(ZEROS_S)
         master.identify()
         master.start()
-        asked = setpoints(master, chief, session.here, duration_s, scale)
+        recorder = LiveRecorder(session, folder, "follow")
+        stack.callback(recorder.stop)
+        recorder.start()
+        asked = setpoints(master, master_of(config), session.here, duration_s, scale)
         for reading in session.follow(asked, LEAD_S):
+            recorder.write(reading)
             played = reading.where(reading.setpoint >= 0)
             if len(played):
                 for axis in followed:
                     axis.add(played)
                 on_time(float(played.setpoint[-1] + 1) / session.machine.profile.rate_hz)
-    return followed
+        assert recorder.path is not None  # noqa: S101  it was started
+        return followed, recorder.path

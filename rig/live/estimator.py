@@ -1,6 +1,6 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from estimation import model_file
@@ -11,17 +11,19 @@ from estimation.model import Model
 from estimation.recording import MissingChannelError
 from estimation.stream import Stream
 from rig.live.block import FloatArray
+from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
 
 
 class ModelEstimator:
     """Feeds blocks to an estimator's causal stream. Satisfies `rig.live.replay.EstimateStream`."""
 
-    def __init__(self, path: Path, sample_rate_hz: float) -> None:
+    def __init__(self, path: Path, sample_rate_hz: float, balance: str | None = None) -> None:
         """Read an estimator and begin before the first sample.
 
         Args:
             path: Model file, or a state estimator or a network (`.npz`).
             sample_rate_hz: Nominal rate of the device's clock, Hz.
+            balance: Which model of a file of several; the first if not said.
 
         Raises:
             EstimationError: The file is no estimator, the model is not fitted, or it cannot run at
@@ -39,7 +41,8 @@ class ModelEstimator:
             if isinstance(estimator, BankEstimator) and estimator.interval is not None:
                 self.half_width = estimator.interval.typical
             return
-        model = model_file.read(path)
+        models = model_file.read_all(path)
+        model = next((m for m in models if m.balance == balance), models[0])
         self._stream = Stream(model, sample_rate_hz)
         self.target_channel = model.target
         self.model = model
@@ -61,3 +64,36 @@ class ModelEstimator:
                 "Choose a model that needs less.",
             )
         return self._stream.step(time_s, columns)
+
+
+def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
+    """Return what a file estimates with, each before its first sample.
+
+    Raises:
+        EstimationError: As for `ModelEstimator`.
+    """
+    if path.suffix == ".npz":
+        return [ModelEstimator(path, sample_rate_hz)]
+    return [ModelEstimator(path, sample_rate_hz, m.balance) for m in models_in_use(path)]
+
+
+def models_in_use(path: Path) -> list[Model]:
+    """Return what is used of a model file: the models of a grasper's axes, else the first.
+
+    Raises:
+        ModelFileError: The file cannot be read.
+    """
+    models = model_file.read_all(path)
+    return [model for model in models if model.target in AXES] or models[:1]
+
+
+def half_widths_of(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
+    """Return half of the 95 % interval of each channel that is estimated and has one known."""
+    known = {e.target_channel: e.half_width for e in estimators if e.half_width is not None}
+    return interval_of_joints(known)
+
+
+def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what to show: a grasper's joints, else what is estimated, else what is usual."""
+    targets = tuple(estimator.target_channel for estimator in estimators)
+    return JOINTS if set(targets) & set(AXES) else targets or usual

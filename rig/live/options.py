@@ -1,7 +1,8 @@
 """How a person wants a stream shown."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from rig.errors import UsageError
 
@@ -16,8 +17,7 @@ class ShowOptions:
         lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
-        half_width: Half of the estimate's 95 % interval, in the main channel's SI unit; None where
-            it is not known.
+        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
         footer: What a person can do.
     """
 
@@ -26,7 +26,7 @@ class ShowOptions:
     lever_m: float = 0.012
     plain: bool = False
     json: bool = False
-    half_width: float | None = None
+    half_widths: Mapping[str, float] = field(default_factory=dict)
     footer: str = "Ctrl-C leaves"
 
     def __post_init__(self) -> None:

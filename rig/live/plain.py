@@ -1,20 +1,26 @@
 """The stream as lines: one for people twice a second, one JSON object for machines at 10 Hz."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from rig.live import text as words
 from rig.live.state import Reading, Snapshot
 
+NOT_KNOWN: Mapping[str, float] = MappingProxyType({})
 
-def plain_line(snapshot: Snapshot, lever_m: float, half_width: float | None = None) -> str:
+
+def plain_line(
+    snapshot: Snapshot, lever_m: float, half_widths: Mapping[str, float] = NOT_KNOWN
+) -> str:
     """Return one line on a snapshot, for logs and for terminals that cannot draw."""
     time = "no samples yet" if snapshot.time_s is None else f"{snapshot.time_s:8.1f} s"
     parts = [time]
     for reading in snapshot.readings:
         source, value = words.main_value(reading)
         shown = words.with_unit(value, reading.unit)
-        if source == "estimate" and reading is snapshot.readings[0]:
-            shown += words.interval(half_width, reading.unit)
+        if source == "estimate":
+            shown += words.interval(half_widths.get(reading.channel), reading.unit)
         parts.append(f"{words.name_of(reading.channel)}, {source} {shown}")
         force_n = words.tip_force_n(reading, value, lever_m)
         if force_n is not None:
@@ -30,7 +36,7 @@ def plain_line(snapshot: Snapshot, lever_m: float, half_width: float | None = No
 
 
 def json_frame(
-    snapshot: Snapshot, lever_m: float, half_width: float | None = None
+    snapshot: Snapshot, lever_m: float, half_widths: Mapping[str, float] = NOT_KNOWN
 ) -> dict[str, Any]:
     """Return a snapshot as plain types, SI units.
 
@@ -45,8 +51,11 @@ def json_frame(
         "sample_rate_hz": snapshot.sample_rate_hz,
         "flagged": dict(snapshot.flagged),
         "lever_m": lever_m,
-        "estimate_half_width95": half_width,
-        "channels": {r.channel: _json_reading(r, lever_m) for r in snapshot.readings},
+        "estimate_half_width95": half_widths.get(snapshot.readings[0].channel),
+        "channels": {
+            r.channel: _json_reading(r, lever_m) | {"half_width95": half_widths.get(r.channel)}
+            for r in snapshot.readings
+        },
         "devices": snapshot.devices,
         "limits": snapshot.limits,
     }

@@ -21,11 +21,13 @@ class LiveRecorder:
     Args:
         session: The session.
         folder: Where logs go.
+        kind: What is recorded; a log is named after it.
     """
 
-    def __init__(self, session: Session, folder: Path) -> None:
+    def __init__(self, session: Session, folder: Path, kind: str = "live") -> None:
         self._session = session
         self._folder = folder
+        self._kind = kind
         self._log: LogWriter | None = None
         self._path: Path | None = None
         self._raw = session.machine.counts
@@ -41,6 +43,11 @@ class LiveRecorder:
         return self._log is not None
 
     @property
+    def path(self) -> Path | None:
+        """The newest log, None before the first."""
+        return self._path
+
+    @property
     def said(self) -> str:
         """What a person should know of it; empty before the first recording."""
         if self._path is None:
@@ -52,7 +59,7 @@ class LiveRecorder:
         """Open a new log; its clock begins with the next reading."""
         session = self._session
         self._folder.mkdir(parents=True, exist_ok=True)
-        name = f"live-{datetime.now():%Y-%m-%d-%H%M%S}"
+        name = f"{self._kind}-{datetime.now():%Y-%m-%d-%H%M%S}"
         number = len(list(self._folder.glob(f"{name}*")))
         self._path = self._folder / (f"{name}-{number}.mcap" if number else f"{name}.mcap")
         self._start_ns = time.time_ns()
@@ -60,11 +67,11 @@ class LiveRecorder:
             name=self._path.stem,
             rig=session.config.name,
             instrument=session.config.instrument.identity(),
-            conditions={"trajectory": "live"},
+            conditions={"trajectory": self._kind},
             started_at_ns=self._start_ns,
             calibrations={session.calibrations.name: session.calibrations.content_hash},
             zeros_before={f"{name}_counts": zero for name, zero in session.zeros.items()},
-            details={"rig_version": __version__, "logger_serial": session.identity.serial},
+            details={"rig_version": __version__, **session.board},
         )
         settings = json.dumps(session.config.logged(), indent=1).encode()
         lines = session.calibrations.to_json().encode()

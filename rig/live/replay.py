@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -28,7 +28,7 @@ class EstimateStream(Protocol):
 
 def replay_blocks(
     recording: Recording,
-    estimator: EstimateStream | None,
+    estimators: Sequence[EstimateStream],
     speed: float | None,
     block_s: float = 0.05,
     sleep: Callable[[float], None] = time.sleep,
@@ -36,12 +36,12 @@ def replay_blocks(
 ) -> Iterator[SampleBlock]:
     """Yield a recording block by block, at the pace of its own clock or faster.
 
-    Estimates are the estimator's, and those recorded in `estimated_*` columns for other channels.
+    Estimates are the estimators', and those recorded in `estimated_*` columns for other channels.
     Samples flagged missing and gaps in the clock count as lost.
 
     Args:
         recording: The run.
-        estimator: A stream that has seen nothing yet; None for none.
+        estimators: Streams that have seen nothing yet; none for none.
         speed: Times real time; None for as fast as it can be read.
         block_s: Time a block covers, s.
         sleep: Waits, s.
@@ -55,12 +55,12 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, estimator, speed, block_s, sleep, clock)
+    return _blocks(recording, estimators, speed, block_s, sleep, clock)
 
 
 def _blocks(
     recording: Recording,
-    estimator: EstimateStream | None,
+    estimators: Sequence[EstimateStream],
     speed: float | None,
     block_s: float,
     sleep: Callable[[float], None],
@@ -79,7 +79,7 @@ def _blocks(
             for name, values in columns.items()
             if name.startswith(ESTIMATED)
         }
-        if estimator is not None:
+        for estimator in estimators:
             estimates[estimator.target_channel] = estimator.push(columns, time_s)
         if speed is not None:
             # against the clock and not from block to block, so that small delays do not add up

@@ -10,7 +10,7 @@ from rich.console import Console
 from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Summary
-from rig.live.writers import OutputClosedError, Writer, choose_writer
+from rig.live.writers import Writer, choose_writer
 
 
 def show(
@@ -43,8 +43,6 @@ def show(
             _follow(blocks, state, writer, clock)
         except KeyboardInterrupt:
             ended = "interrupted"
-        except OutputClosedError:
-            return state.summary("output_closed")
     summary = state.summary(ended)
     writer.summary(summary)
     return summary

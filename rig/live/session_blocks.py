@@ -26,7 +26,7 @@ def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
     plans: Sequence[MachinePlan],
-    estimator: EstimateStream | None,
+    estimators: Sequence[EstimateStream],
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
 ) -> Iterator[SampleBlock]:
@@ -38,7 +38,7 @@ def session_blocks(
         config: The rig's configuration.
         open_transport: Opens the way to the logger.
         plans: Runs to play one after the other; without any, the rig is only watched.
-        estimator: A stream that has seen nothing yet; None for none.
+        estimators: Streams that have seen nothing yet; none for none.
         keys: Keys pressed; see `rig.live.keys`.
         folder: Where recordings go that a key starts.
     """
@@ -53,7 +53,7 @@ def session_blocks(
                 hand.obey(reading)
                 if hand.leaves:
                     return
-                block = _block(session, reading, estimator)
+                block = _block(session, reading, estimators)
                 said = (*block.devices, calibrations.of(reading), *hand.status())
                 yield replace(block, devices=said)
 
@@ -111,9 +111,9 @@ def _readings(session: Session, plans: Sequence[MachinePlan]) -> Iterator[Readin
         yield from session.watch()
 
 
-def _block(session: Session, reading: Reading, estimator: EstimateStream | None) -> SampleBlock:
+def _block(session: Session, reading: Reading, estimators: Sequence[EstimateStream]) -> SampleBlock:
     estimates = {}
-    if estimator is not None:
+    for estimator in estimators:
         estimates[estimator.target_channel] = estimator.push(reading.columns, reading.time_s)
     return SampleBlock(
         reading.time_s,

@@ -99,8 +99,7 @@ class Summary:
     """What a whole stream came to.
 
     Attributes:
-        ended: `finished` when the stream ended, `interrupted` when a person left,
-            `output_closed` when nobody reads any more.
+        ended: `finished` when the stream ended, `interrupted` when a person left.
         duration_s: Device time covered, s.
         samples: Samples received.
         lost: Samples lost.

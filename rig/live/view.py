@@ -1,7 +1,7 @@
 """The display as a person sees it: lines of text made from one snapshot, for any terminal size."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -28,6 +28,9 @@ STYLES = {
 WIDE = 64
 """From this many columns on, the numbers stand beside the digits and not under them."""
 
+LEAST_TRACES = 5
+"""Lines that limits leave to the traces."""
+
 MARGIN = 18
 """Columns left of a trace, for its name and the edges of its scale."""
 
@@ -41,14 +44,14 @@ class View:
         title: What is being shown: a session's or a recording's name.
         lever_m: Lever arm from the jaw's axis to its tip, m.
         footer: What a person can do.
-        half_width: Half of the main estimate's 95 % interval, SI; None where it is not known.
+        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
     """
 
     snapshot: Snapshot
     title: str
     lever_m: float
     footer: str = "Ctrl-C leaves"
-    half_width: float | None = None
+    half_widths: Mapping[str, float] = field(default_factory=dict)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield one line of text after the other, none wider than the terminal."""
@@ -63,14 +66,15 @@ class View:
         snapshot, main = self.snapshot, self.snapshot.readings[0]
         above = [
             _header(snapshot, self.title, width),
-            *_headline(main, self.lever_m, width, self.half_width),
+            *_headline(main, self.lever_m, width, self.half_widths.get(main.channel)),
         ]
-        above += [_other(reading) for reading in snapshot.readings[1:]]
+        above += [_other(r, self.half_widths.get(r.channel)) for r in snapshot.readings[1:]]
         if snapshot.flagged:
             seen = words.flagged(snapshot.flagged)
             above.append(_styled(f"▲ flagged in {TRACE_S:g} s: {seen}", "warning"))
         below = [_device(device) for device in snapshot.devices]
-        below += [_limit(limit, width) for limit in snapshot.limits]
+        room = max(height - len(above) - len(below) - 1 - LEAST_TRACES, 1)
+        below += list(_limits(snapshot.limits, width, room))
         below.append(_styled(self.footer, "quiet"))
         free = height - len(above) - len(below)
         return [*above, *_traces(main, width, free), *below]
@@ -136,11 +140,13 @@ def _beside(reading: Reading, source: str, value: Value, lever_m: float) -> Iter
     yield words.error_rms(reading)
 
 
-def _other(reading: Reading) -> Text:
+def _other(reading: Reading, half_width: float | None) -> Text:
     """Return one line on a quantity that is not the main one."""
     source, value = words.main_value(reading)
     line = _styled(f"{words.name_of(reading.channel)}, {source} ")
     line.append(words.with_unit(value, reading.unit), style=STYLES[source])
+    if source == "estimate" and value.number is not None:
+        line.append(words.interval(half_width, reading.unit), style=STYLES[source])
     if source == "estimate":
         line.append(f", sensor {words.with_unit(reading.sensor, reading.unit)}")
     return line
@@ -180,6 +186,21 @@ def _device(device: DeviceStatus) -> Text:
     symbol, style = words.STATES.get(device.state, ("◆", "warning"))
     line = _styled(f"{symbol} {device.name} ", style).append(device.state)
     return line.append(f"  {device.detail}" if device.detail else "", style="default")
+
+
+def _limits(limits: Sequence[LimitStatus], width: int, room: int) -> Iterator[Text]:
+    """Yield the limits, or the nearest of them where there is no room for all."""
+    if len(limits) <= room:
+        yield from (_limit(limit, width) for limit in limits)
+        return
+    nearest = sorted(limits, key=lambda limit: -_urgency(words.limit_share(limit)))[: room - 1]
+    yield from (_limit(limit, width) for limit in limits if limit in nearest)
+    yield _styled(f"{len(limits) - len(nearest)} more limits, none nearer", "quiet")
+
+
+def _urgency(share: float | None) -> float:
+    """Return a rank: a limit whose share nobody knows comes first."""
+    return np.inf if share is None else share
 
 
 def _limit(limit: LimitStatus, width: int) -> Text:

@@ -1,10 +1,8 @@
 """The three ways to show a stream: drawn on a terminal, as lines for people, as JSON objects."""
 
-import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any, Protocol
+from typing import Protocol
 
 from rich.console import Console
 from rich.control import Control
@@ -33,10 +31,6 @@ BEGIN_FRAME = _sequence("\x1b[?2026h")
 END_FRAME = _sequence("\x1b[?2026l")
 
 
-class OutputClosedError(Exception):
-    """Nobody reads the output any more, as in `rig replay LOG --json | head`."""
-
-
 class Writer(Protocol):
     """One way to show a stream."""
 
@@ -47,11 +41,7 @@ class Writer(Protocol):
         """Hold the output while the stream runs."""
 
     def frame(self, snapshot: Snapshot) -> None:
-        """Show one snapshot.
-
-        Raises:
-            OutputClosedError: Nobody reads any more.
-        """
+        """Show one snapshot."""
 
     def summary(self, summary: Summary) -> None:
         """Show what the stream came to, when it no longer runs."""
@@ -81,19 +71,11 @@ class JsonWriter:
 
     def frame(self, snapshot: Snapshot) -> None:
         """Write an object of kind `frame`."""
-        self._emit(json_frame(snapshot, self._options.lever_m, self._options.half_width))
+        emit_json(json_frame(snapshot, self._options.lever_m, self._options.half_widths))
 
     def summary(self, summary: Summary) -> None:
         """Write an object of kind `summary`."""
-        self._emit({"kind": "summary", "summary": summary})
-
-    def _emit(self, value: dict[str, Any]) -> None:
-        try:
-            emit_json(value)
-        except BrokenPipeError as closed:
-            # what is still buffered would fail again when the interpreter leaves
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise OutputClosedError from closed
+        emit_json({"kind": "summary", "summary": summary})
 
 
 class PlainWriter:
@@ -112,7 +94,7 @@ class PlainWriter:
     def frame(self, snapshot: Snapshot) -> None:
         """Write one line."""
         options = self._options
-        _say(self._console, plain_line(snapshot, options.lever_m, options.half_width))
+        _say(self._console, plain_line(snapshot, options.lever_m, options.half_widths))
 
     def summary(self, summary: Summary) -> None:
         """Write what the stream came to."""
@@ -171,7 +153,7 @@ class DisplayWriter:
 
     def _view(self, snapshot: Snapshot) -> View:
         options = self._options
-        return View(snapshot, options.title, options.lever_m, options.footer, options.half_width)
+        return View(snapshot, options.title, options.lever_m, options.footer, options.half_widths)
 
 
 def _say(console: Console, line: str) -> None:

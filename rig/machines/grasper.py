@@ -70,7 +70,7 @@ class GrasperMachine:
             ("force", "force_n"),
         )
     }
-    shown = ("jaw_1_force_n", "jaw_2_force_n", "yaw_force_n")
+    shown = ("grasp_force_n", "pitch_force_n", "yaw_force_n")
     guard = grasper_guard.GrasperDrive
     first_crossing = staticmethod(grasper_guard.first_crossing)
 

@@ -14,7 +14,7 @@ import typer
 from numpy.typing import NDArray
 
 from estimation.recording import Recording
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 from rig.errors import DataError, UsageError
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.play import play
@@ -163,7 +163,7 @@ def main(
     if as_json:
         emit_json({"run": recording.name, "rows": rows, "figure": figure})
         return
-    out = console()
+    out = results(json=False)
     out.print(f"{'channel':24s}{'measured 5 / 50 / 95 %':>30s}{'simulated 5 / 50 / 95 %':>30s}")
     for row in rows:
         levels = [

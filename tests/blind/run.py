@@ -21,7 +21,7 @@ from typing import Annotated, Any
 import typer
 
 from estimation.files import write_text_atomic
-from rig.cli.output import JsonFlag, console, emit_json
+from rig.cli.output import JsonFlag, emit_json, results
 from rig.errors import UsageError
 from rig.reports.provenance import Provenance
 from rig.reports.table import to_markdown, to_rich
@@ -208,7 +208,7 @@ def blind(
             bar.advance(task)
     found = tables(state)
     for table in found:
-        console().print(to_rich(table))
+        results(json=False).print(to_rich(table))
     if report is not None:
         head = f"# Blind study\n\n{Provenance.now(seed).line()}\n\n"
         write_text_atomic(report, head + "\n".join(map(to_markdown, found)))

@@ -110,7 +110,8 @@ CATALOGUED: dict[str, Truth] = {
     "gear_wear": _of("change.step", "motor", course="comes"),
     "cable_stiff": _of("friction.warmup", "cable", course="fades"),
     "cable_dwell": _of("friction.dwell", "cable", needs="rests"),
-    "cable_capstan": _of("friction.capstan", "cable"),
+    # at one angle of wrap the two directions differ by what the ratio takes up
+    "cable_capstan": _of("friction.capstan", "cable", "friction.load"),
     "wrist_capstan": _of("friction.capstan", "cable", needs="wrist"),
     "wrist_pull": _of("coupling.kinematic", "stretch", needs="wrist"),
     "jaw_weight": _of("gravity.payload", "cable stretch"),

@@ -1,20 +1,22 @@
-"""The firmware on an emulated Cortex-M4: QEMU, its serial line on a loopback port."""
+"""The firmware on an emulated Cortex-M4: QEMU, its serial line on a loopback port.
+
+The board's time passes only as it is asked for ticks (firmware/boards/mps2/hardware.hpp), so that
+nothing here depends on how fast the emulator gets on.
+"""
 
 import shutil
 import socket
+import struct
 import subprocess
 from pathlib import Path
-from time import monotonic, sleep
 
 from drivers.device import Device
-from drivers.errors import LinkError
 from drivers.teensy.device import TeensyDevice
-from drivers.transport import Transport, open_transport
 from drivers.transport.faulty import Faults, FaultyTransport
+from drivers.transport.simulated import SimulatedTransport
 
 PROGRAM = Path(__file__).parents[2] / "firmware" / "build" / "rig_firmware_arm.elf"
 EMULATOR = "qemu-system-arm"
-STARTS_S = 10.0
 MISSING = (
     f"{EMULATOR} is not installed; see make firmware-arm"
     if shutil.which(EMULATOR) is None
@@ -23,64 +25,64 @@ MISSING = (
     else ""
 )
 """Why the emulated board cannot be tried here; empty where it can."""
+SILENT_S = 120.0
+"""An emulator that says nothing for so long has crashed."""
 
 
 class EmulatedBoard:
-    """A transport to an emulated board that it starts, and ends when it is closed."""
+    """An emulator that it starts; implements `drivers.transport.simulated.Board`."""
 
     def __init__(self) -> None:
-        port = _free_port()
-        words = [EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none"]
-        serial = ["-serial", f"tcp:127.0.0.1:{port},server,nowait,nodelay"]
-        self._emulator = subprocess.Popen([*words, *serial, "-kernel", str(PROGRAM)])
-        try:
-            self._line = _open(f"socket://127.0.0.1:{port}")
-        except BaseException:
-            self._end()
-            raise
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            server.settimeout(SILENT_S)
+            port = server.getsockname()[1]
+            words = [EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none"]
+            words += ["-serial", f"tcp:127.0.0.1:{port},nodelay=on", "-kernel", str(PROGRAM)]
+            self._emulator = subprocess.Popen(words)
+            try:
+                self._line, _ = server.accept()
+            except BaseException:
+                self._end()
+                raise
+        self._line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._line.settimeout(SILENT_S)
+        self._answers = self._line.makefile("rb")
+        self._waiting = b""
 
-    @property
-    def url(self) -> str:
-        return self._line.url
+    def receive(self, data: bytes) -> None:
+        self._turn(0, data)
 
-    @property
-    def now_s(self) -> float:
-        return self._line.now_s
+    def advance(self, ticks: int) -> None:
+        self._turn(ticks, b"")
 
-    def read(self, timeout_s: float) -> bytes:
-        return self._line.read(timeout_s)
-
-    def write(self, data: bytes) -> None:
-        self._line.write(data)
+    def transmit(self) -> bytes:
+        waiting, self._waiting = self._waiting, b""
+        return waiting
 
     def close(self) -> None:
+        self._answers.close()
         self._line.close()
         self._end()
+
+    def _turn(self, ticks: int, data: bytes) -> None:
+        self._line.sendall(struct.pack("<HH", ticks, len(data)) + data)
+        while size := struct.unpack("<H", self._answers.read(2))[0]:
+            self._waiting += self._answers.read(size)
 
     def _end(self) -> None:
         self._emulator.kill()
         self._emulator.wait()
 
 
+class EmulatedLine(SimulatedTransport):
+    """A transport to an emulated board, which ends with it."""
+
+    def close(self) -> None:
+        super().close()
+        assert isinstance(self.board, EmulatedBoard)
+        self.board.close()
+
+
 def open_fake(faults: Faults) -> Device:
     """Open the logger's driver on an emulated board behind a cable with faults."""
-    return TeensyDevice(FaultyTransport(EmulatedBoard(), faults))
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-def _open(url: str) -> Transport:
-    """Open the line as soon as the emulator listens."""
-    give_up_s = monotonic() + STARTS_S
-    while True:
-        try:
-            return open_transport(url)
-        except LinkError:
-            if monotonic() > give_up_s:
-                raise
-            sleep(0.02)
+    return TeensyDevice(FaultyTransport(EmulatedLine(EmulatedBoard(), "sim://cortex-m4"), faults))

@@ -100,3 +100,20 @@ def test_a_knee_at_no_load_is_play_and_no_stiffening(knee_n_m, is_play):
         Term(effect("transmission.stiffening"), -1, {"load": "proximal_torque_n_m"}), [knee_n_m]
     )
     assert bend.is_limit is is_play
+
+
+def test_a_campaigns_clock_is_as_long_for_a_warm_up_when_a_drift_reads_it_too():
+    warming = Candidate.of(Term(effect("friction.warmup.campaign")), [300.0, 1.0])
+    drift = Candidate.of(Term(effect("sensor.drift"), 1, {"elapsed": "campaign_time_s"}), [])
+    run = swept(0.1)
+    late = {**run.channels, "campaign_time_s": np.linspace(380.0, 400.0, 100)}
+    for pool_ in ([warming, drift], [drift, warming]):
+        assert warming in covered(pool_, [replace(run, channels=late)])
+
+
+@pytest.mark.parametrize(("knee_rad_s", "shown"), [(2.0, False), (3.0, True)])
+def test_damping_that_is_worn_off_long_before_the_usual_speed_is_a_direction(knee_rad_s, shown):
+    film = Candidate.of(Term(effect("friction.load_viscous.saturating")), [knee_rad_s])
+    run = swept(0.1)
+    loaded = {**run.channels, "motor_load_n_m": np.ones(100)}
+    assert bool(covered([film], [replace(run, channels=loaded)])) is shown

@@ -260,6 +260,16 @@ def test_the_gain_on_runs_left_out_is_that_of_plain_least_squares():
     assert losses.gain[0, 0] > 0.5 > losses.gain[1, 0]
 
 
+def test_a_run_that_alone_tells_a_declared_parameter_counts_alike_with_and_without_a_block():
+    random = np.random.default_rng(1)
+    base = [random.normal(size=(50, 2)) * [1.0, size] for size in (1.0, 0.01, 0.01, 0.01)]
+    block = [random.normal(size=(50, 1)) for _ in range(4)]
+    target = [c[:, 0] + 0.3 * random.normal(size=50) for c in block]
+    losses = leave_one_run_out(base, block, [1], [y[:, None] for y in target])
+    assert losses.joint[0, 0, 0] == losses.base[0, 0] == pytest.approx(target[0] @ target[0])
+    assert np.all(losses.joint[1:, 0, 0] < 0.5 * losses.base[1:, 0])
+
+
 def test_surrogates_keep_the_power_and_lose_the_place():
     left = [np.sin(np.arange(400) / (10 + k)) for k in range(5)]
     drawn = surrogates(left, 50, seed=3)

@@ -33,7 +33,7 @@ TRUE = {
     "friction.warmup": ((4.0, 2.0), [0.02]),
     "friction.warmup.campaign": ((120.0, 2.0), [-0.02]),
     "hysteresis.bouc_wen": ((0.15, 2.0), [0.02]),
-    "hysteresis.bouc_wen.twist": ((0.03, 1.5), [0.004]),
+    "hysteresis.bouc_wen.twist": ((0.03, 1.5, 0.4), [0.004]),
     "hysteresis.presliding": ((0.1,), [0.02]),
     "hysteresis.presliding.lugre": ((0.05, 0.8, 4.0), [0.02]),
     "hysteresis.presliding.maxwell": ((0.02,), [0.01, 0.004, 0.02]),
@@ -41,8 +41,8 @@ TRUE = {
     "spring.end_stop.opening": ((0.3,), [0.1]),
     "transmission.backlash": ((0.01, 0.02), [0.006]),
     "transmission.backlash.play": ((0.06,), [0.05]),
-    "transmission.relaxation": ((0.8,), [0.2]),
-    "transmission.relaxation.prony": ((0.15,), [0.2, 0.1]),
+    "transmission.relaxation": ((0.8, 0.4), [0.2]),
+    "transmission.relaxation.prony": ((0.15, 0.4), [0.2, 0.1]),
     "transmission.stiffening": ((0.05,), [0.1]),
     "transmission.stiffening.asymmetric": ((), [0.05]),
     "transmission.stiffening.cubic": ((), [2.0]),
@@ -256,3 +256,24 @@ def test_a_change_between_runs_is_found_by_the_diagnosis():
     (finding,) = diagnosis.findings
     assert 240 < finding.parameters["since"].value <= 300
     assert finding.rmse_after < 0.5 * finding.rmse_before
+
+
+@pytest.mark.parametrize("name", ["transmission.relaxation", "sensor.creep"])
+def test_a_run_begins_as_settled_under_its_first_load_as_it_is_told(name):
+    kind = effect(name)
+    time_s = np.linspace(0.0, 3.0, 301)
+    load = next(role for role in kind.roles if role != "clock")
+    inputs = {load: np.ones(301), "clock": time_s}
+    size = np.exp(-time_s / 0.8)
+    for settled in (0.0, 0.25, 1.0):
+        column = kind.columns(inputs, (0.8, settled))[:, 0]
+        assert np.abs(column) == pytest.approx((1.0 - settled) * size, abs=1e-9)
+
+
+def test_a_springs_loop_begins_as_loaded_from_where_it_had_settled():
+    kind = effect("hysteresis.bouc_wen.twist")
+    load = np.full(10, 0.5)
+    start = [kind.columns({"load": load}, (0.1, 2.0, settled))[0, 0] for settled in (0.0, 0.9, 1.0)]
+    assert start[0] == pytest.approx(1.0, abs=1e-3)  # far beyond its reach
+    assert 0.3 < start[1] < 0.6
+    assert start[2] == 0.0

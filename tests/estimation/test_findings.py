@@ -1,5 +1,7 @@
 """When two balances show one fault."""
 
+from dataclasses import replace
+
 import pytest
 
 from estimation.diagnosis.findings import Told, echoes, findings_of, same_fault
@@ -51,12 +53,19 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
     assert same_fault(gear, motor)
 
 
-@pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.4, {})])
+@pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.5, {})])
 def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(share, small):
     ripple = Told(finding("motor", "ripple.motor"), {}, None, 0, 0.9)
     inertia = Told(finding("gearbox", "inertia.missing"), {}, None, 0, share)
     told = [ripple, inertia]
     assert echoes(told) == small
+
+
+@pytest.mark.parametrize(("family", "small"), [("inertia.missing", True), ("friction.load", False)])
+def test_what_any_faster_motion_shows_is_sooner_taken_for_an_echo(family, small):
+    lag = Told(finding("motor", "sensor.lag"), {}, None, 0, 0.6)
+    other = Told(finding("gearbox", family), {}, None, 0, 0.35)
+    assert bool(echoes([lag, other])) is small
 
 
 def test_findings_come_in_the_order_found_however_much_each_explains():
@@ -68,3 +77,20 @@ def test_findings_come_in_the_order_found_however_much_each_explains():
     ]
     listed = findings_of(told, ["motor", "gearbox"])
     assert [f.family for f in listed] == ["friction.drag", "ripple.motor", "sensor.creep"]
+
+
+@pytest.mark.parametrize(
+    ("family", "share", "verdict", "surer"),
+    [
+        ("gravity.payload", 0.9, "identified", True),
+        ("gravity.payload", 0.9, "one_of", False),
+        ("gravity.payload", 0.3, "identified", False),
+        ("sensor.encoder_inl", 0.9, "identified", False),  # what the other names already
+    ],
+)
+def test_what_two_balances_show_is_told_by_the_one_that_names_it_better(
+    family, share, verdict, surer
+):
+    wave = Told(finding("stretch", "sensor.encoder_inl"), {}, None, 0, 0.8)
+    other = Told(replace(finding("cable", family), verdict=verdict), {}, None, 0, share)
+    assert other.is_surer_than(wave) is surer

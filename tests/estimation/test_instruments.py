@@ -7,12 +7,14 @@ import pytest
 from scipy import signal
 
 from estimation.campaign import Campaign
+from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.balance import lay_out
+from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import prepare, tables
 from estimation.diagnosis.endogeneity import kept_share
 from estimation.diagnosis.evidence import leave_one_run_out
-from estimation.diagnosis.instruments import instruments, projection
+from estimation.diagnosis.instruments import instruments, projection, stand_in
 from estimation.effects import effect
 from estimation.fitting import fit
 from estimation.model import Term
@@ -128,3 +130,42 @@ def test_without_other_sensors_nothing_is_said_of_the_noise(noisy):
     model, runs = noisy
     balance = lay_out(model, [prepare_without(r) for r in runs])
     assert kept_share(balance, balance.terms, LAGS[:1]) is None
+
+
+def test_the_motors_own_idea_of_its_load_is_fitted_to_the_rig_and_hears_no_other_sensor():
+    told, spoilt = {}, {}
+    for shift in (0.0, 0.05):
+        runs = [quiet(k) for k in range(5)]
+        runs = [
+            r.with_columns(distal_torque_n_m=r["distal_torque_n_m"] * (1 + shift)) for r in runs
+        ]
+        model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+        names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
+        made = [prepare(r, names, model) for r in runs]
+        put = stand_in(made, model.target)
+        told[shift], spoilt[shift] = put(made[0]).channels[MOTOR_LOAD], made[0]
+    used, true = spoilt[0.0].used, spoilt[0.0].channels["proximal_torque_n_m"]
+    nominal = spoilt[0.0].channels[MOTOR_LOAD]
+    assert told[0.0][used] == pytest.approx(told[0.05][used], abs=1e-9)
+    assert np.std((told[0.0] - true)[used]) < 0.5 * np.std((nominal - true)[used])
+
+
+def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
+    def lost(motor, speed, load):
+        return 0.8 * load**2 * np.tanh(speed / 3.0)
+
+    runs = [
+        run(f"r{k}", 0.2, 0.05 + 0.02 * k, seed=k, noise_n_m=1e-4, extra=lost) for k in range(6)
+    ]
+    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
+    made = [prepare(r, names, model) for r in runs]
+    put = stand_in(made, model.target)
+    balance = lay_out(model, [put(r) for r in made])
+    friction = Candidate.of(Term(effect("friction.load"), -1, {}), [3.0])
+    left = balance.left(balance.terms)
+    columns = balance.columns([friction])
+    aims = [r[:, None] for r in left]
+    plain = leave_one_run_out(balance.base(balance.terms), columns, [1], aims)
+    bent = bent_losses(balance, balance.terms, friction, left)
+    assert bent.joint.sum() < 0.7 * plain.joint.sum()

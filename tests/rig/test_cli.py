@@ -5,8 +5,9 @@ import subprocess
 import sys
 
 import pytest
+from typer.main import get_command
 
-from rig.cli.main import main
+from rig.cli.main import app, main
 from rig.cli.output import plain
 from rig.errors import DataError, ExitCode, UsageError, exit_code_of
 
@@ -33,6 +34,38 @@ def test_an_unknown_verb_is_a_usage_error(capsys):
 )
 def test_exit_codes(error, code):
     assert exit_code_of(error) == code
+
+
+def verbs(command, words=()):
+    """Yield every verb of the command line and its options."""
+    if not getattr(command, "commands", None):
+        yield " ".join(words), {o for p in command.params for o in p.opts}
+        return
+    for name, part in command.commands.items():
+        yield from verbs(part, (*words, name))
+
+
+def test_every_command_speaks_to_machines():
+    found = dict(verbs(get_command(app)))
+    assert {"record", "cal list", "firmware flash", "study zhao"} <= set(found)
+    assert [words for words, options in found.items() if "--json" not in options] == []
+
+
+RESULTS = ["devices", "cal list", "config check", "config list", "config show", "grasper designs"]
+
+
+@pytest.mark.parametrize("words", RESULTS)
+def test_results_go_where_a_pipe_finds_them(words, capsys):
+    assert main(words.split()) == 0
+    out, err = capsys.readouterr()
+    assert out.strip()
+    assert err == ""
+
+
+@pytest.mark.parametrize("words", RESULTS)
+def test_with_json_stdout_carries_nothing_else(words, capsys):
+    assert main([*words.split(), "--json"]) == 0
+    assert isinstance(json.loads(capsys.readouterr().out), dict)
 
 
 def test_json_has_no_nan_and_no_numpy():

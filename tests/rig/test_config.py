@@ -115,7 +115,14 @@ def test_the_shifted_base_at_the_drives_bit_rate_is_sound():
         ({"driver": "ati-kan", "url": "can:socketcan:can1"}, "no driver 'ati-kan'"),
         ({"driver": "usb520", "url": "can:socketcan:can1"}, "on no CAN bus"),
         ({"driver": "ati-can", "url": "/dev/ttyACM0"}, "needs a CAN bus"),
-        ({"driver": "usb520", "url": "sim://", "options": {"baud": 1}}, "no option 'baud'"),
+        (
+            {"driver": "usb520", "url": "sim://", "options": {"baud_rat": 1}},
+            "did you mean 'baud_rate'?",
+        ),
+        ({"driver": "usb520", "url": "sim://", "options": {"rate_hz": 50}}, "given 50 Hz"),
+        ({"driver": "ati-can", "url": "can:socketcan:can1", "options": {"base": "x"}}, "base"),
+        ({"driver": "ati-can", "url": "can:socketcan:can1", "options": {"base": 500}}, "127"),
+        ({"driver": "qia128", "url": "sim://", "options": {"rated_load": True}}, "rated_load"),
     ],
 )
 def test_what_a_device_cannot_be(device, message):

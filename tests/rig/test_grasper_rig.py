@@ -179,7 +179,7 @@ def test_commands_on_the_grasper_as_a_person_types_them(
     for command in (["doctor"], ["selftest"], ["stop"], ["firmware", "version"]):
         assert main([*command, "-c", "grasper"]) == 0, command
     assert main(["config", "show", "grasper"]) == 0
-    assert "grasper protocol" in capsys.readouterr().err
+    assert "grasper protocol" in capsys.readouterr().out
     assert main(["grip", "-c", "grasper", "--torque", "0.05"]) == 2
     assert "is a grasper" in capsys.readouterr().err
     assert main(["calibrate", "torque", "-c", "grasper", "--operator", "me", "--yes"]) == 2

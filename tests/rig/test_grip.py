@@ -28,7 +28,7 @@ def test_a_torque_beyond_the_limits_is_refused(torque, capsys):
 
 def test_a_torque_the_load_cannot_give_is_said(capsys):
     assert main(["grip", "--torque", "0.3", "--duration", "12"]) == 1
-    assert "not reached" in capsys.readouterr().err
+    assert "not reached" in capsys.readouterr().out
 
 
 class Constant:
@@ -68,3 +68,10 @@ def test_pieces_decided_on_the_way_are_each_played_once():
         numbers = np.concatenate([r.setpoint for r in session.follow(pieces)])
     played = numbers[numbers >= 0]
     np.testing.assert_array_equal(np.unique(played), np.arange(1000))
+
+
+def test_a_torque_there_was_no_time_for_is_not_called_held(capsys):
+    assert main(["grip", "--torque", "0.06", "--duration", "8", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert not json.loads(out)["is_reached"]
+    assert "longer --duration" in err

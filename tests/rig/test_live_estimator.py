@@ -39,7 +39,7 @@ def test_replayed_estimates_are_the_causal_prediction(model_path):
     run = recording(7)
     estimator = ModelEstimator(model_path, run.sample_rate_hz)
     assert estimator.target_channel == SPINDLE
-    blocks = list(replay_blocks(run, estimator, speed=None))
+    blocks = list(replay_blocks(run, [estimator], speed=None))
     live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
     offline = predict(model_file.read(model_path), run, causal=True)
     np.testing.assert_allclose(live, offline, rtol=1e-9, atol=1e-12)
@@ -50,7 +50,7 @@ def test_a_channel_the_model_lacks_is_named(model_path):
     run = Recording("x", np.arange(100) / 1000, {SPINDLE: np.zeros(100)})
     estimator = ModelEstimator(model_path, 1000.0)
     with pytest.raises(MissingChannelError, match="motor_current_a"):
-        list(replay_blocks(run, estimator, speed=None))
+        list(replay_blocks(run, [estimator], speed=None))
 
 
 def test_a_state_estimator_runs_live_as_offline(tmp_path):
@@ -61,6 +61,6 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     estimator = ModelEstimator(path, runs[0].sample_rate_hz)
     assert estimator.model is None
     assert estimator.target_channel == SPINDLE
-    blocks = list(replay_blocks(runs[0], estimator, speed=None))
+    blocks = list(replay_blocks(runs[0], [estimator], speed=None))
     live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
     np.testing.assert_allclose(live, fitted.predict(runs[0], causal=True), atol=1e-9)

@@ -23,7 +23,7 @@ from tests.rig.simulated import short_protocol, simulated, transport
 def watched(config, keys, tmp_path, duration_s=2.0, plans=()):
     script = iter(keys)
     stream = session_blocks(
-        config, lambda: transport(config), plans, None, lambda: next(script, ""), tmp_path
+        config, lambda: transport(config), plans, (), lambda: next(script, ""), tmp_path
     )
     return list(until(stream, duration_s))
 
@@ -101,12 +101,18 @@ def test_the_interval_and_the_keys_fit_80_columns(tmp_path):
         state.feed(
             replace(block, estimates={"distal_torque_n_m": block.columns["distal_torque_n_m"]})
         )
-    view = View(state.snapshot(), "rig live", 0.012, "t tare  m mark", half_width=0.033)
+    view = View(
+        state.snapshot(),
+        "rig live",
+        0.012,
+        "t tare  m mark",
+        half_widths={"distal_torque_n_m": 0.033},
+    )
     lines = [line.plain for line in view.lines(79, 23)]
     assert "±33.0 mN m" in lines[1]
     assert lines[-1] == "t tare  m mark"
     assert max(len(line) for line in lines if "traces" not in line) <= 120
-    assert ShowOptions("x").half_width is None
+    assert not ShowOptions("x").half_widths
 
 
 def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):

@@ -19,7 +19,7 @@ from tests.rig.simulated import is_armed, short_protocol, simulated, transport
 def test_a_plan_is_played_and_every_sample_shown_once():
     config = simulated()
     plans = short_protocol(1).plans()
-    blocks = list(session_blocks(config, lambda: transport(config), plans, None))
+    blocks = list(session_blocks(config, lambda: transport(config), plans, ()))
     time_s = np.concatenate([block.time_s for block in blocks])
     np.testing.assert_allclose(np.diff(time_s), 1e-3)
     assert blocks[0].devices[0].state == "armed"
@@ -29,14 +29,14 @@ def test_a_plan_is_played_and_every_sample_shown_once():
 
 def test_without_a_plan_the_rig_is_watched_and_never_armed():
     config = simulated()
-    blocks = list(until(session_blocks(config, lambda: transport(config), [], None), 1.0))
+    blocks = list(until(session_blocks(config, lambda: transport(config), [], ()), 1.0))
     assert {block.devices[0].state for block in blocks} == {"disarmed"}
 
 
 def test_closing_the_stream_disarms_the_rig():
     config = simulated()
     link = transport(config)
-    stream = session_blocks(config, lambda: link, short_protocol(1).plans(), None)
+    stream = session_blocks(config, lambda: link, short_protocol(1).plans(), ())
     for _ in range(5):
         assert next(stream).devices[0].state == "armed"
     stream.close()
@@ -46,7 +46,7 @@ def test_closing_the_stream_disarms_the_rig():
 @pytest.mark.parametrize("duration_s", [0.5, 1.0])
 def test_it_ends_after_the_asked_device_time(duration_s):
     config = simulated()
-    blocks = list(until(session_blocks(config, lambda: transport(config), [], None), duration_s))
+    blocks = list(until(session_blocks(config, lambda: transport(config), [], ()), duration_s))
     shown_s = blocks[-1].time_s[-1] - blocks[0].time_s[0]
     assert duration_s <= shown_s < duration_s + 0.25
 
@@ -57,7 +57,7 @@ def test_the_shipped_model_is_live_as_good_as_its_file_states():
     stated = model_file.read(config.model_path).evidence
     estimator = ModelEstimator(config.model_path, 1000.0)
     plans = load_protocol("quick").plans()
-    stream = session_blocks(config, lambda: transport(config), plans, estimator)
+    stream = session_blocks(config, lambda: transport(config), plans, [estimator])
     blocks = list(until(stream, 60.0))
     truth = np.concatenate([b.columns["distal_torque_n_m"] for b in blocks])
     error = np.concatenate([b.estimates["distal_torque_n_m"] for b in blocks]) - truth

@@ -1,12 +1,14 @@
 """A small share of `make soak` and `make fuzz`, and that the two go on where they stopped."""
 
+import os
 import random
+import socket
 from pathlib import Path
 
 import pytest
 
 from benchmarks.reliability import __main__ as page
-from benchmarks.reliability import fuzz
+from benchmarks.reliability import fuzz, listening
 from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
@@ -77,14 +79,27 @@ def test_a_part_that_was_not_measured_here_keeps_its_rows(
 ) -> None:
     earlier = page.TABLE.read_text()
     monkeypatch.setattr(fuzz, "STATE", tmp_path / "fuzz.json")
-    rows = [line for line in earlier.splitlines() if line.startswith("| ")]
+    rows = [line for line in earlier.splitlines() if line.startswith("| ")][1:]
     assert len(rows) >= 2 + 12 + len(TARGETS)
     kept = page.written({}, earlier)
-    assert [line for line in kept.splitlines() if line.startswith("| ")] == rows
-    kills = {"count": 3, "most_lost_s": 0.5, "median_lost_s": 0.1}
+    assert [line for line in kept.splitlines() if line.startswith("| ")][1:] == rows
+    kills = {"count": 3, "most_lost_s": 0.5, "median_lost_s": 0.1, "made": "today, abc, 0"}
     changed = page.written({"kills": kills}, earlier).splitlines()
-    assert [line for line in changed if line.startswith("| ") and line not in rows] == [
+    assert [line for line in changed if line.startswith("| ") and line not in rows][1:] == [
         "| 3 recorders killed: lost, all files repaired, nothing earlier changed | most 0.500 s,"
-        " median 0.100 s | 0.25 s in 200 | **no** |"
+        " median 0.100 s | 0.25 s in 200 | **no** | today, abc, 0 |"
     ]
     assert "not measured" in page.written({}, "")
+
+
+@pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="needs /proc (Linux)")
+def test_what_listens_is_seen_and_told_from_what_does_not() -> None:
+    before = listening.listening(os.getpid())
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        (found,) = listening.listening(os.getpid()) - before
+        assert int(found.split(":")[1], 16) == server.getsockname()[1]
+        assert listening.is_loopback(found)
+        with socket.create_connection(server.getsockname()):
+            assert listening.listening(os.getpid()) - before == {found}
+    assert listening.listening(os.getpid()) == before
+    assert not listening.is_loopback("00000000:1F90")

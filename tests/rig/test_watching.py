@@ -97,7 +97,7 @@ def test_a_stream_says_since_when_its_model_no_longer_fits() -> None:
         return np.where(late, 6e-3 * np.sin(4 * motor_rad), 0.0)
 
     run = synthetic.run("long", 0.35, 0.1, seed=3, seconds=60.0, extra=rough)
-    blocks = list(watched(replay_blocks(run, None, None), fitted))
+    blocks = list(watched(replay_blocks(run, (), None), fitted))
     states = [(block.time_s[-1], block.devices[-1]) for block in blocks]
     assert {status.name for _, status in states} == {"model"}
     early = {status.state for time_s, status in states if time_s < 29}
@@ -111,7 +111,7 @@ def test_a_stream_without_the_models_channels_is_not_watched() -> None:
     fitted = fit(model_file.read(Path("motor")), synthetic.campaign(), bootstrap=0)
     time_s = np.arange(7000) * 1e-3
     bare = Recording("bare", time_s, {"distal_torque_n_m": np.zeros(7000)})
-    last = list(watched(replay_blocks(bare, None, None), fitted))[-1].devices[-1]
+    last = list(watched(replay_blocks(bare, (), None), fitted))[-1].devices[-1]
     assert last.state == "not watched"
     assert "channel" in last.detail or "lacks" in last.detail
 
@@ -121,7 +121,7 @@ def test_closing_the_watched_stream_closes_the_rigs() -> None:
 
     def stream():
         try:
-            yield from replay_blocks(synthetic.run("r", 0.3, 0.1, seed=1), None, None)
+            yield from replay_blocks(synthetic.run("r", 0.3, 0.1, seed=1), (), None)
         finally:
             closed.append(True)
 

@@ -1,4 +1,4 @@
-// The logger on an emulated Cortex-M4: start-up, and the loop that ticks when the timer says so.
+// The logger on an emulated Cortex-M4: start-up, and the loop that ticks as the host asks for it.
 #include "hardware.hpp"
 
 extern "C" {
@@ -6,18 +6,16 @@ extern "C" {
 extern std::uint32_t stack_top, data_begin, data_end, data_stored, bss_begin, bss_end;
 
 [[noreturn]] void reset();
-void wake() {}
-void on_received() { rig::Mps2Hardware::on_received(); }
 [[noreturn]] void stuck() {
     for (;;) {
     }
 }
 
 using Handler = void (*)();
-__attribute__((section(".vectors"), used)) const Handler vectors[17] = {
+__attribute__((section(".vectors"), used)) const Handler vectors[16] = {
     reinterpret_cast<Handler>(&stack_top),
     reset, stuck, stuck, stuck, stuck, stuck, nullptr, nullptr, nullptr, nullptr,
-    stuck, stuck, nullptr, stuck, wake, on_received};
+    stuck, stuck, nullptr, stuck, stuck};
 }
 
 namespace {
@@ -33,15 +31,15 @@ rig::Mps2Hardware* hardware() {
 [[noreturn]] void run() {
     static rig::App<rig::ReferenceProfile, rig::Mps2Hardware, kTransmitCapacity> app(*hardware(), "MPS2-0001");
     hardware()->begin();
-    // the timer says when a tick is due, so one that came late is caught up
-    for (std::uint32_t due_us = hardware()->now_us() + kTickUs;;) {
-        app.exchange();
-        if (static_cast<std::int32_t>(hardware()->now_us() - due_us) >= 0) {
-            app.tick(due_us);
-            due_us += kTickUs;
-        } else {
-            __asm volatile("wfi");
+    for (std::uint32_t tick_us = 0;;) {
+        const std::uint32_t ticks = hardware()->take_turn();
+        do app.exchange();
+        while (hardware()->has_unread());
+        for (std::uint32_t k = 0; k < ticks; ++k, tick_us += kTickUs) {
+            app.tick(tick_us);
+            app.exchange();
         }
+        hardware()->end_turn();
     }
 }
 

@@ -15,14 +15,17 @@ from drivers.transport.faulty import Faults
 from rig.cli.main import main
 from rig.config import load_config
 from rig.errors import ExitCode, UsageError
+from rig.firmware import source_hash
 from rig.grasper import following
 from rig.grasper.coupling import GrasperError
 from rig.grasper.follow import setpoints
-from rig.live.grasper import master
+from rig.grasper.master import master_of
+from rig.log.reader import read_log
 from rig.logger import open_logger
 from rig.machines.grasper import axes_of_joints
 from tests.rig.simulated import is_armed
 
+CHIEF = master_of(load_config(Path("grasper")))
 HERE = (0.1, 0.0, -0.05)
 
 
@@ -40,6 +43,12 @@ def link(monkeypatch, library):
     link = open_logger(load_config(Path("grasper")))
     monkeypatch.setattr(following, "open_logger", lambda config: link)
     return link
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Logs go to the folder of the test."""
+    monkeypatch.chdir(tmp_path)
 
 
 def remembered(device):
@@ -67,9 +76,9 @@ def test_the_potentiometers_come_in_counts_at_2_khz(potentiometers):
 
 def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potentiometers):
     counts = remembered(potentiometers)
-    asked = list(setpoints(potentiometers, master(), HERE, 1.0, scale=0.5))
+    asked = list(setpoints(potentiometers, CHIEF, HERE, 1.0, scale=0.5))
     axes = np.concatenate([np.column_stack(piece) for piece in asked])
-    joints = master().joint_rad(np.concatenate(counts)[:2000])
+    joints = CHIEF.joint_rad(np.concatenate(counts)[:2000])
     assert len(axes) == 2000
     np.testing.assert_allclose(axes[0], HERE)
     np.testing.assert_allclose(axes, HERE + axes_of_joints(0.5 * (joints - joints[0])), atol=1e-12)
@@ -78,7 +87,7 @@ def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potent
 def test_a_master_that_sends_nothing_is_told(potentiometers):
     potentiometers.stop()
     with pytest.raises(LinkTimeoutError, match="sent nothing"):
-        next(setpoints(potentiometers, master(), HERE, 1.0))
+        next(setpoints(potentiometers, CHIEF, HERE, 1.0))
 
 
 def test_three_motors_go_where_the_master_goes(link, capsys):
@@ -93,6 +102,18 @@ def test_three_motors_go_where_the_master_goes(link, capsys):
     for axis in (yaw, jaw_1, jaw_2):
         assert axis["largest_error_rad"] < 0.1 * reach_rad
     assert max(jaw_1["largest_force_n"], jaw_2["largest_force_n"]) > 0.5  # the jaws meet
+    log = read_log(Path(told["log"]))
+    assert log.end.clean
+    assert log.run.conditions == {"trajectory": "follow"}
+    assert int(log.run.details["firmware_build"], 16) == source_hash()
+    assert len(log.topics["/rig/sample"]) >= 6000
+
+
+def test_the_firmware_process_follows_in_real_time(library, capsys):
+    assert main(["grasper", "follow", "-c", "grasper_pty", "--duration", "1", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert all(axis["highest_rad"] > axis["lowest_rad"] for axis in told["axes"])
+    assert read_log(Path(told["log"])).end.clean
 
 
 def test_a_master_that_asks_for_too_much_trips_the_grasper(link, capsys):
@@ -102,7 +123,7 @@ def test_a_master_that_asks_for_too_much_trips_the_grasper(link, capsys):
     assert not is_armed(link.board, GRASPER)
 
 
-def test_a_broken_wire_disarms_the_motors(link, monkeypatch):
+def test_a_broken_wire_disarms_the_motors(link, monkeypatch, tmp_path):
     device = open_fake(Faults())
     read, reads, followed = device.read, [], []
 
@@ -117,7 +138,7 @@ def test_a_broken_wire_disarms_the_motors(link, monkeypatch):
     monkeypatch.setattr(following, "open_section", lambda section: device)
     with pytest.raises(GrasperError, match="rail"):
         following.follow_master(
-            load_config(Path("grasper")), None, master(), 5.0, 0.2, followed.append
+            load_config(Path("grasper")), None, 5.0, 0.2, tmp_path, followed.append
         )
     assert followed[-1] > 0.1
     assert not is_armed(link.board, GRASPER)
@@ -148,8 +169,8 @@ def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
         ("bench", "sim://", "simulated master"),
     ],
 )
-def test_what_cannot_be_followed_is_refused(config, url, said, library):
+def test_what_cannot_be_followed_is_refused(config, url, said, library, tmp_path):
     bench = load_config(Path("grasper")).changed(logger={"url": "usb:16c0:0483"})
     chosen = bench if config == "bench" else load_config(Path(config))
     with pytest.raises(UsageError, match=said):
-        following.follow_master(chosen, url, master(), 1.0, 0.2)
+        following.follow_master(chosen, url, 1.0, 0.2, tmp_path)

@@ -1,0 +1,110 @@
+"""Rivals: which other effects could do what a named one does, and which of them are beaten.
+
+Of two effects of the same channels the form decides. Of two that depend on different channels each
+is given any form a little bent, and the one that is clearly better then has the name.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from estimation.diagnosis.bent import bent_losses
+from estimation.diagnosis.candidate import Candidate, related
+from estimation.diagnosis.evidence import leave_one_run_out, runs_agree
+from estimation.diagnosis.search import Search
+from estimation.recording import FloatArray
+
+MOST = 8
+"""Rivals that are looked at."""
+
+ROUGHLY = 0.8
+"""Share of the least gain of a rival above which it is worth polishing."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """An effect in the place of a named one, beside all others that were found.
+
+    Attributes:
+        candidate: The effect at its own best shape.
+        losses: Squared error of each run left out, shape (runs,).
+        bent: The same in any form a little bent.
+    """
+
+    candidate: Candidate
+    losses: FloatArray
+    bent: FloatArray
+
+    def depends_as(self, other: "Tried") -> bool:
+        """Say whether two effects depend on the same channels: only their form tells them apart."""
+        one, two = ({name for _, name in t.candidate.channels} for t in (self, other))
+        return one == two
+
+
+def tried(search: Search, others: Sequence[Candidate], candidate: Candidate) -> Tried:
+    """Put an effect beside others."""
+    terms = [*search.balance.terms, *others]
+    left = search.balance.left(terms)
+    block = search.balance.columns([candidate])
+    aims = [r[:, None] for r in left]
+    plain = leave_one_run_out(search.balance.base(terms), block, [block[0].shape[1]], aims)
+    bent = bent_losses(search.balance, terms, candidate, left)
+    return Tried(candidate, plain.joint[:, 0, 0], bent.joint[:, 0, 0])
+
+
+def rivals_of(
+    search: Search, others: Sequence[Candidate], named: Candidate, gain: float
+) -> list[Tried]:
+    """Return the other families that could do it, each at its own best shape, best first.
+
+    Args:
+        search: The search that found it.
+        others: The other effects found.
+        named: The effect.
+        gain: Share of the squared error it removes beside the others.
+    """
+    found: list[Tried] = []
+    for rival in search.ranked(others, 0):
+        if rival.family == named.family or rival.gain < ROUGHLY * search.gates.rival * gain:
+            continue
+        best = _polished(search, others, rival.candidates[0])
+        if search.shows(best) or best.family in named.effect.same_as:
+            found.append(tried(search, others, best))
+        if len(found) == MOST:
+            break
+    return found
+
+
+def _polished(search: Search, others: Sequence[Candidate], rival: Candidate) -> Candidate:
+    """Return a rival at its own best shape."""
+    if not rival.shape:
+        return rival
+    return search.balance.refined([*search.balance.terms, *others, rival], passes=1)[-1]
+
+
+def beaten(search: Search, named: Tried, rival: Tried) -> bool:
+    """Say whether a named effect leaves less than a rival in run after run, and not just a little.
+
+    Of effects that only another experiment tells apart neither beats the other.
+    """
+    if named.depends_as(rival):
+        if rival.candidate.family in named.candidate.effect.same_as:
+            return False
+        return runs_agree(rival.losses, named.losses) <= search.gates.agree
+    enough = named.bent.sum() < search.gates.clearly * rival.bent.sum()
+    return bool(enough) and runs_agree(rival.bent, named.bent) <= search.gates.agree
+
+
+def better(
+    search: Search, named: Tried, rivals: Sequence[Tried], others: Sequence[Candidate]
+) -> Candidate | None:
+    """Return the rival of other channels that does clearly better in any form, or None."""
+    offered = [
+        r
+        for r in rivals
+        if not r.depends_as(named) and not any(related(r.candidate, f) for f in others)
+    ]
+    best = min(offered, key=lambda r: float(r.bent.sum()), default=None)
+    if best is None or best.bent.sum() > search.gates.veto * named.bent.sum():
+        return None
+    agreed = runs_agree(named.bent, best.bent) <= search.gates.agree
+    return best.candidate if agreed else None

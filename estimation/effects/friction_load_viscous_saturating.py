@@ -1,0 +1,35 @@
+"""Load-viscous friction of a film that thins: damping under load that speed wears off."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Parameter, Pointwise
+
+
+class SaturatingLoadViscousFriction(Pointwise):
+    """Viscous friction of a loaded film that is sheared thinner the faster it is sheared.
+
+    Equation: torque = c |load| speed / (1 + |speed| / knee).
+
+    Source: Bair and Winer 1979 (a lubricant under pressure bears a limiting shear stress).
+    """
+
+    id = "friction.load_viscous.saturating"
+    family = "friction.load_viscous"
+    balances: ClassVar = {"motor": -1, "cable": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "motor_load_n_m"}
+    amplitudes = (
+        Parameter("damping", "target / load / speed", "damping for one unit of load", lower=0.0),
+    )
+    shape = (Parameter("knee", "speed", "speed at which half of it is left", 0.1, 500.0, points=9),)
+    confused_with = ("friction.load", "friction.viscous")
+    bends = ("load", "speed")
+    told_apart_by = "a staircase of speeds at two loads"
+    other_below = ("knee",)
+
+    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+        """Return one value or array for each amplitude."""
+        speed = inputs["speed"]
+        return (np.abs(inputs["load"]) * speed / (1.0 + np.abs(speed) / shape[0]),)

@@ -1,0 +1,107 @@
+"""Grasp, pitch and yaw force of a 3-DOF grasper on the live display, as `rig live -c grasper`."""
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.effects.roles import MOTORS
+from estimation.model_table import ModelFileError
+from estimation.recording import Recording
+from rig.cli.main import main
+from rig.config import SHIPPED, load_config
+from rig.diagnosis.subject import subject
+from rig.live.block import LimitStatus
+from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
+from rig.live.model_status import ModelStatus
+from rig.live.options import ShowOptions
+from rig.live.state import Reading, Snapshot, Value
+from rig.live.view import View
+from rig.log.convert import write_recording
+
+MODEL = SHIPPED / "simulated_grasper.model.toml"
+
+
+def test_the_grasp_is_of_both_jaws_and_the_pitch_of_the_one_that_touches():
+    joints = of_joints(
+        {"jaw_1_force_n": np.array([1.0, 0.0]), "jaw_2_force_n": np.array([2.0, 3.0])}
+    )
+    np.testing.assert_allclose(joints["grasp_force_n"], [1.5, 1.5])
+    np.testing.assert_allclose(joints["pitch_force_n"], [2.0, 3.0])
+    assert of_joints({"distal_torque_n_m": np.zeros(2)}) == {}
+    widths = interval_of_joints({"jaw_1_force_n": 0.1, "jaw_2_force_n": 0.2, "yaw_force_n": 0.3})
+    assert [widths[joint] for joint in JOINTS] == pytest.approx([0.15, 0.2, 0.3])
+
+
+def test_live_shows_three_forces_with_intervals_and_the_age_of_their_fit(capsys):
+    assert main(["live", "-c", "grasper", "--pace", "0", "--duration", "6", "--json"]) == 0
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    channels = frames[-2]["channels"]
+    assert tuple(channels) == JOINTS
+    for channel in channels.values():
+        assert channel["half_width95"] > 0
+        assert abs(channel["estimate"] - channel["sensor"]) < 2 * channel["half_width95"]
+    (status,) = [d for d in frames[-2]["devices"] if d["name"] == "estimate"]
+    assert "days ago" in status["detail"]
+
+
+def status(days=0.0, **estimates):
+    models = [
+        replace(m, evidence=replace(m.evidence, made_at="2026-01-01T00:00:00+00:00"))
+        for m in model_file.read_all(MODEL)
+    ]
+    now = datetime.fromtimestamp(datetime(2026, 1, 1, tzinfo=UTC).timestamp() + 86400 * days, UTC)
+    return ModelStatus(models, now).of({k: np.full(9, v) for k, v in estimates.items()})
+
+
+def test_an_estimate_beyond_what_was_fitted_is_suspect_and_an_old_fit_stale():
+    assert status(12, yaw_force_n=0.5).state == "ok"
+    assert status(12, yaw_force_n=0.5).detail == "fitted 12 days ago"
+    assert status(200, yaw_force_n=0.5).state == "stale"
+    beyond = status(200, jaw_1_force_n=5.0)
+    assert beyond.state == "suspect"
+    assert beyond.detail.startswith("Jaw 1 force beyond its fit, ")
+    assert beyond.detail.endswith(" N")
+
+
+@pytest.mark.parametrize("line", ['made_at = "yesterday"', "target_range = [1.0]"])
+def test_a_model_file_with_a_strange_date_or_range_is_refused(line, tmp_path):
+    text = MODEL.read_text()
+    key = line.split()[0]
+    kept = [row for row in text.splitlines() if not row.startswith(key)]
+    path = tmp_path / "m.toml"
+    path.write_text("\n".join([*kept, line]))
+    with pytest.raises(ModelFileError, match=key):
+        model_file.read_all(path)
+
+
+def test_the_nearest_limits_are_shown_where_there_is_no_room_for_all():
+    nothing = np.full((2, 500), np.nan)
+    reading = Reading(JOINTS[0], "N", False, Value(1.0), Value(1.0), None, nothing, nothing)
+    limits = tuple(LimitStatus(f"limit_{k}", k / 10, 1.0, "N") for k in range(9))
+    snapshot = Snapshot(1.0, 10, 0, 2000.0, {}, (reading,), (), limits)
+    lines = [line.plain for line in View(snapshot, "x", 0.01).lines(79, 16)]
+    assert len(lines) <= 16
+    shown = [line.split()[0] for line in lines if line.startswith("limit_")]
+    assert shown == sorted(shown)
+    assert shown[-1] == "limit_8"
+    assert f"{9 - len(shown)} more limits, none nearer" in lines
+
+
+def test_the_shipped_model_is_of_the_shipped_configuration():
+    assert load_config(Path("grasper")).model_path == MODEL
+    assert ShowOptions("x").half_widths == {}
+
+
+def test_logs_of_a_grasper_are_diagnosed_axis_by_axis(tmp_path):
+    time_s = np.arange(200) / 2000
+    names = [f"{axis}_{channel}" for axis in MOTORS for channel in ("current_a", "angle_rad")]
+    columns = {name: np.zeros(200) for name in (*names, *AXES)}
+    write_recording(tmp_path / "one.mcap", Recording("one", time_s, columns))
+    assert [m.balance for m in subject(tmp_path).models] == ["jaw_1", "jaw_2", "yaw"]
+    (one,) = subject(tmp_path, balance="jaw_2").models
+    assert one.target == "jaw_2_force_n"
