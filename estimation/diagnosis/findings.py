@@ -23,6 +23,10 @@ SAME_CAUSE = 0.9
 TWICE = 2.0
 """And when the sizes differ by less than this factor."""
 
+NEARLY = 0.8
+"""A balance that names a cause better speaks for another one where it removes at least this share
+of what the other removes of its own error."""
+
 ECHO, LARGER = 0.3, 3.0
 """A claim that removes less than this share of its balance's squared error is not told from the
 echo of a cause in another balance that removes so many times its share there."""
@@ -72,7 +76,7 @@ class Told:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
         told = others.family.startswith("sensor.") and _same_sensor(others, mine)
-        if told or self.share < 0.5 * other.share:
+        if told or self.share < NEARLY * other.share:
             return False
         if (mine.verdict == "identified") != (others.verdict == "identified"):
             return mine.verdict == "identified"

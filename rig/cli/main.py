@@ -2,6 +2,7 @@
 
 import os
 import sys
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
@@ -136,4 +137,6 @@ def _report(error: Exception, words: list[str]) -> int:
 
 def run() -> None:
     """Run the command line as the console script does: leave with its exit code."""
+    if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a letter it lacks is no error
+        sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())

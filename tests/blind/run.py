@@ -208,7 +208,7 @@ def blind(
             bar.advance(task)
     found = tables(state)
     for table in found:
-        results(json=False).print(to_rich(table))
+        results(json=json_).print(to_rich(table))
     if report is not None:
         head = f"# Blind study\n\n{Provenance.now(seed).line()}\n\n"
         write_text_atomic(report, head + "\n".join(map(to_markdown, found)))

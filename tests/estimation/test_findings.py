@@ -84,7 +84,7 @@ def test_findings_come_in_the_order_found_however_much_each_explains():
     [
         ("gravity.payload", 0.9, "identified", True),
         ("gravity.payload", 0.9, "one_of", False),
-        ("gravity.payload", 0.3, "identified", False),
+        ("gravity.payload", 0.5, "identified", False),
         ("sensor.encoder_inl", 0.9, "identified", False),  # what the other names already
     ],
 )

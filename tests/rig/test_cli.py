@@ -1,8 +1,10 @@
 """The command line's skeleton: instant help, errors in three lines, exit codes."""
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
@@ -66,6 +68,20 @@ def test_results_go_where_a_pipe_finds_them(words, capsys):
 def test_with_json_stdout_carries_nothing_else(words, capsys):
     assert main([*words.split(), "--json"]) == 0
     assert isinstance(json.loads(capsys.readouterr().out), dict)
+
+
+def test_a_terminal_without_the_letters_gets_their_codes():
+    """The plus-minus of an interval ended `rig live` where stdout is ASCII."""
+    words = ["live", "--plain", "--pace", "0", "--duration", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", "rig", *words],
+        capture_output=True,
+        check=False,
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"mN m \\xb1" in done.stdout
 
 
 def test_json_has_no_nan_and_no_numpy():
