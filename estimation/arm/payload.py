@@ -74,6 +74,24 @@ def point_mass(arm: Arm, motion: Motion, link: int, point_m: FloatArray) -> Floa
     return torque
 
 
+def carried_torque(arm: Arm, motion: Motion) -> FloatArray:
+    """Return the joint torques of what an arm carries, shape (n, joints); zero where it is nothing.
+
+    An arm identified without its payload or with another tool estimates its torque with this added.
+
+    Args:
+        arm: The arm, with `carried`.
+        motion: Its motion.
+
+    Raises:
+        ArmError: A mass sits on a link whose parameters do not all count.
+    """
+    torque = np.zeros((len(motion), len(arm.joints)))
+    for mass in arm.carried:
+        torque += mass.mass_kg * point_mass(arm, motion, mass.link, np.array(mass.point_m))
+    return torque
+
+
 def added_mass(
     residual: FloatArray,
     unit: tuple[FloatArray, FloatArray, FloatArray],

@@ -84,6 +84,38 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
+class PointMass:
+    """A mass fixed to a link, beside what the link's own parameters say.
+
+    Attributes:
+        name: What it is called.
+        link: The link it is fixed to, from 1.
+        point_m: Where, in the link's frame, m.
+        mass_kg: How much.
+    """
+
+    name: str
+    link: int
+    point_m: tuple[float, float, float]
+    mass_kg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """What is mounted on the last link: where its own tip is, and what it weighs.
+
+    Attributes:
+        name: What it is called.
+        tip: The fixed row from the last joint's frame to the tool's tip.
+        masses: Its masses.
+    """
+
+    name: str
+    tip: DhRow
+    masses: tuple[PointMass, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Arm:
     """An arm: its joints in a row, and the bodies of its loops where it has any.
 
@@ -99,6 +131,8 @@ class Arm:
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
         loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
             see `bodies`.
+        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` says
+            what they ask of the joints.
     """
 
     name: str
@@ -110,6 +144,16 @@ class Arm:
     wrist: int | None = None
     wrist_coupling: tuple[tuple[float, ...], ...] = ()
     loops: tuple[Body, ...] = ()
+    carried: tuple[PointMass, ...] = ()
+
+    def with_payload(self, *masses: PointMass) -> "Arm":
+        """Return the arm with masses added to what it carries."""
+        return replace(self, carried=(*self.carried, *masses))
+
+    def with_tool(self, tool: Tool) -> "Arm":
+        """Return the arm with a tool at its end: its tip is the tool's, and it carries the tool."""
+        mounted = replace(self, name=f"{self.name}, with {tool.name}", tip=tool.tip)
+        return mounted.with_payload(*tool.masses)
 
     @property
     def bodies(self) -> tuple[Body, ...]:

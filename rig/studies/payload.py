@@ -7,13 +7,11 @@ that lift the mass is the mass.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from estimation.arm.effects import ArmEffect
 from estimation.arm.identification import smoothed
 from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
-from estimation.arm.payload import SIDE_STEP_M, AddedMass, added_mass, point_mass
-from estimation.arm.tables import PSM
+from estimation.arm.payload import SIDE_STEP_M, AddedMass, added_mass, carried_torque
+from estimation.arm.tables import PSM, PointMass
 from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
 from rig.reports.provenance import Provenance
@@ -105,16 +103,15 @@ def _mass(
     height_error_m: float,
 ) -> AddedMass:
     path, kept = prepare(run, tried), [effect.name for effect in tried]
-    straight = _unit(run, np.array([0.0, height_m, 0.0]), len(path.torque))
+    straight = _unit(run, (0.0, height_m, 0.0), len(path.torque))
 
-    def beside(direction: FloatArray) -> FloatArray:
-        at = np.array([0.0, height_m, 0.0]) + SIDE_STEP_M * direction
-        return _unit(run, at, len(path.torque)) - straight
+    def beside(x_m: float, z_m: float) -> FloatArray:
+        return _unit(run, (x_m, height_m, z_m), len(path.torque)) - straight
 
     return added_mass(
         _left(path, kept, values),
-        (straight, beside(np.array([1.0, 0.0, 0.0])), beside(np.array([0.0, 0.0, 1.0]))),
-        _unit(run, np.array([0.0, height_m + height_error_m, 0.0]), len(path.torque)),
+        (straight, beside(SIDE_STEP_M, 0.0), beside(0.0, SIDE_STEP_M)),
+        _unit(run, (0.0, height_m + height_error_m, 0.0), len(path.torque)),
         noise,
         round(PERIOD_S * RATE_SHARE * LOW_PASS.cutoff_hz),
     )
@@ -125,11 +122,12 @@ def _left(path: Prepared, kept: Sequence[str], values: FloatArray) -> FloatArray
     return left
 
 
-def _unit(run: Recording, point_m: FloatArray, length: int) -> FloatArray:
+def _unit(run: Recording, point_m: tuple[float, float, float], length: int) -> FloatArray:
     """Return one kilogram's torque on the lifting joints, filtered and thinned as the path is."""
     rate_hz = run.sample_rate_hz
     position, _, _ = joint_channels(run)
-    torque = point_mass(PSM, motion_of(position, 1 / rate_hz, FINE), LINK, point_m)
+    loaded = PSM.with_payload(PointMass("one kilogram", LINK, point_m, 1.0))
+    torque = carried_torque(loaded, motion_of(position, 1 / rate_hz, FINE))
     every = max(1, round(rate_hz / (RATE_SHARE * LOW_PASS.cutoff_hz)))
     start = round(EDGE_S * rate_hz)
     filtered = smoothed(torque[:, LIFTING, None], rate_hz)[start::every, :, 0]

@@ -1,12 +1,14 @@
 """A mass added to an arm: its torque against Pinocchio's, and the estimate from what is left."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from estimation.arm.kinematics import ArmError, built
+from estimation.arm.kinematics import ArmError, built, tip_pose
 from estimation.arm.motion import motion_of
-from estimation.arm.payload import added_mass, point_mass
-from estimation.arm.tables import PSM
+from estimation.arm.payload import added_mass, carried_torque, point_mass
+from estimation.arm.tables import PSM, DhRow, PointMass, Tool
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 
@@ -62,3 +64,21 @@ def test_two_periods_are_too_few_to_know_the_scatter():
 def test_a_link_without_a_mass_of_its_own_is_refused():
     with pytest.raises(ArmError, match="Link 5"):
         point_mass(PSM, motion(), 5, np.zeros(3))
+
+
+def test_an_arm_carries_its_payload_and_its_tool_as_data():
+    moved = motion()
+    weight = PointMass("weight", 2, (0.0, 0.5, 0.0), 0.105)
+    tool = Tool("a longer driver", DhRow(0.0, -np.pi / 2, 0.02, 0.0), (replace(weight, link=1),))
+    arm = PSM.with_payload(weight).with_tool(tool)
+    one, other = (point_mass(PSM, moved, k, np.array(weight.point_m)) for k in (2, 1))
+    np.testing.assert_allclose(carried_torque(arm, moved), 0.105 * (one + other), atol=1e-12)
+    assert not carried_torque(PSM, moved).any()
+    moved_tip = tip_pose(arm, np.zeros(6)) @ np.linalg.inv(tip_pose(PSM, np.zeros(6)))
+    assert np.linalg.norm(moved_tip[:3, 3]) == pytest.approx(0.01)  # 20 mm in place of 10 mm
+
+
+def test_a_mass_on_a_link_without_a_mass_of_its_own_is_refused():
+    arm = PSM.with_payload(PointMass("weight", 4, (0.0, 0.0, 0.0), 0.1))
+    with pytest.raises(ArmError, match="Link 4"):
+        carried_torque(arm, motion())
