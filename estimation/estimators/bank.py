@@ -175,9 +175,14 @@ class BankEstimator:
 
 
 class BankStepper:
-    """A state estimator as it runs live."""
+    """A state estimator as it runs live.
+
+    Attributes:
+        inside: Whether each of the last samples lay in the range fitted on, shape (n,).
+    """
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
+        self.inside: NDArray[np.bool_] = np.empty(0, np.bool_)
         self._estimator = estimator
         self._source = CausalChannels(
             estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
@@ -190,7 +195,9 @@ class BankStepper:
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
-        return self.estimate(time_s, measured).value
+        found = self.estimate(time_s, measured)
+        self.inside = found.inside
+        return found.value
 
     def estimate(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> Estimates:
         """Take the next samples and return their estimates with interval and validity."""

@@ -106,9 +106,14 @@ class NetworkEstimator:
 
 
 class NetworkStepper:
-    """A network as it runs live."""
+    """A network as it runs live.
+
+    Attributes:
+        inside: Whether each of the last samples lay in the range trained on, shape (n,).
+    """
 
     def __init__(self, estimator: NetworkEstimator, sample_rate_hz: float) -> None:
+        self.inside: NDArray[np.bool_] = np.empty(0, np.bool_)
         self._network = estimator.network
         self._source = CausalChannels(estimator.network.inputs, sample_rate_hz, estimator.low_pass)
 
@@ -120,7 +125,9 @@ class NetworkStepper:
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
         channels = self._source.step(time_s, measured)
-        return self._network(np.column_stack([channels[n] for n in self._network.inputs]))[:, 0]
+        rows = np.column_stack([channels[n] for n in self._network.inputs])
+        self.inside = self._network.inside(rows)
+        return self._network(rows)[:, 0]
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,8 @@ def live(
             out,
         )
         blocks = with_joint_forces(blocks)
-        if models:
-            blocks = with_model_status(blocks, models)
+        if estimators:
+            blocks = with_model_status(blocks, estimators)
         if len(models) == 1:
             blocks = watched(blocks, models[0])
         if foxglove:

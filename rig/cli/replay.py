@@ -66,8 +66,8 @@ def replay(
     )
     blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None))
     models = [estimator.model for estimator in estimators if estimator.model is not None]
-    if models:
-        blocks = with_model_status(blocks, models)
+    if estimators:
+        blocks = with_model_status(blocks, estimators)
     if len(models) == 1:
         blocks = watched(blocks, models[0])
     summary = show(blocks, options, results(json_))

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from estimation import model_file
 from estimation.estimator import Stepper, load
-from estimation.estimators.bank import BankEstimator
-from estimation.estimators.network import NetworkEstimator
+from estimation.estimators.bank import BankEstimator, BankStepper
+from estimation.estimators.network import NetworkEstimator, NetworkStepper
 from estimation.model import Model
 from estimation.recording import MissingChannelError
 from estimation.stream import Stream
@@ -49,6 +49,17 @@ class ModelEstimator:
         # two standard errors of the runs it was fitted on, their means left in: what a person at
         # the bench has to reckon with, in motion, on a rig that is as it was then
         self.half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
+
+    @property
+    def outside(self) -> bool:
+        """Whether most of the last samples lay outside the range that the estimator was fitted on.
+
+        A physical model says nothing of it sample by sample.
+        """
+        if not isinstance(self._stream, BankStepper | NetworkStepper):
+            return False
+        inside = self._stream.inside
+        return inside.size > 0 and not inside.mean() > 0.5
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,).

@@ -10,6 +10,7 @@ from estimation.channels import unit_of
 from estimation.model import Model
 from rig.live import text as words
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
+from rig.live.estimator import ModelEstimator
 from rig.live.state import Value
 
 NAME = "estimate"
@@ -35,11 +36,18 @@ class ModelStatus:
         days = [_days(text, now or datetime.now(UTC)) for text in made if text]
         self._days = max(days) if days else None
 
-    def of(self, estimates: Mapping[str, FloatArray]) -> DeviceStatus:
+    def of(self, estimates: Mapping[str, FloatArray], outside: Sequence[str] = ()) -> DeviceStatus:
         """Return the status with new estimates: `suspect` beyond a range, `stale` when too old.
 
         Beyond is by more than the estimate's own interval.
+
+        Args:
+            estimates: Estimates of the newest samples by channel.
+            outside: Channels whose estimator says that these lie outside what it was fitted on.
         """
+        if outside:
+            names = ", ".join(words.name_of(name) for name in outside)
+            return DeviceStatus(NAME, "suspect", f"{names} outside what it was fitted on")
         outside = [
             _beyond(name, low, high)
             for name, (low, high, margin) in self._ranges.items()
@@ -48,24 +56,25 @@ class ModelStatus:
         if outside:
             return DeviceStatus(NAME, "suspect", ", ".join(outside))
         if self._days is None:
-            return DeviceStatus(NAME, "ok", "its fit has no date")
+            return DeviceStatus(NAME, "ok", "within its fit, which has no date")
         state = "stale" if self._days > STALE_DAYS else "ok"
         return DeviceStatus(NAME, state, f"fitted {self._days:.0f} days ago")
 
 
 def with_model_status(
-    blocks: Iterator[SampleBlock], models: Sequence[Model]
+    blocks: Iterator[SampleBlock], estimators: Sequence[ModelEstimator]
 ) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with what can be said of the models that estimate.
+    """Yield blocks as they come, each with what can be said of what estimates.
 
     Args:
         blocks: The stream. It is closed when this one is.
-        models: Fitted models.
+        estimators: What made its estimates.
     """
-    status = ModelStatus(models)
+    status = ModelStatus([e.model for e in estimators if e.model is not None])
     try:
         for block in blocks:
-            yield replace(block, devices=(*block.devices, status.of(block.estimates)))
+            outside = [e.target_channel for e in estimators if e.outside]
+            yield replace(block, devices=(*block.devices, status.of(block.estimates, outside)))
     finally:
         close = getattr(blocks, "close", None)
         if close is not None:

@@ -11,6 +11,7 @@ from estimation.fitting import fit
 from estimation.model import predict
 from estimation.recording import MissingChannelError, Recording
 from rig.live.estimator import ModelEstimator
+from rig.live.model_status import with_model_status
 from rig.live.replay import replay_blocks
 from tests.estimation.synthetic import campaign
 
@@ -64,3 +65,22 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     blocks = list(replay_blocks(runs[0], [estimator], speed=None))
     live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
     np.testing.assert_allclose(live, fitted.predict(runs[0], causal=True), atol=1e-9)
+
+
+def test_a_state_estimator_outside_what_it_was_fitted_on_is_suspect(tmp_path):
+    runs = list(campaign())
+    fitted = BankRecipe(SPINDLE, Bank("motor_current_a"), causal=True).fit(Campaign.of(runs))
+    path = tmp_path / "states.npz"
+    fitted.save(path)
+    loaded = runs[0].with_columns(motor_current_a=3.0 * runs[0]["motor_current_a"] + 2.0)
+    assert {"ok", "suspect"} == states(
+        path, runs[0]
+    )  # the jaw opens too, and only closing is fitted
+    assert states(path, loaded) == {"suspect"}
+
+
+def states(path, run):
+    """Return what the display says of an estimator in a run."""
+    estimator = ModelEstimator(path, run.sample_rate_hz)
+    blocks = with_model_status(replay_blocks(run, [estimator], speed=None), [estimator])
+    return {block.devices[-1].state for block in blocks}

@@ -37,6 +37,7 @@ class Smoothed:
 
     target_channel = GRIP
     half_width = None
+    outside = False
     model = None
 
     def __init__(self):
