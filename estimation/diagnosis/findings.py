@@ -50,6 +50,9 @@ SENSORS = {
 }
 """What each balance reads: a sensor at fault shows in all that read it."""
 
+ENCODER, OF_TORQUE = "sensor.encoder_inl", ("motor", "cable")
+"""A fault of an angle's reading, and balances of torque that no such fault can reach."""
+
 LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
 """Faults that two balances may name differently."""
 
@@ -75,6 +78,8 @@ class Told:
     def is_surer_than(self, other: "Told") -> bool:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
+        if others.family == ENCODER and mine.balance in OF_TORQUE:
+            return self.share >= ECHO  # no encoder makes a torque
         told = others.family.startswith("sensor.") and _same_sensor(others, mine)
         if told or self.share < NEARLY * other.share:
             return False

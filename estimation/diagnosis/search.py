@@ -126,7 +126,8 @@ class Search:
             terms = self.balance.refined([*self.balance.terms, *found])
             self.balance = replace(self.balance, terms=terms[: -len(found)])
             moved = zip(found, terms[-len(found) :], strict=True)
-            found = [new if self.shows(new) else old for old, new in moved]
+            kept = self.gates.akin  # where no name is asked for, the best shape is right
+            found = [new if kept or self.shows(new) else old for old, new in moved]
         return found, trials, steps, ranking
 
     def shows(self, candidate: Candidate) -> bool:

@@ -83,9 +83,8 @@ def test_findings_come_in_the_order_found_however_much_each_explains():
     ("family", "share", "verdict", "surer"),
     [
         ("gravity.payload", 0.9, "identified", True),
-        ("gravity.payload", 0.9, "one_of", False),
-        ("gravity.payload", 0.5, "identified", False),
-        ("sensor.encoder_inl", 0.9, "identified", False),  # what the other names already
+        ("gravity.payload", 0.9, "one_of", True),  # no encoder makes a torque
+        ("gravity.payload", 0.2, "identified", False),
     ],
 )
 def test_what_two_balances_show_is_told_by_the_one_that_names_it_better(
@@ -94,3 +93,20 @@ def test_what_two_balances_show_is_told_by_the_one_that_names_it_better(
     wave = Told(finding("stretch", "sensor.encoder_inl"), {}, None, 0, 0.8)
     other = Told(replace(finding("cable", family), verdict=verdict), {}, None, 0, share)
     assert other.is_surer_than(wave) is surer
+
+
+@pytest.mark.parametrize(
+    ("family", "share", "verdict", "surer"),
+    [
+        ("gravity.payload", 0.9, "identified", True),
+        ("gravity.payload", 0.9, "one_of", False),
+        ("gravity.payload", 0.5, "identified", False),
+        ("sensor.crosstalk", 0.9, "identified", False),  # what the other names already
+    ],
+)
+def test_a_torque_sensors_fault_gives_way_to_a_name_that_explains_as_much(
+    family, share, verdict, surer
+):
+    fault = Told(finding("stretch", "sensor.crosstalk"), {}, None, 0, 0.8)
+    other = Told(replace(finding("cable", family), verdict=verdict), {}, None, 0, share)
+    assert other.is_surer_than(fault) is surer
