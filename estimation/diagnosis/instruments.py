@@ -56,11 +56,10 @@ def projection(runs: Sequence[Run], pool: Sequence[Candidate], target: str) -> C
         target: The balance's target, which is no instrument.
     """
     wanted = {name for c in pool for role, name in c.channels if role in c.effect.projected_roles}
-    found = {name: fitted(runs, name, target) for name in sorted(wanted)}
-    fits = {projected(name): fit for name, fit in found.items() if fit}
+    fits = {name: fit for name in sorted(wanted) if (fit := fitted(runs, name, target))}
 
     def added(run: Run) -> Run:
-        new = {name: as_told(run, fit) for name, fit in fits.items()}
+        new = {projected(name): as_told(run, fit) for name, fit in fits.items()}
         return replace(run, channels={**run.channels, **new})
 
     return added

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.evidence import Losses, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map, variables_of, within
-from estimation.diagnosis.rivals import beaten, better, rivals_of, tried
+from estimation.diagnosis.rivals import Tried, beaten, better, rivals_of, tried
 from estimation.diagnosis.search import Search, Trial
 from estimation.recording import FloatArray
 
@@ -52,34 +52,53 @@ class Discovery:
     left_map: Map | None
 
 
+@dataclass(frozen=True)
+class Contest:
+    """An effect beside the others that were found, and its rivals in its place.
+
+    Attributes:
+        losses: Of the effect beside the others.
+        rivalry: The effect, and its rivals.
+        others: The others.
+    """
+
+    losses: Losses
+    rivalry: tuple[Tried, list[Tried]]
+    others: list[Candidate]
+
+
 def searched(search: Search) -> Discovery:
     """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
     found, trials, steps, ranking = search.forwards()
     kept = search.backwards(found)
     stay = [found[j] for j in kept]
+    contests: dict[int, Contest] = {}
     for k in range(len(stay)):
-        others = [f for j, f in enumerate(stay) if j != k]
-        stay[k] = _better(search, stay[k], others) or stay[k]
-    named = [_named(search, stay, k, trials[j]) for k, j in enumerate(kept)]
+        contests[k] = _contest(search, stay, k)
+        if (best := better(search, *contests[k].rivalry, contests[k].others)) is not None:
+            stay[k] = best
+            contests = {}  # what stood beside this effect was held against another one
+    named = [
+        _named(search, trials[j], contests.get(k) or _contest(search, stay, k))
+        for k, j in enumerate(kept)
+    ]
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
     left = best_map(search.balance, terms, search.gates.draws, search.seed)
     return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
 
 
-def _better(search: Search, named: Candidate, others: Sequence[Candidate]) -> Candidate | None:
-    mine = search.beside([named, *others], range(1 + len(others)), 0)
-    rivals = rivals_of(search, others, named, float(mine.gain[0, 0]))
-    return better(search, tried(search, others, named), rivals, others)
-
-
-def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> Named:
-    """Ask what else an effect could be, how sure its name is, and whether a map does better."""
+def _contest(search: Search, found: Sequence[Candidate], k: int) -> Contest:
     others = [f for j, f in enumerate(found) if j != k]
     mine = search.beside(found, range(len(found)), k)
+    rivals = rivals_of(search, others, found[k], float(mine.gain[0, 0]))
+    return Contest(mine, (tried(search, others, found[k]), rivals), others)
+
+
+def _named(search: Search, trial: Trial, contest: Contest) -> Named:
+    """Ask what else an effect could be, how sure its name is, and whether a map does better."""
+    mine, (own, rivals), others = contest.losses, contest.rivalry, contest.others
     total, gain = mine.base[:, 0], float(mine.gain[0, 0])
-    own = tried(search, others, found[k])
-    rivals = rivals_of(search, others, found[k], gain)
     near = [
         r
         for r in rivals
@@ -93,12 +112,12 @@ def _named(search: Search, found: Sequence[Candidate], k: int, trial: Trial) -> 
     flat = best_map(search.balance, terms, 0, search.seed)
     withdrawn = (
         flat is not None
-        and flat.variables != found[k].effect.any_function_of
+        and flat.variables != own.candidate.effect.any_function_of
         and _vetoes(search, flat, mine)
-        and not _of_its_form(search, found[k], gain, flat)
+        and not _of_its_form(search, own.candidate, gain, flat)
     )
     return Named(
-        found[k],
+        own.candidate,
         trial,
         gain,
         tuple(r.candidate.family for r in near),

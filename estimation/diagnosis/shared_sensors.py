@@ -78,7 +78,8 @@ def _denies(other: Balance, balance: Balance, fault: Candidate) -> bool:
     base = np.vstack([columns[k] for k in shared])
     error = np.concatenate(expected)
     error = error - base @ least_squares(base, error)
-    left = np.concatenate([other.left(other.terms)[k] for k in shared])
+    remains = other.left(other.terms)
+    left = np.concatenate([remains[k] for k in shared])
     size = float(error @ error)
     return size >= PLAIN * float(left @ left) and float(left @ error) < SHOWN * size
 
