@@ -189,7 +189,7 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
     found.sort(
         key=lambda told: (
             told.share < ECHO or not told.finding.family.startswith("sensor."),
-            told.finding.rmse_after / max(told.finding.rmse_before, 1e-300),
+            -told.share,
         )
     )
     kept: list[Told] = []
