@@ -144,7 +144,7 @@ def wrench(
             seeds, kept_in(state, "wrench"), workers, lambda: bar.advance(task)
         )
     drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = shown.NOTES
+    lines = [shown.lead(study), *shown.NOTES]
     page = partial(shown.markdown, study)
     _show(study, lines, shown.tables(study), page, drawn, out, json)
 

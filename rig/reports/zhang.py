@@ -78,7 +78,7 @@ def notes(study: ZhangStudy) -> list[str]:
         " torque measured as an input of joints 3 to 6. The candidates are the arm catalogue, slips"
         " over longer ways and drag of the moving gripper; the simulated friction (Dahl) is none.",
         "The small network sees its joint's motion and the stretches of springs that slip, and is"
-        " kept where it takes 5 % of the squared rest away on pieces held out.",
+        " kept where it takes 10 % of the squared rest away on pieces held out.",
     ]
 
 

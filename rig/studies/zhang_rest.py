@@ -27,7 +27,7 @@ SETTINGS = Settings(nodes=4, iterations=60)
 HELD_OUT = 6
 """Every so many pieces of the samples choose the step, and whether the network is kept."""
 
-LEAST_GAIN = 0.05
+LEAST_GAIN = 0.1
 """Share of the squared rest on those pieces that a network must take away to be kept. Below, it
 fits the pieces' noise: the rest then holds nothing that these states tell."""
 
