@@ -100,10 +100,11 @@ def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
 
 
 def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_path):
-    monkeypatch.setattr(arm_search, "open_campaign", lambda path: Campaign.of(paths))
+    three = Campaign.of((*paths, made_path("c", 13)))
+    monkeypatch.setattr(arm_search, "open_campaign", lambda path: three)
     monkeypatch.setattr(pique, "candidates", lambda arm: TRIED)
     out = tmp_path / "pique.md"
-    words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "a", "--out", str(out)]
+    words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "c", "--out", str(out)]
     ran = CliRunner().invoke(study_app, [*words, "--json"])
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
