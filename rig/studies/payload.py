@@ -19,12 +19,11 @@ from estimation.arm.payload import (
 )
 from estimation.arm.tables import PSM, PointMass
 from estimation.arm.wrist import candidates
-from estimation.diagnosis.paths import period_samples
-from estimation.diagnosis.split import SplitError
 from estimation.recording import FloatArray, Recording
 from rig.reports.provenance import Provenance
 from rig.reports.table import TextTable
 from rig.studies.arm_search import EDGE_S, RATE_SHARE, Prepared, prepare
+from rig.studies.arm_within import period_of
 
 LINK = 2
 """The mass turns with joints 1 and 2; the insertion does not move it."""
@@ -128,11 +127,8 @@ def _mass(
 
 def _samples_a_period(run: Recording, length: int) -> int:
     """Return the thinned samples of a period of the motion; of a third of it if it repeats less."""
-    try:
-        period_s = period_samples(run) / run.sample_rate_hz
-    except SplitError:
-        return length // LEAST_PERIODS
-    return min(round(period_s * RATE_SHARE * LOW_PASS.cutoff_hz), length // LEAST_PERIODS)
+    third = length // LEAST_PERIODS
+    return min(round(period_of(run) or third), third)
 
 
 def _left(path: Prepared, kept: Sequence[str], values: FloatArray) -> FloatArray:
