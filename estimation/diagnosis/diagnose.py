@@ -229,6 +229,8 @@ def _confirmed(story: Story, gates: Gates) -> Story:
     for claim in story.claims:
         trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
         reason = _refusal(last, trial, story.confirm, gates)
+        if reason is None and claim.part.map is not None:
+            reason = _runs_away(last, trial, story.confirm, gates)
         if reason is None:
             kept.append(claim)
             last = trial
@@ -282,14 +284,29 @@ def _refusal(before: Frozen, after: Frozen, confirm: Sequence[Run], gates: Gates
     better = int(np.count_nonzero(new < old))
     if better < len(confirm) / 2:
         return f"it helps in {better} of {len(confirm)} confirm runs"
-    whole = [squares(f, confirm, at_rest=True).sum() for f in (before, after)]
-    rise = 100 * (whole[1] / whole[0] - 1)
-    if change > -100 * gates.in_motion and rise > 0:
+    rise = _rise(before, after, confirm)
+    if rise > 0 and change > -100 * gates.in_motion:
         return (
             f"on the confirm runs in motion the squared error changed by {change:+.1f} %, but over"
             f" all samples by {rise:+.1f} %"
         )
     return None
+
+
+def _runs_away(before: Frozen, after: Frozen, confirm: Sequence[Run], gates: Gates) -> str | None:
+    """Return why a map is refused that is wrong where it was not fitted, or None."""
+    rise = _rise(before, after, confirm)
+    if rise <= 100 * gates.at_rest:
+        return None
+    return (
+        f"over all confirm samples, those at rest too, the squared error changed by {rise:+.1f} %"
+    )
+
+
+def _rise(before: Frozen, after: Frozen, confirm: Sequence[Run]) -> float:
+    """Return by how many percent the squared error over all samples rises."""
+    old, new = (squares(f, confirm, at_rest=True).sum() for f in (before, after))
+    return float(100 * (new / old - 1))
 
 
 def _notes(
