@@ -124,7 +124,7 @@ def _solved(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
 
 
 def _noise_power(columns: Sequence[FloatArray], k: int) -> float:
-    """Return the power of white noise in a column, by its third differences.
+    """Return the power of white noise in a column, by its third differences; a filter lowers it.
 
     By their median: a few sharp turns do not count as noise.
     """
