@@ -33,6 +33,7 @@ class Provenance:
     def now(cls, seed: int) -> "Provenance":
         """Return the provenance of what this process makes now."""
         words = [Path(word).name if "/" in word else word for word in sys.argv]
+        words[:1] = ["rig" if word == "__main__.py" else word for word in words[:1]]
         return cls(
             date=datetime.now(UTC).strftime("%Y-%m-%dT%H:%MZ"),
             commit=commit(Path(rig.__file__).parents[1]),
