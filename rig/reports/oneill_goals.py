@@ -50,6 +50,11 @@ class Reached:
         return f"{job.pose}: {name}, {unit}, from {job.surrogate}"
 
     @property
+    def surrogate(self) -> str:
+        """What stands for the load."""
+        return self.live.job.surrogate
+
+    @property
     def missed(self) -> list[str]:
         """What is not reached, in words."""
         goal, _ = GOALS[self.live.job.pose, self.live.job.target]
@@ -64,7 +69,7 @@ class Reached:
         for protocol, what in (("lofo", "unseen frequency"), ("lopo", "unseen power")):
             row = self.unseen.get(protocol)
             if row is not None and row.score.rmse > UNSEEN * self.live.score.rmse:
-                told.append(f"{what}, {row.score.rmse / self.live.score.rmse - 1:+.0%}")
+                told.append(f"{what}, {row.score.rmse / self.live.score.rmse - 1:+.1%}")
         return told
 
 
@@ -92,22 +97,26 @@ def lead(found: list[Reached]) -> Iterator[str]:
     neutral = [one for one in found if one.live.job.pose == "neutral"]
     if not neutral:
         return
-    errors = [
-        f"{_cell(one, one.live.score.rmse)} {unit} in {name} from {one.live.job.surrogate}"
-        + (f" (the paper's network {_cell(one, one.network, 2)})" if one.network else "")
-        for one in neutral
-        for name, unit, _ in [SHOWN[one.live.job.target]]
-    ]
+    errors = []
+    for surrogate in dict.fromkeys(one.surrogate for one in neutral):
+        own = [_error(one) for one in neutral if one.surrogate == surrogate]
+        errors.append(f"from {surrogate} {', '.join(own)}")
     yield (
         "The best estimator is a sum of products of physical states. On whole runs that it was not"
         " fitted on, filtered as live, looking back half a second, its error (RMSE over closing"
-        f" samples) is {'; '.join(errors)}. The paper's network is trained on the same folds,"
-        " without lag."
+        f" samples) is {'; '.join(errors)}. In brackets the paper's network, trained on the same"
+        " folds, without lag."
     )
     missed = [f"{one.name}: {', '.join(one.missed)}" for one in found if one.missed]
     if missed:
         yield f"Missed of what is aimed at: {'; '.join(missed)}."
     yield _intervals(found)
+
+
+def _error(one: Reached) -> str:
+    name, unit, _ = SHOWN[one.live.job.target]
+    network = f" ({_cell(one, one.network, 2)})" if one.network is not None else ""
+    return f"{_cell(one, one.live.score.rmse)} {unit}{network} in {name}"
 
 
 def _intervals(found: list[Reached]) -> str:

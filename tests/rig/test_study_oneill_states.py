@@ -86,12 +86,12 @@ def test_what_is_missed_is_said_with_its_size(study):
     known = replace(found.without_lag, score=replace(found.live.score, rmse=2.9e-3))
     far = replace(worse, score=replace(worse.score, rmse=4.2e-3))
     late = goals.Reached(worse, known, {"lofo": far}, None)
-    assert late.missed == ["live by 10.0%", "unseen frequency, +27%"]
+    assert late.missed == ["live by 10.0%", "unseen frequency, +27.3%"]
     good = goals.Reached(known, known, {}, 6.9e-3)
     assert good.missed == []
     reached, told, intervals = goals.lead([late, good])
     assert "3.30 mN m in proximal torque" in reached
-    assert "2.90 mN m in proximal torque from current (the paper's network 6.90)" in reached
+    assert "2.90 mN m (6.90) in proximal torque" in reached
     assert "of 2 estimates" in intervals
     assert told.startswith("Missed of what is aimed at: neutral: proximal torque")
     assert [row[-1] for row in goals.table([late, good]).rows][1] == "nothing"
