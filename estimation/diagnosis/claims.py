@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from estimation.diagnosis.balance import Balance
+from estimation.diagnosis.endogeneity import own_share
 from estimation.diagnosis.frozen import Part
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.maps import Map, variables_of, within
@@ -13,22 +14,23 @@ from estimation.diagnosis.story import Claim
 def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
     """Return what is claimed, and no more than that."""
     claims: list[Claim] = []
+    told = own_share(balance) >= gates.told
     for named in discovery.named:
         if named.veto is not None:
             continue  # the map of what is left then speaks for it
         if may_name:
-            sure = not named.rivals and named.confidence >= gates.sure
+            sure = told and not named.rivals and named.confidence >= gates.sure
             verdict = "identified" if sure else "one_of"
             of = variables_of(named.candidate, balance)
             claims.append(Claim(Part(named.candidate), verdict, named, of))
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
-    told = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
+    mapped = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
     if (
         left is not None
         and left.p <= gates.level
-        and left.variables not in told
+        and left.variables not in mapped
         and not _told_already(left, claims)
     ):
         worth = left.gain * _share_left(claims, balance)

@@ -6,18 +6,17 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from estimation.campaign import Campaign, with_campaign_time
 from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.balance import intervals, lay_out
+from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.claims import claims_of
+from estimation.diagnosis.confirm import confirmed, without
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.findings import causes_of, echoes, findings_of, moved
 from estimation.diagnosis.formula import formulas
-from estimation.diagnosis.frozen import Frozen, errors, freeze, settled, squares
+from estimation.diagnosis.frozen import errors, freeze
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments, stand_in
 from estimation.diagnosis.instruments import projection as instrumented
@@ -27,7 +26,7 @@ from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
 from estimation.diagnosis.shared_sensors import Fault, denied
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
-from estimation.diagnosis.story import Claim, Story
+from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import Bootstrap, Twin
 from estimation.errors import EstimationError
 from estimation.fitting import fit
@@ -98,11 +97,11 @@ def diagnose(
     discovering = [r for r in recordings if r.name in sealed.discover]
     on_stage("opening the confirm runs")
     on_open()
-    stories = {name: _confirmed(story, gates) for name, story in stories.items()}
+    stories = {name: confirmed(story, gates) for name, story in stories.items()}
     causes = causes_of(stories)
     if small := echoes(causes):
         for name, places in small.items():
-            stories[name] = _confirmed(_without(stories[name], places), gates)
+            stories[name] = confirmed(without(stories[name], places), gates)
         causes = causes_of(stories)
     findings = findings_of(causes, list(stories))
     found: dict[str, Error] = {
@@ -219,77 +218,6 @@ def _usable(
                 raise
             unused.append(recording.name)
     return runs, unused
-
-
-def _confirmed(story: Story, gates: Gates) -> Story:
-    """Freeze, open the confirm runs, and keep the claims they bear out."""
-    kept: list[Claim] = []
-    refused = list(story.refused)
-    last = story.before
-    for claim in story.claims:
-        trial = freeze(story.balance, [*(c.part for c in kept), claim.part])
-        reason = _refusal(last, trial, story.confirm, gates)
-        if reason is None:
-            kept.append(claim)
-            last = trial
-        else:
-            refused.append(f"{claim.family}: {reason}")
-    values = tuple(intervals(story.balance, last.terms, seed=0))
-    story = replace(story, claims=tuple(kept), refused=tuple(refused), after=last, values=values)
-    return _written(story, gates)
-
-
-def _without(story: Story, places: Collection[int]) -> Story:
-    """Return a story without some of its claims, and why."""
-    claims = tuple(c for k, c in enumerate(story.claims) if k not in places)
-    why = "it removes too little to be told from what a larger cause in another balance does here"
-    lost = tuple(f"{story.claims[k].family}: {why}" for k in sorted(places))
-    return replace(story, claims=claims, refused=(*story.refused, *lost))
-
-
-def _written(story: Story, gates: Gates) -> Story:
-    """Say what a model file holds; a formula that the confirm runs do not bear out is left out."""
-    if all(claim.part.map is None for claim in story.claims):
-        return replace(story, written=story.after, written_values=story.values)
-    kept: list[Claim] = []
-    refused = list(story.refused)
-    last = story.before
-    for claim in story.claims:
-        parts = [c.written for c in (*kept, claim)]
-        trial = (settled if claim.formulas else freeze)(story.balance, parts)
-        reason = _refusal(last, trial, story.confirm, gates) if claim.formulas else None
-        if reason is not None:
-            refused.append(f"the formula {claim.formulas[0].text}: {reason}")
-            kept.append(replace(claim, formulas=()))
-            continue
-        if claim.formulas:
-            best, *others = claim.formulas
-            claim = replace(claim, formulas=(best.settled(trial.terms, trial.weights), *others))
-        kept.append(claim)
-        last = trial
-    values = tuple(intervals(last.balance, last.terms, seed=0))
-    return replace(
-        story, claims=tuple(kept), refused=tuple(refused), written=last, written_values=values
-    )
-
-
-def _refusal(before: Frozen, after: Frozen, confirm: Sequence[Run], gates: Gates) -> str | None:
-    """Return why the confirm runs do not bear out what was added, or None where they do."""
-    old, new = squares(before, confirm), squares(after, confirm)
-    change = 100 * (new.sum() / old.sum() - 1)
-    if new.sum() > (1 - gates.floor) * old.sum():
-        return f"on the confirm runs the squared error changed by {change:+.1f} %"
-    better = int(np.count_nonzero(new < old))
-    if better < len(confirm) / 2:
-        return f"it helps in {better} of {len(confirm)} confirm runs"
-    whole = [squares(f, confirm, at_rest=True).sum() for f in (before, after)]
-    rise = 100 * (whole[1] / whole[0] - 1)
-    if change > -100 * gates.in_motion and rise > 0:
-        return (
-            f"on the confirm runs in motion the squared error changed by {change:+.1f} %, but over"
-            f" all samples by {rise:+.1f} %"
-        )
-    return None
 
 
 def _notes(

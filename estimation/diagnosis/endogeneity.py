@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.derived import measured_channels
 from estimation.diagnosis.balance import Balance
@@ -18,6 +19,14 @@ from estimation.diagnosis.design import Run
 from estimation.diagnosis.instruments import FORCES, Fit, as_told, fitted, instrument_columns
 from estimation.diagnosis.least_squares import least_squares, orthonormal
 from estimation.recording import FloatArray
+
+MEDIAN_OF_SQUARE = 0.4549
+"""Of a standard normal variable."""
+
+PULL = 1e-8
+"""On columns of length 1: settles those that the others hold."""
+
+TINY = float(np.finfo(float).tiny)
 
 
 def kept_share(
@@ -53,6 +62,74 @@ def kept_share(
     own_columns = _beside(seen[:, :-count], seen[:, -count:])
     size, left = own_columns @ plain, own_columns @ through
     return float(size @ left / max(float(size @ size), np.finfo(float).tiny))
+
+
+def noise_share(
+    balance: Balance, terms: Sequence[Candidate], added: Sequence[FloatArray], every: int = 1
+) -> float:
+    """Return the share of the squared error that columns remove which is a force sensor's noise.
+
+    Where every run meets the same load at the same place, that place tells the force without the
+    noise of its sensor: the gain that the model has on the sensor then shrinks, and its noise goes,
+    which nothing missing could do. Below 0 where the gain grows.
+
+    Args:
+        balance: The balance.
+        terms: Declared effects and those found before.
+        added: Columns of each run.
+        every: Only every so manieth sample, where `added` has no others.
+    """
+    read = _reads_force(terms)
+    if not read.any():
+        return 0.0
+    columns = balance.columns(terms)
+    aim = np.concatenate([y[::every] for y in balance.target])
+    own = np.vstack([c[::every] for c in columns])
+    whole = np.hstack([own, np.vstack(list(added)), aim[:, None]])
+    whole /= np.maximum(np.linalg.norm(whole, axis=0), np.finfo(float).tiny)
+    gram = whole.T @ whole
+    count = len(read)
+    alone, left = _solved(gram[:count, :count], gram[:count, -1])
+    beside, less = _solved(gram[:-1, :-1], gram[:-1, -1])
+    power = np.einsum("nk,nk->k", own, own)[read]
+    noise = np.array([_noise_power(columns, int(k)) for k in np.flatnonzero(read)])
+    gains = (alone[read] ** 2 - beside[:count][read] ** 2) / np.maximum(power, TINY)
+    return len(aim) * float(gains @ noise) / max(left - less, TINY)
+
+
+def own_share(balance: Balance) -> float:
+    """Return the least share of a force's declared column that the other declared ones do not say.
+
+    At one speed either way, friction and a force that stands for it say the same: the gain on the
+    force can then hardly be told.
+    """
+    base = np.vstack(balance.base(balance.terms))
+    shares = [1.0]
+    for k in np.flatnonzero(_reads_force(balance.terms)):
+        own = _beside(np.delete(base, k, axis=1), base[:, [k]])
+        shares.append(float(np.sum(own**2) / max(np.sum(base[:, k] ** 2), TINY)))
+    return min(shares)
+
+
+def _reads_force(terms: Sequence[Candidate]) -> NDArray[np.bool_]:
+    """Say of each column of effects whether it is made of a force's reading."""
+    sizes = [len(term.effect.amplitudes) for term in terms]
+    return np.repeat([any(c in FORCES for _, c in term.channels) for term in terms], sizes)
+
+
+def _solved(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
+    """Solve for the weights of columns of length 1; return them and what they leave of the aim."""
+    weights = np.asarray(np.linalg.solve(gram + PULL * np.eye(len(gram)), right), np.float64)
+    return weights, float(1.0 + weights @ (gram @ weights - 2.0 * right))
+
+
+def _noise_power(columns: Sequence[FloatArray], k: int) -> float:
+    """Return the power of white noise in a column, by its third differences; a filter lowers it.
+
+    By their median: a few sharp turns do not count as noise.
+    """
+    jumps = np.concatenate([np.diff(c[:, k], 3) for c in columns])
+    return float(np.median(jumps**2)) / (MEDIAN_OF_SQUARE * 20.0)
 
 
 def _noisy(terms: Iterable[Candidate]) -> set[str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.derived import GEAR_RATIO
-from estimation.diagnosis.candidate import UNKNOWN, Candidate
+from estimation.diagnosis.candidate import UNKNOWN
 from estimation.diagnosis.consequences import follows
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import Frozen, freeze, samples_of, squares
@@ -78,7 +78,7 @@ class Told:
     def is_surer_than(self, other: "Told") -> bool:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
-        if others.family == ENCODER and mine.balance in OF_TORQUE:
+        if others.family == ENCODER and not others.alternatives and mine.balance in OF_TORQUE:
             return self.share >= ECHO  # no encoder makes a torque
         told = others.family.startswith("sensor.") and _same_sensor(others, mine)
         if told or self.share < NEARLY * other.share:
@@ -125,7 +125,7 @@ def _findings(story: Story) -> list[Told]:
                     alternatives=named.rivals if named else (),
                     depends_on=claim.depends_on,
                     confidence=named.confidence if named else None,
-                    parameters=_parameters(story, named.candidate) if named else {},
+                    parameters=_parameters(story, k) if named else {},
                     formulas=_stated(story, claim, samples),
                 ),
                 _added(last, now, story.balance.runs),
@@ -151,8 +151,11 @@ def _stated(story: Story, claim: Claim, samples: float) -> tuple[Stated, ...]:
     return tuple(Stated(f.text, f.gain, e) for f, e in zip(found, confirmed, strict=True))
 
 
-def _parameters(story: Story, candidate: Candidate) -> dict[str, Value]:
-    own = story.values[story.after.terms.index(candidate)]
+def _parameters(story: Story, place: int) -> dict[str, Value]:
+    """Return the parameters of the effect that a claim adds."""
+    before = [term for claim in story.claims[:place] for term in claim.part.terms]
+    at = len(story.before.terms) + len(before)
+    candidate, own = story.after.terms[at], story.values[at]
     units = {
         p.name: candidate.term.unit(p, story.balance.model.target)
         for p in candidate.term.parameters
@@ -189,7 +192,7 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
     found.sort(
         key=lambda told: (
             told.share < ECHO or not told.finding.family.startswith("sensor."),
-            told.finding.rmse_after / max(told.finding.rmse_before, 1e-300),
+            -told.share,
         )
     )
     kept: list[Told] = []

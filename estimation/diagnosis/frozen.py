@@ -11,6 +11,7 @@ from estimation.diagnosis.design import Run
 from estimation.diagnosis.evidence import resampled
 from estimation.diagnosis.maps import RIDGE, Map
 from estimation.diagnosis.result import Error
+from estimation.diagnosis.turning import turned
 from estimation.recording import FloatArray
 
 ROUNDS = 30
@@ -62,6 +63,7 @@ class Frozen:
 def freeze(balance: Balance, parts: Sequence[Part]) -> Frozen:
     """Fit declared effects and parts together on the discovery runs."""
     terms = [*balance.terms, *(term for part in parts for term in part.terms)]
+    terms = turned(balance, terms)
     maps = [p.map for p in parts if p.map is not None]
     weights = balance.solve(terms) if not maps else _with_maps(balance, terms, maps)
     level = 0.0

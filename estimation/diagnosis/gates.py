@@ -19,8 +19,8 @@ class Gates:
             of the error that the rival leaves, both in any form: less may be a matter of how well
             their regressors are known.
         veto: A map withdraws a name when it leaves at most this share of the name's error.
-        form: A map of no other variables than the name's own does so only when the name removes
-            less than this share of what the map removes: no formula has the true form.
+        form: A map of no other variables than those of what was named does so only when the name
+            removes less than this share of what the map removes: no formula has the true form.
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
@@ -30,11 +30,17 @@ class Gates:
             be told as something missing.
         kept: Least share of what an effect adds that is left when it is fitted through instruments:
             less, and it is made of the noise of a regressor.
+        noise: Largest share of what an effect removes that may be the noise of a force's sensor.
+        told: Where less than this share of a force's reading is its own, beside what the other
+            declared terms say too, the runs hardly tell the model's gain on it: no name is beaten
+            there, and no map withdraws one.
         leftover: Least share that an effect has in what all found in a balance remove together:
             what a name's form leaves of its own cause is no second cause.
         in_motion: What removes less than this share of the squared error in motion on the confirm
             runs must not add to that over all samples. At rest friction holds any torque, and what
             is clear in motion may be wrong there.
+        at_rest: A map that adds more than this share to the squared error over all samples is
+            refused.
         parameters: Named parameters of the whole model at most, or None for no limit.
         akin: Whether an effect may be added beside one that looks alike: where a model must
             predict well rather than be named surely.
@@ -56,8 +62,11 @@ class Gates:
     near: float = 0.7
     some: float = 0.1
     kept: float = 0.5
+    noise: float = 0.2
+    told: float = 0.01
     leftover: float = 0.15
-    in_motion: float = 0.05
+    in_motion: float = 0.1
+    at_rest: float = 0.5
     parameters: int | None = None
     akin: bool = False
     balances: int = 1

@@ -15,6 +15,7 @@ from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, measured_cha
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
+from estimation.diagnosis.endogeneity import noise_share
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
 from estimation.effects.unknown_product import followed
 from estimation.recording import FloatArray
@@ -67,6 +68,12 @@ PLAYS = (0.05, 0.2, 0.6)
 RIDGE = 1e-3
 THIN = 2
 """A map is slow in its variables: every second sample tells the same."""
+
+NOISE_SHARE = 0.1
+"""A map is none where this share of what it removes is the noise of a sensor of force."""
+
+MOST_OF_NOISE = 20
+"""Where so many of the best are made of noise, there is no map."""
 
 SIMPLER = 0.07
 """A smaller subset is taken when its gain is this near to the best, pooled and in the median."""
@@ -197,6 +204,15 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
     if not found or max(m.gain for m in found) <= 0:
         return None
     chosen = _simplest(found)
+    for _ in range(MOST_OF_NOISE):
+        if not _is_of_noise(balance, terms, chosen):
+            break
+        found.remove(chosen)
+        if max((m.gain for m in found), default=0.0) <= 0:
+            return None
+        chosen = _simplest(found)
+    else:
+        return None
     return Map(
         chosen.bases,
         chosen.gain,
@@ -206,6 +222,13 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         chance(chosen.gain, null),
         chosen.agree,
     )
+
+
+def _is_of_noise(balance: Balance, terms: Sequence[Candidate], found: Map) -> bool:
+    """Say whether a map tells a force in place of its sensor, without that sensor's noise."""
+    parts = zip(*(_thinned(balance, basis) for basis in found.bases), strict=True)
+    columns = [_centred(_products(part), balance.demean) for part in parts]
+    return noise_share(balance, terms, columns, THIN) > NOISE_SHARE
 
 
 def stretches(periods: Sequence[FloatArray]) -> list[FloatArray]:

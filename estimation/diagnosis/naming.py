@@ -104,7 +104,7 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
         for r in rivals
         if 1 - r.losses.sum() / total.sum() >= search.gates.rival * gain
         and runs_agree(total, r.losses) <= search.gates.agree
-        and not beaten(search, own, r)
+        and (search.hardly_told or not beaten(search, own, r))
     ]
     near.sort(key=lambda r: float(r.losses.sum()))
     wins = _wins(own.losses, [r.losses for r in rivals], search.seed)
@@ -112,9 +112,10 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
     flat = best_map(search.balance, terms, 0, search.seed)
     withdrawn = (
         flat is not None
+        and not search.hardly_told
         and flat.variables != own.candidate.effect.any_function_of
         and _vetoes(search, flat, mine)
-        and not _of_its_form(search, own.candidate, gain, flat)
+        and not _of_their_form(search, [own.candidate, *others], gain, flat)
     )
     return Named(
         own.candidate,
@@ -126,10 +127,10 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
     )
 
 
-def _of_its_form(search: Search, named: Candidate, gain: float, flat: Map) -> bool:
-    """Say whether a map only bends a name's formula: its variables, and little more gain."""
-    own = within(flat.variables, variables_of(named, search.balance))
-    return own and gain >= search.gates.form * flat.gain
+def _of_their_form(search: Search, found: Sequence[Candidate], gain: float, flat: Map) -> bool:
+    """Say whether a map only bends the formulas found: their variables, and little more gain."""
+    known = {v for candidate in found for v in variables_of(candidate, search.balance)}
+    return within(flat.variables, known) and gain >= search.gates.form * flat.gain
 
 
 def _vetoes(search: Search, flat: Map, mine: Losses) -> bool:

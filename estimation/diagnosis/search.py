@@ -3,13 +3,14 @@
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.design import spans_of, tables
-from estimation.diagnosis.endogeneity import kept_share
+from estimation.diagnosis.endogeneity import kept_share, noise_share, own_share
 from estimation.diagnosis.evidence import (
     Losses,
     chance,
@@ -156,8 +157,17 @@ class Search:
     def _hangs_on_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
         if not trial.passes(self.gates):
             return False  # it is refused for less
-        share = kept_share(self.balance, [*self.balance.terms, *found], trial.candidates)
+        terms = [*self.balance.terms, *found]
+        noise = noise_share(self.balance, terms, self.balance.columns(trial.candidates))
+        if noise > self.gates.noise:
+            return True
+        share = kept_share(self.balance, terms, trial.candidates)
         return share is not None and share < self.gates.kept
+
+    @cached_property
+    def hardly_told(self) -> bool:
+        """Whether the runs hardly tell the declared gain on a force from what stands beside it."""
+        return own_share(self.balance) < self.gates.told
 
     @property
     def floor(self) -> float:

@@ -189,14 +189,17 @@ class Remembering(Effect):
         return [float(value) for value in rows[0]]
 
     def _walked(self, now: FloatArray, shape: Sequence[float], state: FloatArray) -> FloatArray:
+        if np.isfinite(now.sum()):
+            return self._rows(now, shape, state)
         good = np.isfinite(now).all(axis=1)
-        seen = np.ascontiguousarray(now if good.all() else now[good], np.float64)
-        walked = np.empty((len(seen), len(self.amplitudes)))
-        type(self).walk(seen, np.array(shape, np.float64), state, walked)
-        if len(seen) == len(now):
-            return walked
         rows = np.full((len(now), len(self.amplitudes)), np.nan)
-        rows[good] = walked
+        rows[good] = self._rows(now[good], shape, state)
+        return rows
+
+    def _rows(self, now: FloatArray, shape: Sequence[float], state: FloatArray) -> FloatArray:
+        rows = np.empty((len(now), len(self.amplitudes)))
+        now = np.ascontiguousarray(now, np.float64)
+        type(self).walk(now, np.array(shape, np.float64), state, rows)
         return rows
 
 

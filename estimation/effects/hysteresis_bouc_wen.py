@@ -12,9 +12,21 @@ STEP, SATED = 0.5, 8.0
 
 
 @numba.njit(cache=True)
+def power(size: float, sharpness: float) -> float:
+    """Return size^sharpness; the grid's three by products, several times faster than a power."""
+    if sharpness == 1.0:
+        return size
+    if sharpness == 2.0:
+        return size * size
+    if sharpness == 4.0:
+        return size * size * size * size
+    return float(size**sharpness)
+
+
+@numba.njit(cache=True)
 def slope(z: float, way: float, sharpness: float) -> float:
     """Return dz along the way: 1 while it unloads, 1 - |z|^sharpness while it loads."""
-    return 1.0 - abs(z) ** sharpness if z * way > 0.0 else 1.0
+    return 1.0 - power(abs(z), sharpness) if z * way > 0.0 else 1.0
 
 
 @numba.njit(cache=True)

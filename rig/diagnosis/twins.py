@@ -18,6 +18,34 @@ PLAYED = ("motor", "gearbox", "cable", "stretch")
 Maker = Callable[[Model, Sequence[Recording]], Callable[[int], Sequence[Recording]]]
 
 
+REMEMBERED = 12
+"""Campaigns of a twin kept for the next balance: as many as a decision takes at least."""
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """A twin that plays each of its first campaigns once, whichever balance asks.
+
+    Attributes:
+        twin: Plays the campaigns.
+    """
+
+    twin: Twin
+    played: dict[int, Sequence[Recording]] = field(default_factory=dict, repr=False)
+
+    def __call__(self, seed: int) -> Sequence[Recording]:
+        """Return one campaign's recordings; the same seed gives the same samples."""
+        if seed >= REMEMBERED:
+            return self.twin(seed)
+        if seed not in self.played:
+            self.played[seed] = self.twin(seed)
+        return self.played[seed]
+
+    def __reduce__(self) -> tuple[type["Remembered"], tuple[Twin]]:
+        """Leave what was played behind: another process plays it faster than it reads it."""
+        return Remembered, (self.twin,)
+
+
 @dataclass(frozen=True)
 class Twins:
     """What simulates the declared models, or why nothing can.
@@ -63,7 +91,8 @@ def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
         return Twins(None, note=f"No simulated twin could be made. {error}")
     left = [balance for balance in asked if balance not in played]
     note = f"The simulated rig does not play {', '.join(left)}: no twins there." if left else ""
-    return Twins(twin, dict.fromkeys(played, lambda *_: twin), note)
+    remembered = Remembered(twin)
+    return Twins(twin, dict.fromkeys(played, lambda *_: remembered), note)
 
 
 def _shipped() -> list[Model]:

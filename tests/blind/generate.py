@@ -38,6 +38,13 @@ CHAINS = ("plain", "coloured", "drifting", "skewed")
 CONTROLS = (*((chain, "usual") for chain in CHAINS), ("coloured", "rests"), ("coloured", "wrist"))
 """Chain and excitation of controls, in turn."""
 
+EITHER = {
+    "one spring": ("friction.load", "motor.saturation"),
+    "constant speed": ("friction.load", "motor.saturation", "friction.load_viscous"),
+}
+"""What cannot be told from friction by load on such runs: loads of one sign tell it from a falling
+torque constant by the rotor's own friction only, and one speed says nothing of others."""
+
 SPREAD = 0.1
 EPOCH_NS = 1_700_000_000_000_000_000
 APART_S = 30.0
@@ -93,8 +100,7 @@ def draw(kind: str, number: int, seed: int) -> Answer:
     either: tuple[str, ...] = ()
     if kind == "confounded":
         excitation = ("one spring", "constant speed")[number % 2]
-        other = "friction.position" if excitation == "one spring" else "friction.load_viscous"
-        either = ("friction.load", other)
+        either = EITHER[excitation]
     names = _names(kind, number, seed, random)
     needed = {TRUTHS[name].needs for name in names} - {"usual"}
     excitation = needed.pop() if needed else excitation

@@ -105,7 +105,8 @@ def run_case(
         "excitation": answer.excitation,
         "chain": answer.chain,
         "found": [
-            (f["verdict"], f["balance"], f["family"]) for f in (diagnosis or {}).get("findings", [])
+            (f["verdict"], f["balance"], f["family"], f["confidence"], f["also_in"])
+            for f in (diagnosis or {}).get("findings", [])
         ],
         "message": "" if diagnosis is not None else said[-500:],
     }

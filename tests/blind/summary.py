@@ -1,5 +1,6 @@
 """The tables of a blind study: what came of each class, and textbook methods on the same cases."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
@@ -8,6 +9,9 @@ from rig.reports.table import TextTable
 from tests.blind.generate import CLASSES
 from tests.blind.score import OUTCOMES, wilson
 from tests.blind.truths import TRUTHS
+
+SURE = (0.0, 0.5, 0.8, 0.95, 0.99, 1.01)
+"""Bounds of confidence in the table of how often a name was right."""
 
 
 def tables(state: Mapping[str, Any]) -> list[TextTable]:
@@ -41,10 +45,34 @@ def tables(state: Mapping[str, Any]) -> list[TextTable]:
         "the true structure fitted by its own optimiser, median of the named cases (their number)."
     )
     found = [TextTable("Diagnosis of undeclared effects", columns, rows, note)]
+    sure = _sureness(list(state.values()))
+    if sure.rows:
+        found.append(sure)
     picked = [(r, one) for r in state.values() for one in r.get("baselines", [])]
     if picked:
         found.append(_textbook(picked))
     return found
+
+
+def _sureness(done: Sequence[Any]) -> TextTable:
+    """Return how often a name was right among the findings that were so sure of it."""
+    said: list[tuple[float, bool]] = []
+    for result in done:
+        truths = [TRUTHS[name] for name in result["hidden"]]
+        for _, balance, family, confidence, also_in in result["found"]:
+            if confidence is not None:
+                shown = {balance, *also_in}
+                true = any(t.names(family) and shown & t.balances for t in truths)
+                said.append((confidence, true))
+    rows = []
+    for low, high in itertools.pairwise(SURE):
+        within = [true for confidence, true in said if low <= confidence < high]
+        if within:
+            rows.append([f"{low:g} to {min(high, 1.0):g}", _share(sum(within), len(within))])
+    note = (
+        "Findings that name an effect, first names of `one_of` too, by the confidence they state."
+    )
+    return TextTable("How sure, and how often right", ["confidence", "right (95 %)"], rows, note)
 
 
 def _textbook(picked: Sequence[tuple[Any, Any]]) -> TextTable:
@@ -75,7 +103,7 @@ def _method(name: str, said: Sequence[tuple[Any, Any]]) -> list[str]:
 
 def _named(result: Any) -> dict[str, Any]:
     """Return what a diagnosis called identified, counted as the textbook methods' names are."""
-    families = [family for verdict, _, family in result["found"] if verdict == "identified"]
+    families = [family for verdict, _, family, *_ in result["found"] if verdict == "identified"]
     return counted(families, result["hidden"]) | {"seconds": result["seconds"]}
 
 

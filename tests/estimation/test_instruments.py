@@ -12,7 +12,7 @@ from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import prepare, tables
-from estimation.diagnosis.endogeneity import kept_share
+from estimation.diagnosis.endogeneity import kept_share, noise_share, own_share
 from estimation.diagnosis.evidence import leave_one_run_out
 from estimation.diagnosis.instruments import instruments, projection, stand_in
 from estimation.effects import effect
@@ -20,7 +20,7 @@ from estimation.fitting import fit
 from estimation.model import Term
 from estimation.model_file import read, shipped
 from estimation.recording import Recording
-from tests.estimation.synthetic import run
+from tests.estimation.synthetic import TRUE, run
 
 NOISE_A = 5e-3
 MEASURED = (
@@ -169,3 +169,53 @@ def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
     plain = leave_one_run_out(balance.base(balance.terms), columns, [1], aims)
     bent = bent_losses(balance, balance.terms, friction, left)
     assert bent.joint.sum() < 0.7 * plain.joint.sum()
+
+
+@pytest.mark.parametrize("slips", [False, True])
+def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effect_does_not(slips):
+    def ripple(motor, speed, load):
+        return 2e-3 * np.sin(0.3 * motor)
+
+    runs = []
+    for k in range(5):
+        clean = pushed(run(f"r{k}", 0.1, 0.05, seed=3, extra=ripple if slips else None))
+        noise = 4 * NOISE_A * np.random.default_rng(100 + k).normal(size=len(clean))
+        runs.append(clean.with_columns(**{CURRENT: clean[CURRENT] + noise}))
+    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    wanted = [*model.channels, model.target, "motor_angle_rad", CURRENT]
+    balance = lay_out(model, [prepare(r, wanted, model) for r in runs])
+
+    def columns(values):
+        kept = [values[r.kept][:, None] for r in balance.runs]
+        return [c - c.mean() for c in kept]
+
+    if slips:
+        found = columns(np.sin(0.3 * clean["motor_angle_rad"]))
+        assert noise_share(balance, balance.terms, found) < 0.1
+    else:  # all runs are alike, so the place in a run tells the current
+        assert noise_share(balance, balance.terms, columns(clean[CURRENT])) > 0.5
+
+
+def pushed(recording: Recording) -> Recording:
+    """Return a run against a further load, the same in every run and no function of the motion."""
+    white = np.random.default_rng(1).normal(size=len(recording))
+    load = signal.sosfiltfilt(signal.butter(2, 1.0, fs=1000.0, output="sos"), white)
+    return recording.with_columns(
+        **{
+            CURRENT: recording[CURRENT] + load / TRUE["gain"],
+            "proximal_torque_n_m": recording["proximal_torque_n_m"] + load,
+        }
+    )
+
+
+def test_a_gain_is_hardly_told_where_the_force_goes_with_the_direction(noisy):
+    model, runs = noisy
+    assert own_share(lay_out(model, runs)) > 0.01
+    steady = [with_current_of_direction(r) for r in runs]
+    assert own_share(lay_out(model, steady)) < 0.01
+
+
+def with_current_of_direction(prepared):
+    width = 2.0 * np.std(prepared.channels["motor_velocity_rad_s"])
+    of_sign = np.tanh(prepared.channels["motor_velocity_rad_s"] / width)
+    return replace(prepared, channels={**prepared.channels, CURRENT: 0.1 * of_sign})

@@ -14,7 +14,7 @@ from rig.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.propose import propose, write_protocol
-from rig.diagnosis.twins import twins_of
+from rig.diagnosis.twins import REMEMBERED, Remembered, twins_of
 from rig.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import HiddenEffect
 from tests.rig.rippled import MOTOR, QUICK, few, record
@@ -119,3 +119,18 @@ def test_processes_give_the_answer_of_one(rippled, answered) -> None:
             rippled, [MOTOR], sealed, gates=QUICK, twins=twins.makers, executor=executor
         )
     assert replace(alone, seconds=0.0) == replace(together, seconds=0.0)
+
+
+def test_a_twin_plays_each_of_its_first_campaigns_once_and_leaves_them_behind_when_sent() -> None:
+    asked: list[int] = []
+
+    def twin(seed: int) -> tuple[int, ...]:
+        asked.append(seed)
+        return (seed,)
+
+    remembered = Remembered(twin)  # type: ignore[arg-type]
+    seeds = [0, 1, 0, REMEMBERED, REMEMBERED]
+    assert [remembered(seed) for seed in seeds] == [(seed,) for seed in seeds]
+    assert asked == [0, 1, REMEMBERED, REMEMBERED]
+    kind, parts = remembered.__reduce__()
+    assert kind(*parts).played == {}

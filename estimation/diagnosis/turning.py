@@ -1,0 +1,86 @@
+"""How fast friction turns round at a reversal, told by the samples at rest too.
+
+Names, amplitudes and decisions come from samples in motion, since at rest friction holds any
+torque. How wide its smooth sign is hardly shows there, and the errors that are reported count all
+samples. So among the widths that are as good in motion the one is taken that is best over all.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from estimation.diagnosis.balance import Balance
+from estimation.diagnosis.candidate import Candidate
+from estimation.diagnosis.design import Run
+from estimation.recording import FloatArray
+
+FREE = 1.01
+"""A width is as good in motion when it leaves at most so many times the least squared error."""
+
+REACH = 3.0
+"""How far a width may move, in steps of its grid."""
+
+
+def turned(balance: Balance, terms: Sequence[Candidate]) -> list[Candidate]:
+    """Return the effects with each smooth sign as wide as all samples tell.
+
+    Args:
+        balance: The balance on the runs that discover.
+        terms: The effects.
+    """
+    best = list(terms)
+    if all(len(_places(run)) == len(run.kept) for run in balance.runs):
+        return best
+    aims = [run.channels[balance.model.target][_places(run)] for run in balance.runs]
+    blocks = [[c.columns(run.channels)[_places(run)] for c in best] for run in balance.runs]
+    most = FREE * balance.loss(best)
+    for i, term in enumerate(terms):
+        for k, shape in enumerate(term.effect.shape):
+            if shape.name == "width" and "speed" in dict(term.channels):
+                best[i] = _widened(balance, best, (i, k), (blocks, aims), most)
+                for run, block in zip(balance.runs, blocks, strict=True):
+                    block[i] = best[i].columns(run.channels)[_places(run)]
+    return best
+
+
+def _widened(
+    balance: Balance,
+    terms: list[Candidate],
+    place: tuple[int, int],
+    seen: tuple[list[list[FloatArray]], list[FloatArray]],
+    most: float,
+) -> Candidate:
+    """Return one effect at its best width over all samples."""
+    i, k = place
+    blocks, aims = seen
+
+    def error(steps: float) -> float:
+        moved = terms[i].moved(k, steps)
+        trial = [*terms[:i], moved, *terms[i + 1 :]]
+        motion = balance.loss(trial)
+        weights = balance.solve(trial)
+        if moved != terms[i]:
+            balance.tables_of.pop(moved, None)  # a point of a search, not to be kept
+        total = 0.0
+        for run, block, aim in zip(balance.runs, blocks, aims, strict=True):
+            own = moved.columns(run.channels)[_places(run)]
+            left = aim - np.hstack([*block[:i], own, *block[i + 1 :]]) @ weights
+            total += float(np.sum((left - left.mean()) ** 2))
+        return total * max(motion / most, 1.0) ** PENALTY
+
+    found = optimize.minimize_scalar(
+        error, bounds=(-REACH, REACH), method="bounded", options={"xatol": 0.05}
+    )
+    return terms[i].moved(k, found.x) if found.fun < error(0.0) else terms[i]
+
+
+PENALTY = 100
+"""Power that makes a width which costs anything in motion lose."""
+
+
+def _places(run: Run) -> NDArray[np.intp]:
+    """Return the places of every `down`-th valid sample, those at rest too."""
+    at = np.arange(0, len(run.valid), run.down)
+    return at[run.valid[at]]
