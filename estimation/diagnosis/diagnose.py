@@ -15,6 +15,7 @@ from estimation.diagnosis.claims import claims_of
 from estimation.diagnosis.confirm import confirmed, without
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
 from estimation.diagnosis.findings import causes_of, echoes, findings_of, moved
+from estimation.diagnosis.forms import formed
 from estimation.diagnosis.formula import formulas
 from estimation.diagnosis.frozen import errors, freeze
 from estimation.diagnosis.gates import Gates
@@ -175,7 +176,9 @@ def _balance(
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
     discovery = searched(Search(seen, tried, gates, sealed.seed, twin))
     claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME)
-    beside = [c.part.candidate for c in claims if c.part.candidate is not None]
+    if not gates.akin:  # else every parameter counts
+        claims = formed(claims, balance, gates, sealed.seed)
+    beside = [term for c in claims for term in c.part.terms]
     claims = [
         c
         if c.part.map is None
@@ -240,6 +243,12 @@ def _notes(
         valid = sum(int(run.valid.sum()) for run in story.confirm)
         if story.unused:
             notes.append(f"{name}: without a usable sample: {', '.join(story.unused)}.")
+        notes += [
+            f"{name}: what the equation of {c.family} leaves of its own cause is told by"
+            f" {c.form.text}."
+            for c in story.claims
+            if c.form is not None
+        ]
         if used < valid:
             notes.append(
                 f"{name}: reported errors count all samples; {1 - used / valid:.0%} of the confirm"

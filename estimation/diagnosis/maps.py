@@ -17,6 +17,7 @@ from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.endogeneity import noise_share
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
+from estimation.diagnosis.instruments import FORCES
 from estimation.effects.unknown_product import followed
 from estimation.recording import FloatArray
 
@@ -169,7 +170,13 @@ def within(variables: Sequence[str], others: Collection[str]) -> bool:
     return {*variables} <= known
 
 
-def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int) -> Map | None:
+def best_map(
+    balance: Balance,
+    terms: Sequence[Candidate],
+    count: int,
+    seed: int,
+    only: Collection[str] | None = None,
+) -> Map | None:
     """Return the smallest map that is about as good as the best one.
 
     Args:
@@ -177,8 +184,9 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
         terms: Effects that are refitted beside the map.
         count: Number of surrogates.
         seed: Their seed.
+        only: Variables to map over; None for all.
     """
-    offered = bases(balance)
+    offered = [b for b in bases(balance) if only is None or b.variable in only]
     folds = stretches if balance.one_path else list
     base = folds([b[::THIN] for b in balance.base(terms)])
     left = folds([r[::THIN] for r in balance.left(terms)])
@@ -226,6 +234,8 @@ def best_map(balance: Balance, terms: Sequence[Candidate], count: int, seed: int
 
 def _is_of_noise(balance: Balance, terms: Sequence[Candidate], found: Map) -> bool:
     """Say whether a map tells a force in place of its sensor, without that sensor's noise."""
+    if any(basis.channel in FORCES for basis in found.bases):
+        return False  # it reads that sensor, noise and all
     parts = zip(*(_thinned(balance, basis) for basis in found.bases), strict=True)
     columns = [_centred(_products(part), balance.demean) for part in parts]
     return noise_share(balance, terms, columns, THIN) > NOISE_SHARE

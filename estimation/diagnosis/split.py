@@ -1,7 +1,8 @@
 """Splitting runs once into those that discover and those that confirm.
 
 The confirm runs are chosen before anything is fitted, by a seed, stratified over the conditions:
-runs are sorted by what was held constant and every stratum of neighbours gives one run away.
+runs are sorted by what was held constant and every stratum of neighbours gives one run away, but
+not the last one of the least or greatest load, speed or other condition.
 """
 
 import hashlib
@@ -52,6 +53,9 @@ class Sealed:
 def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()) -> Sealed:
     """Choose the confirm runs, stratified over the conditions.
 
+    The runs that discover keep the least and the greatest value of every condition: what a model is
+    worth beyond what it was fitted on is another question.
+
     Where there are enough new runs beside those of earlier diagnoses, only new ones confirm: a run
     proves something once.
 
@@ -73,14 +77,30 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     new = [recording for recording in recordings if recording.name not in seen]
     ordered = sorted(new if len(new) >= SHARE else recordings, key=_place)
     random = np.random.default_rng(seed)
-    confirm = set()
+    confirm: set[str] = set()
     for start in range(0, len(ordered) - SHARE + 1, SHARE):
-        confirm.add(ordered[start + int(random.integers(SHARE))].name)
+        stratum = [ordered[start + int(k)].name for k in random.permutation(SHARE)]
+        inside = (n for n in stratum if _spans_all(recordings, {*confirm, n}))
+        confirm.add(next(inside, stratum[0]))
     names = [recording.name for recording in recordings]
     data = data_hash(recordings)
     kept = tuple(n for n in names if n not in confirm)
     held = tuple(n for n in names if n in confirm)
     return Sealed(kept, held, seed, data, seal(data, kept, held))
+
+
+def _spans_all(recordings: Sequence[Recording], held: Collection[str]) -> bool:
+    """Say whether the runs that are not held have the range of every condition that all have."""
+    return _ranges([r for r in recordings if r.name not in held]) == _ranges(recordings)
+
+
+def _ranges(recordings: Sequence[Recording]) -> dict[str, tuple[float, float]]:
+    found: dict[str, list[float]] = {}
+    for recording in recordings:
+        for name, value in recording.conditions.items():
+            if isinstance(value, int | float):
+                found.setdefault(name, []).append(float(value))
+    return {name: (min(values), max(values)) for name, values in found.items()}
 
 
 def seal(data: str, discover: Sequence[str], confirm: Sequence[str]) -> str:

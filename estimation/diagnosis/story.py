@@ -22,6 +22,7 @@ class Claim:
         named: The effect, or None.
         depends_on: Variables.
         formulas: What stands for its map in a model, the one that is written first.
+        form: What stands beside a named effect for what its equation leaves of its own cause.
     """
 
     part: Part
@@ -29,6 +30,7 @@ class Claim:
     named: Named | None
     depends_on: tuple[str, ...]
     formulas: tuple[Formula, ...] = ()
+    form: Formula | None = None
 
     @property
     def family(self) -> str:

@@ -37,8 +37,8 @@ def turned(balance: Balance, terms: Sequence[Candidate]) -> list[Candidate]:
     blocks = [[c.columns(run.channels)[_places(run)] for c in best] for run in balance.runs]
     most = FREE * balance.loss(best)
     for i, term in enumerate(terms):
-        for k, shape in enumerate(term.effect.shape):
-            if shape.name == "width" and "speed" in dict(term.channels):
+        for k in range(len(term.shape)):
+            if term.effect.shape[k].name == "width" and "speed" in dict(term.channels):
                 best[i] = _widened(balance, best, (i, k), (blocks, aims), most)
                 for run, block in zip(balance.runs, blocks, strict=True):
                     block[i] = best[i].columns(run.channels)[_places(run)]
@@ -68,7 +68,7 @@ def _widened(
             own = moved.columns(run.channels)[_places(run)]
             left = aim - np.hstack([*block[:i], own, *block[i + 1 :]]) @ weights
             total += float(np.sum((left - left.mean()) ** 2))
-        return total * max(motion / most, 1.0) ** PENALTY
+        return total * min(max(motion / most, 1.0), FAR) ** PENALTY
 
     found = optimize.minimize_scalar(
         error, bounds=(-REACH, REACH), method="bounded", options={"xatol": 0.05}
@@ -76,8 +76,8 @@ def _widened(
     return terms[i].moved(k, found.x) if found.fun < error(0.0) else terms[i]
 
 
-PENALTY = 100
-"""Power that makes a width which costs anything in motion lose."""
+PENALTY, FAR = 100, 1e3
+"""Power that makes a width which costs anything in motion lose; beyond `FAR` all are as bad."""
 
 
 def _places(run: Run) -> NDArray[np.intp]:
