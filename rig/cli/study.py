@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.output import JsonFlag, emit_json, progress, results, show_result
-from rig.cli.study_arm import StateFolder, arm_studies, kept_in
+from rig.cli.study_arm import StateFolder, arm_studies, resumable
 
 if TYPE_CHECKING:
     from rig.studies.oneill import Source
@@ -211,13 +211,8 @@ def zhao(
         raise UsageError(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
-    with progress() as bar:
-        task = bar.add_task("graspers", total=3 + 2 * seeds)  # three diagnoses
-
-        def step() -> None:
-            bar.advance(task)
-
-        kept = kept_in(state, "zhao")
+    steps = 3 + 2 * seeds  # three diagnoses
+    with resumable(state, "zhao", steps, "graspers") as (kept, step):
         study = run_study(prototype, seeds, spread, kept, workers=workers, on_step=step)
         added = study.lacking["grasp"].terms
         haptics = haptics_of(prototype, seeds, spread, added, kept, workers=workers, on_step=step)

@@ -1,7 +1,9 @@
 """`rig study` on arms: a paper's results on joint torque, wrench, added mass, grasp."""
 
 import os
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -56,9 +58,23 @@ def _show(
         emit_json(study)
 
 
-def kept_in(state: Path | None, study: str) -> Path:
-    """Return where a study keeps what is done."""
-    return state or Path.home() / ".cache" / "rig" / study
+@contextmanager
+def resumable(
+    state: Path | None, study: str, total: int, what: str = "arms"
+) -> Iterator[tuple[Path, Callable[[], None]]]:
+    """Show how much of a study is done; where it is interrupted, say how to go on.
+
+    Yields:
+        Where the study keeps what is done, and what to call after each step.
+    """
+    kept = state or Path.home() / ".cache" / "rig" / study
+    try:
+        with progress() as bar:
+            task = bar.add_task(what, total=total)
+            yield kept, lambda: bar.advance(task)
+    except KeyboardInterrupt:
+        sys.stderr.write(f"What is done is kept in {kept}: the same command goes on from there.\n")
+        raise
 
 
 @arm_studies.command()
@@ -138,13 +154,10 @@ def wrench(
     from rig.reports import pique_wrench as shown
     from rig.studies.pique_wrench import run_wrench_study
 
-    with progress() as bar:
-        task = bar.add_task("arms", total=seeds)
-        study = run_wrench_study(
-            seeds, kept_in(state, "wrench"), workers, lambda: bar.advance(task)
-        )
+    with resumable(state, "wrench", seeds) as (kept, on_arm):
+        study = run_wrench_study(seeds, kept, workers, on_arm)
     drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = shown.NOTES
+    lines = [shown.lead(study), *shown.NOTES]
     page = partial(shown.markdown, study)
     _show(study, lines, shown.tables(study), page, drawn, out, json)
 
@@ -162,9 +175,8 @@ def delsol(
     from rig.reports import delsol as shown
     from rig.studies.delsol import run_delsol
 
-    with progress() as bar:
-        task = bar.add_task("arms", total=seeds)
-        study = run_delsol(seeds, kept_in(state, "delsol"), workers, lambda: bar.advance(task))
+    with resumable(state, "delsol", seeds) as (kept, on_arm):
+        study = run_delsol(seeds, kept, workers, on_arm)
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), shown.NOTE]
     page = partial(shown.markdown, study)
@@ -185,10 +197,8 @@ def zhang(
     from rig.reports.zhang_figures import write_figures
     from rig.studies.zhang import run_zhang
 
-    kept = kept_in(state, "zhang")
-    with progress() as bar:
-        task = bar.add_task("arms", total=seeds)
-        study = run_zhang(seeds, kept, workers, lambda: bar.advance(task))
+    with resumable(state, "zhang", seeds) as (kept, on_arm):
+        study = run_zhang(seeds, kept, workers, on_arm)
     drawn = write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.notes(study)]
     page = partial(shown.markdown, study)

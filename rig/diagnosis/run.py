@@ -78,10 +78,11 @@ def run_diagnosis(
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
     arm = balances_of(recordings[0])
-    on_stage("building the simulated twin of the declared models")
     if arm is None:
+        on_stage("building the simulated twin of the declared models")
         twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
     else:
+        on_stage("fitting the links that all joints share")
         recordings, twin = laid_out(arm, recordings, sealed.discover)
         twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
     diagnosis, stories = diagnose(

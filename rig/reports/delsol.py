@@ -10,6 +10,7 @@ from rig.reports.figures import paired_bars, write_svgs
 from rig.reports.table import TextTable, to_markdown
 from rig.simulation.hydraulic_arm import HYDRAULIC
 from rig.studies.delsol import (
+    DISCARDED,
     OURS,
     PAPER,
     PEAK_N,
@@ -25,6 +26,13 @@ from rig.studies.delsol_diagnosis import JOINTS, PULLS, RUNS, Named
 TITLE = "External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
 
 NOTE = f"Arm: {HYDRAULIC.name}; {HYDRAULIC.source}."
+
+DISCARDS = (
+    "Equation 15 discards points whose observation matrix has a condition number above 100, read"
+    " as that of one point's rows, all 96 columns in SI units; the residual is then of the points"
+    " kept."
+    " The simulated arms were set to meet the paper with all points."
+)
 
 NAMED_NOTE = (
     f"The joints are balances of the diagnosis, on {RUNS} further runs of each arm along finite"
@@ -70,18 +78,9 @@ def markdown(study: DelSolStudy, figures: Sequence[str] = ()) -> str:
 def write_figures(folder: Path, study: DelSolStudy) -> list[Path]:
     """Write the median residual of each joint and the median errors of force, by method."""
     sides = ("paper's method", "ours")
-    residual, forces = (
-        [
-            np.median([values(outcome) for outcome in study.outcomes[method]], axis=0)
-            for method in (PAPER, OURS)
-        ]
-        for values in (
-            lambda o: o.residual_n_m,
-            lambda o: (o.impact_n, o.sliding_n),
-        )
-    )
-    joints = {f"joint {k + 1}": (residual[0][k], residual[1][k]) for k in range(JOINTS)}
-    named = {n: (forces[0][k], forces[1][k]) for k, n in enumerate(("impact", "sliding"))}
+    (paper, their_forces), (ours, our_forces) = (_medians(study, m) for m in (PAPER, OURS))
+    joints = {f"joint {k + 1}": (paper[k], ours[k]) for k in range(JOINTS)}
+    named = {n: (their_forces[k], our_forces[k]) for n, k in (("impact", 0), ("sliding", 2))}
     drawn = {
         "delsol-residual": paired_bars(joints, sides, "RMS residual, N m", "Table 2, medians"),
         "delsol-forces": paired_bars(named, sides, "RMS error of force, N", "Table 5, medians"),
@@ -102,20 +101,18 @@ def tables(study: DelSolStudy) -> list[TextTable]:
         force = np.array([(o.impact_n, o.impact_percent, o.sliding_n) for o in each])
         forces.append([f"{method}, median", *(f"{v:.2f}" for v in np.median(force, axis=0))])
         forces.append([f"{method}, least to most", *_ranges(force)])
-    paper_rms = np.median([o.residual_n_m for o in study.outcomes[PAPER]], axis=0)
-    paper_force = np.median(
-        [(o.impact_n, o.impact_percent, o.sliding_n) for o in study.outcomes[PAPER]], axis=0
-    )
-    fair = (TABLE_5_N[0], PEAK_PERCENT, TABLE_5_N[1])
-    residual.append(["within 25 % of the paper", *_near(paper_rms, TABLE_2_N_M)])
-    forces.append(["within 25 % of the paper", *_near(paper_force, fair)])
+    stated = (TABLE_5_N[0], PEAK_PERCENT, TABLE_5_N[1])
+    for method, word in ((PAPER, "within"), (DISCARDED, "with points discarded, within")):
+        rms, force = _medians(study, method)
+        residual.append([f"{word} {WITHIN:.0%} of the paper", *_near(rms, TABLE_2_N_M)])
+        forces.append([f"{word} {WITHIN:.0%} of the paper", *_near(force, stated)])
     note = (
         f"The paper's impact peaks at {PEAK_N:.0f} N; its sliding force is not stated and assumed."
     )
     count = f"{len(study.seeds)} seeds"
     return [
         TextTable("Table 1: excitation, Hz", ["", "lowest", "highest"], excited),
-        TextTable(f"Table 2: RMS residual, N m, {count}", ["", *joints], residual),
+        TextTable(f"Table 2: RMS residual, N m, {count}", ["", *joints], residual, DISCARDS),
         TextTable(
             f"Table 5: RMS error of force, {count}",
             ["", "impact, N", "impact, % of peak", "sliding, N"],
@@ -124,6 +121,13 @@ def tables(study: DelSolStudy) -> list[TextTable]:
         ),
         _named(study),
     ]
+
+
+def _medians(study: DelSolStudy, method: str) -> tuple[FloatArray, FloatArray]:
+    """Return a method's median residual of each joint, and its median errors of force."""
+    each = study.outcomes[method]
+    force = [(o.impact_n, o.impact_percent, o.sliding_n) for o in each]
+    return np.median([o.residual_n_m for o in each], axis=0), np.median(force, axis=0)
 
 
 def _named(study: DelSolStudy) -> TextTable:

@@ -17,7 +17,7 @@ from estimation.arm.tables import PSM, PSM_CLOSED
 from estimation.arm.wrist import candidates, gripper
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.importers.registry import open_campaign
 
 EDGE_S = 1.0
@@ -40,16 +40,22 @@ def open_paths(data: Path, names: Sequence[str]) -> list[Recording]:
     """Read runs of a folder by name.
 
     Raises:
-        UsageError: There is nothing at the path.
+        UsageError: There is nothing at the path, or a run is named twice.
         DataError: A run is missing or cannot be read.
     """
+    if len(set(names)) < len(names):
+        raise UsageError(
+            f"A run is named twice among {', '.join(names)}.",
+            "A run that a model was fitted on does not test it.",
+            "Name different runs.",
+        )
     campaign = open_campaign(data)
     missing = [name for name in names if name not in campaign.names]
     if missing:
         raise DataError(
             f"{data} holds no run {' and no run '.join(missing)}.",
             f"It holds: {', '.join(campaign.names) or 'nothing'}.",
-            "Name those you mean: --paths FIRST SECOND",
+            "Name runs that it holds.",
         )
     return [campaign.select([name]).runs[0].recording() for name in names]
 
@@ -150,12 +156,15 @@ class Prepared:
         return self.table[:, : self.joints][:, :, at] @ values
 
 
-def prepare(recording: Recording, tried: Sequence[ArmEffect] | None = None) -> Prepared:
+def prepare(
+    recording: Recording, tried: Sequence[ArmEffect] | None = None, damping: float = DAMPING
+) -> Prepared:
     """Filter one path and make its columns.
 
     Args:
         recording: The path.
         tried: Effects to make columns of; None takes all that are worth trying.
+        damping: Of its fits, as a share of a column's squared length.
 
     Raises:
         DataError: The run is too short, or lacks a joint.
@@ -189,21 +198,23 @@ def prepare(recording: Recording, tried: Sequence[ArmEffect] | None = None) -> P
         thesis=regressor(PSM, coarse)[kept][:, :, base.columns],
         closed=regressor(PSM_CLOSED, coarse)[kept][:, :, base_of(PSM_CLOSED).columns],
         table=np.concatenate([smoothed(part, rate_hz)[kept] for part in parts], axis=2),
-        blocks=_blocks(effects, [part.shape[2] for part in parts]),
+        blocks=_blocks(effects, [part.shape[2] for part in parts], damping),
         independent_share=min(1.0, 2 * LOW_PASS.cutoff_hz * every / rate_hz),
     )
 
 
-def _blocks(effects: Sequence[ArmEffect], widths: Sequence[int]) -> tuple[Block, ...]:
+def _blocks(
+    effects: Sequence[ArmEffect], widths: Sequence[int], damping: float
+) -> tuple[Block, ...]:
     base, own_gripper, *rest = widths
     friction = [name.startswith("F") and len(name) == 3 for name in base_of(PSM).names]
     frictions = np.array([*friction, *([False, True, True, True][:own_gripper])])
-    blocks = [Block("base", np.arange(base + own_gripper), frictions, DAMPING, own_length=True)]
+    blocks = [Block("base", np.arange(base + own_gripper), frictions, damping, own_length=True)]
     start = base + own_gripper
     for effect, width in zip(effects, rest, strict=True):
         at = np.arange(start, start + width)
         signs = np.full(width, effect.dissipative)
-        blocks.append(Block(effect.name, at, signs, DAMPING * effect.damping))
+        blocks.append(Block(effect.name, at, signs, damping * effect.damping))
         start += width
     return tuple(blocks)
 

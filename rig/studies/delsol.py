@@ -31,7 +31,7 @@ from rig.simulation.hydraulic_arm import (
 from rig.studies.delsol_diagnosis import HIGHEST_HZ, JOINTS, Named, diagnosed, found_columns
 from rig.studies.seeds import kept_outcomes
 
-SCHEMA = "rig.study.delsol/2"
+SCHEMA = "rig.study.delsol/3"
 
 TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
 TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
@@ -43,7 +43,11 @@ PEAK_N = 26.096 / 0.1298
 SLIDING_N = 30.0
 """Friction of the rough foam; assumed."""
 
-PAPER, OURS = "paper's method", "with what was found"
+PAPER, DISCARDED = "paper's method", "the same, points above 100 discarded"
+OURS = "with what was found"
+LARGEST_CONDITION = 100.0
+"""Equation 15: points whose own part of the observation matrix has a larger condition number go."""
+
 SWINGS = 4
 POSES = 2
 DAMPING = 0.3
@@ -56,7 +60,7 @@ class Outcome:
     """One seed's results by one method.
 
     Attributes:
-        residual_n_m: RMS residual of each joint on the identification's points, N m.
+        residual_n_m: RMS residual of each joint on the points of the fit, N m.
         impact_n: RMS error of the vertical force of the impact, N.
         impact_percent: The same over the force's peak, %.
         sliding_n: RMS error of the sliding force, N.
@@ -110,7 +114,8 @@ def run_delsol(
         OSError: The folder cannot be written.
     """
     done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
-    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in (PAPER, OURS)}
+    methods = (PAPER, DISCARDED, OURS)
+    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in methods}
     named = tuple(seed.named for seed in done)
     return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, named, Provenance.now(0))
 
@@ -138,9 +143,16 @@ def one_seed(seed: int) -> Seed:
         return np.concatenate([paper_columns(motion), found_columns(effects, motion)], axis=2)
 
     outcomes = {}
-    for method, columns_of in ((PAPER, paper_columns), (OURS, our_columns)):
+    for method, columns_of in (
+        (PAPER, paper_columns),
+        (DISCARDED, paper_columns),
+        (OURS, our_columns),
+    ):
         table = np.concatenate([columns_of(motion) for motion, _ in runs])
         torque = np.concatenate([torque for _, torque in runs])
+        if method == DISCARDED:
+            kept = conditions(table) <= LARGEST_CONDITION
+            table, torque = table[kept], torque[kept]
         values = damped_around(table, torque, np.zeros(table.shape[2]), DAMPING)
         left = torque - table @ values
         errors = {}
@@ -205,6 +217,13 @@ def _around(pose: FloatArray, joint: int, size_rad: float, frequency_hz: float) 
 def paper_columns(motion: Motion) -> FloatArray:
     """Return the 96 columns of eight links, ten parameters and two frictions each."""
     return closed_regressor(HYDRAULIC, motion, SIGN_RAD_S)
+
+
+def conditions(table: FloatArray) -> FloatArray:
+    """Return the condition number of each point's rows, from (n, joints, parameters) to (n,)."""
+    squares = np.linalg.eigvalsh(table @ table.transpose(0, 2, 1))
+    ratio: FloatArray = squares[:, -1] / np.maximum(squares[:, 0], np.finfo(float).tiny)
+    return np.sqrt(ratio)
 
 
 def tip_force(motion: Motion, external: FloatArray) -> FloatArray:

@@ -2,7 +2,8 @@
 
 Each of two paths is fitted, and the model tested on the other. The thesis' model first, then the
 effects that a forward search keeps: each round adds the effect that helps most on the path that was
-not fitted, in one direction. An effect that the other direction does not confirm is left out.
+not fitted, in one direction. An effect that the other direction does not confirm is left out. Last,
+effects chosen on the path that is fitted alone, so that the other is untouched by the choice.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,6 +20,7 @@ from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
 from rig.reports.provenance import Provenance
 from rig.studies.arm_search import Prepared, Trial, prepare, search
+from rig.studies.arm_within import chosen_within
 
 THESIS_TABLE_3_2 = (2.38, 4.80, 12.83, 6.49, 15.29, 18.11)
 """The thesis' NRMSD on a path it was not fitted to, %, on another robot."""
@@ -28,6 +30,7 @@ CLOSED = "thesis' model with the arm's loops"
 CONSISTENT = "thesis' model, physically consistent"
 FILTERED = "columns filtered as the torque"
 EFFECTS = "with the effects kept"
+WITHIN = "with effects chosen on the fitted path alone"
 
 SIMPLER_PERCENT = (1.0, 3.0)
 """Least gain in both directions of simpler choices of effects that further runs are tested with."""
@@ -130,6 +133,10 @@ def run_study(
     trials, kept = search(there, back, effects, lambda number: on_step(f"effects, round {number}"))
     on_step("fits")
     rows = []
+    alone = {
+        path.name: chosen_within(path, run, effects)
+        for path, run in zip(there, (first, second), strict=True)
+    }
     for one, other in (there, back, *((there[1], prepare(run, effects)) for run in also)):
         rows += [
             _row(THESIS, one, other, one.thesis, other.thesis),
@@ -137,6 +144,7 @@ def run_study(
             _consistent_row(one, other),
             _row(FILTERED, one, other, one.filtered, other.filtered),
             _row_with_effects(EFFECTS, one, other, kept),
+            _row_with_effects(WITHIN, one, other, alone[one.name]),
         ]
     for run in also:
         rows += _simpler_rows(there[1], prepare(run, effects), trials)

@@ -65,7 +65,7 @@ BODY = "3.3 in the tip's frame, by the body Jacobian"
 numbers of it."""
 
 PUSHED = ((5.0, 7.0, 7.0), 0.0)
-TWISTED = ((3.0, 5.0, 5.0), 0.1)
+TWISTED = ((2.3, 4.0, 5.0), 0.1)
 """Largest forces along the base's axes, N, and torsion, N m, where the thesis measured forces and
 where it measured moments. It names up to 7 N and states no sizes; these are set so that its method
 meets its table 3.3."""

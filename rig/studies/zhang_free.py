@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.arm.identification import nrmsd_percent
 from estimation.recording import FloatArray
@@ -15,6 +16,7 @@ from rig.studies.zhang_physics import Physics, find_effects, fitted
 
 NETWORKS, BARE, OURS = "paper's networks", "physical model alone", "physical model and network"
 SHORT = "paper's networks on our minutes"
+FLOOR = "white noise of the torque alone"
 
 MINUTES = 15.0
 """Of free motion a condition, split 5:1:1 into training, validation and test."""
@@ -88,6 +90,7 @@ def fitted_physics(psm: Psm, splits: dict[str, Split]) -> tuple[Physics, Cells]:
         for method, network in ((BARE, False), (OURS, True)):
             free = physics(split.test, network)[:, :GRIPPER]
             cells[f"I | M+C on {test} | {method}"] = _nrmse(free, split.test)
+        cells[f"I | M+C on {test} | {FLOOR}"] = _noise(psm, split.test)
     return physics, cells
 
 
@@ -111,10 +114,19 @@ def short_networks(splits: dict[str, Split], seed: int) -> Cells:
 
 def _nrmse(free: FloatArray, run: PsmRun) -> tuple[float, ...]:
     """Return the mean over parts of the test of each joint's error over its range, %."""
-    parts = np.array_split(np.arange(SETTLE, len(run)), PARTS)
     torque = run.torque[:, : free.shape[1]]
-    errors = [nrmsd_percent(free[part], torque[part]) for part in parts]
+    errors = [nrmsd_percent(free[part], torque[part]) for part in _parts(run)]
     return tuple(map(float, np.mean(errors, axis=0)))
+
+
+def _noise(psm: Psm, run: PsmRun) -> tuple[float, ...]:
+    """Return the error that is left of each joint where all but the noise is known, %."""
+    spreads = [np.ptp(run.torque[part, :GRIPPER], axis=0) for part in _parts(run)]
+    return tuple(map(float, np.mean(100 * psm.noise[:GRIPPER] / spreads, axis=0)))
+
+
+def _parts(run: PsmRun) -> list[NDArray[np.intp]]:
+    return np.array_split(np.arange(SETTLE, len(run)), PARTS)
 
 
 def figure_3(psm: Psm, rng: np.random.Generator) -> Cells:

@@ -1,14 +1,16 @@
 """Our way beside the networks: an arm's model, effects found by search, a network on the rest.
 
 Everything is causal, as the networks are: friction's memory is walked along the measured path, and
-acceleration comes from past velocities. What the coupling matrix gets wrong shows in joints 3 to 6
-as a share of the gripper's measured torque, so that torque is an input of theirs.
+velocity and acceleration are those of a polynomial through past positions, at its end. What the
+coupling matrix gets wrong shows in joints 3 to 6 as a share of the gripper's measured torque, so
+that torque is an input of theirs.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import signal
 
 from estimation.arm.base import base_of
 from estimation.arm.effects import ArmEffect, on_joint
@@ -19,10 +21,10 @@ from estimation.arm.signed import Block
 from estimation.arm.tables import PSM, Arm
 from estimation.arm.wrist import candidates, gripper
 from estimation.networks.network import Network
-from estimation.networks.training import Settings, train
 from estimation.recording import FloatArray
 from rig.simulation.psm import GRIPPER, JOINTS, RATE_HZ, PsmRun
 from rig.studies.arm_search import DAMPING, Prepared, search
+from rig.studies.zhang_rest import rest_network, rest_rows
 
 EVERY = 5
 """Of the samples, so many are fitted: ten a second."""
@@ -30,8 +32,9 @@ EVERY = 5
 SETTLE = 100
 """Samples at the start of a run that are not fitted: slip elements have not slipped yet."""
 
-BACK = 5
-"""Samples over which acceleration is taken from velocity."""
+WINDOW, DEGREE = 15, 4
+"""Past samples that velocity and acceleration come from, and the degree of their polynomial. Taken
+at its end, they hardly trail: differences of past velocities do, which shows as late torque."""
 
 CLOSED_RAD = 0.03
 """Angle below which the jaws touch."""
@@ -45,16 +48,19 @@ LONG_SLIP_SHARE = (0.01, 0.03, 0.1, 0.2)
 DRAG_RAD_S = (0.05, 0.2)
 """Speeds over which the drag of the gripper's cables turns."""
 
-REST = Settings(nodes=4, iterations=10)
-HELD_OUT = 6
-"""Every so many pieces of the samples choose whether the network on the rest is kept."""
-
 
 def motion_of_run(run: PsmRun) -> Motion:
-    """Return a run's motion as it is known at each sample."""
-    late = np.maximum(np.arange(len(run)) - BACK, 0)
-    acceleration = (run.velocity - run.velocity[late]) * RATE_HZ / BACK
-    return Motion(run.position, run.velocity, acceleration, 1 / RATE_HZ)
+    """Return a run's motion as it is known at each sample; before its first one it stood still."""
+    before = np.repeat(run.position[:1], WINDOW, axis=0)
+    known = np.vstack([before, run.position])
+
+    def derivative(order: int) -> FloatArray:
+        last, step = WINDOW - 1, 1 / RATE_HZ
+        taps = signal.savgol_coeffs(WINDOW, DEGREE, deriv=order, delta=step, pos=last)
+        found: FloatArray = np.asarray(signal.lfilter(taps, [1.0], known, axis=0), np.float64)
+        return found[WINDOW:]
+
+    return Motion(run.position, derivative(1), derivative(2), 1 / RATE_HZ)
 
 
 def base_columns(arm: Arm, run: PsmRun, motion: Motion) -> FloatArray:
@@ -140,10 +146,10 @@ class Physics:
         """
         torque: FloatArray = columns_of(self.arm, self.effects, run) @ self.values
         if network:
-            rows = rest_rows(run)
+            motion = motion_of_run(run)
             for k, rest in enumerate(self.rest):
                 if rest is not None:
-                    torque[:, k] += rest(rows)[:, 0]
+                    torque[:, k] += rest(rest_rows(self.arm, k, motion))[:, 0]
         return torque
 
 
@@ -210,27 +216,11 @@ def fitted(
     bare = Physics(arm, tuple(effects), values, (None,) * JOINTS)
     if not network:
         return bare
-    rows = np.concatenate([rest_rows(run)[SETTLE::EVERY] for run in runs])
     left = path.torque - path.table @ values
-    rest = tuple(_rest(rows, left[:, [k]]) for k in range(JOINTS))
-    return Physics(arm, tuple(effects), values, rest)
+    motions = [motion_of_run(run) for run in runs]
 
+    def rest(k: int) -> Network | None:
+        rows = [rest_rows(arm, k, motion)[SETTLE::EVERY] for motion in motions]
+        return rest_network(np.concatenate(rows), left[:, k])
 
-def rest_rows(run: PsmRun) -> FloatArray:
-    """Return the states that the networks on the rest take, shape (n, 14)."""
-    return np.hstack([run.position, run.velocity])
-
-
-def _rest(rows: FloatArray, left: FloatArray) -> Network | None:
-    piece = np.arange(len(rows)) * 3 * HELD_OUT // len(rows)
-    out = piece % HELD_OUT == HELD_OUT - 1
-    names = tuple(f"{letter}{k + 1}" for letter in "qv" for k in range(JOINTS))
-    network = train(
-        rows[~out],
-        left[~out],
-        (names, ("rest",)),
-        REST,
-        validation=(rows[out], left[out]),
-    ).network
-    better = np.sum((left[out] - network(rows[out])) ** 2) < np.sum(left[out] ** 2)
-    return network if better else None
+    return Physics(arm, tuple(effects), values, tuple(rest(k) for k in range(JOINTS)))

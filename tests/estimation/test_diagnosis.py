@@ -68,6 +68,23 @@ def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
     assert model_file.parse(model_file.to_toml(fitted)) == fitted
 
 
+def uneven_ripple(motor_rad, speed_rad_s, load_n_m):
+    return 0.006 * np.sin(3 * motor_rad) + 0.002 * np.cos(4 * motor_rad)
+
+
+def test_a_formula_stands_beside_a_name_for_what_its_equation_leaves_of_its_own_cause():
+    diagnosis, stories = diagnosed(runs(uneven_ripple))
+    (finding,) = diagnosis.findings
+    assert (finding.family, finding.verdict) == ("ripple.motor", "identified")
+    assert finding.parameters["order"].value == pytest.approx(3.0, abs=0.01)
+    assert finding.rmse_after < 1.1e-3  # the sensor's noise is 1 mN m; the rest of the wave 1.4
+    (note,) = (n for n in diagnosis.notes if "of its own cause" in n)
+    assert "motor_angle" in note
+    fitted = stories["motor"].model
+    assert any(term.effect.family == "unknown" for term in fitted.terms)
+    assert model_file.parse(model_file.to_toml(fitted)) == fitted
+
+
 def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
     diagnosis, stories = diagnosed(runs(tight_spot))
     assert diagnosis.verdict == "depends_on"
@@ -181,6 +198,17 @@ def test_the_split_is_stratified_repeatable_and_sealed():
     assert {r.conditions["frequency_hz"] for r in recordings if r.name in first.confirm} == {
         r.conditions["frequency_hz"] for r in recordings
     }
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_ends_of_every_condition_discover(seed):
+    recordings = runs(count=12, seconds=1.0)
+    kept = [r for r in recordings if r.name in split(recordings, seed).discover]
+    for name in ("frequency_hz", "load_command_a"):
+        ends = [
+            (min(v), max(v)) for v in ([r.conditions[name] for r in s] for s in (kept, recordings))
+        ]
+        assert ends[0] == ends[1]
 
 
 def test_the_data_hash_follows_the_samples():

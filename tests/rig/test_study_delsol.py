@@ -29,6 +29,13 @@ def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):
     assert np.all(np.array(ours["residual_n_m"]) < paper["residual_n_m"])
     assert ours["impact_n"] < paper["impact_n"]
     assert "| paper | 26.10 | 12.98 | 6.81 |" in out.read_text()
+    assert found["outcomes"][delsol.DISCARDED] != found["outcomes"][delsol.PAPER]
+
+
+def test_a_points_condition_is_that_of_its_own_rows():
+    rows = np.random.default_rng(0).normal(size=(4, 5, 96))
+    expected = [np.linalg.cond(point) for point in rows]
+    np.testing.assert_allclose(delsol.conditions(rows), expected)
 
 
 def test_the_excitation_keeps_to_table_1():

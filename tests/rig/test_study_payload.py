@@ -2,10 +2,19 @@
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from estimation.arm.motion import motion_of
+from estimation.arm.payload import carried_torque
+from estimation.arm.regressor import names, regressor
+from estimation.arm.tables import PSM, PointMass
+from estimation.recording import Recording
+from rig.cli.main import main
 from rig.cli.study import study_app
+from rig.simulation.arm import draw_arm
+from rig.studies.payload import find_payload
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
@@ -23,3 +32,55 @@ def test_the_measured_mass_is_found_and_none_where_there_is_none(measured_data, 
     assert with_mass["mass_kg"] == pytest.approx(0.105, rel=0.03)
     assert abs(without["mass_kg"]) < 0.002
     assert "| one19_insertion_105g |" in out.read_text()
+
+
+RATE_HZ = 100.0
+ARM = draw_arm(np.random.default_rng(3)).values
+
+
+def made_run(name: str, seconds: float, period_s: float, mass_kg: float = 0.0) -> Recording:
+    """A run of an arm that its model knows wholly, with a mass on its second link."""
+    rng = np.random.default_rng(int(10 * period_s))
+    time = np.arange(0, seconds, 1 / RATE_HZ)
+    waves = sum(
+        np.sin(2 * np.pi * k / period_s * time[:, None] + rng.uniform(0, 6.28, 7)) / k
+        for k in range(1, 6)
+    )
+    limits = [*((joint.lower, joint.upper) for joint in PSM.joints), (0.0, 1.0)]
+    lower, upper = np.array(limits).T
+    position = (lower + upper) / 2 + 0.2 * (upper - lower) * waves
+    motion = motion_of(position, 1 / RATE_HZ)
+    loaded = PSM.with_payload(PointMass("weight", 2, (0.01, 0.535, -0.02), mass_kg))
+    torque = regressor(PSM, motion) @ ARM + carried_torque(loaded, motion)
+    torque += 0.002 * np.ptp(torque, axis=0) * rng.normal(size=torque.shape)
+    columns = {}
+    for k in range(7):
+        units = (
+            "angle_rad velocity_rad_s torque_n_m" if k != 2 else "position_m velocity_m_s force_n"
+        )
+        effort = torque[:, k] if k < 6 else np.zeros(len(time))
+        values = (position[:, k], motion.velocity[:, k], effort)
+        for unit, column in zip(units.split(), values, strict=True):
+            columns[f"joint_{k + 1}_{unit}"] = column
+    return Recording(name, time, columns)
+
+
+def test_a_mass_is_found_at_any_speed_even_where_a_run_repeats_only_twice():
+    assert len(ARM) == len(names(PSM))
+    fitted = made_run("without", 40.0, 8.0)
+    runs = [
+        made_run("fast", 30.0, 5.0, 0.08),
+        made_run("slow", 30.0, 13.0, 0.2),
+        made_run("nothing", 30.0, 6.5),
+    ]
+    masses = find_payload(fitted, runs, 0.535, 0.005).masses
+    for run, true, found in zip(runs, (0.08, 0.2, 0.0), masses, strict=True):
+        low, high = found.interval_kg
+        assert found.mass_kg == pytest.approx(true, rel=0.03, abs=0.002), run.name
+        assert low < true < high, run.name
+
+
+def test_a_run_named_twice_is_refused(capsys):
+    words = ["study", "payload", "--data", ".", "--on", "two18"]
+    assert main(words) == 2
+    assert "named twice" in capsys.readouterr().err

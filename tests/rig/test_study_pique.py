@@ -91,6 +91,10 @@ def test_every_candidate_is_reported_as_kept_or_dropped(study):
     )
 
 
+def test_effects_chosen_on_one_path_alone_hold_on_the_other(study):
+    assert errors(study, pique.WITHIN)[1] < 0.5 * errors(study, pique.FILTERED)[1]
+
+
 def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
     one, other = (arm_search.prepare(path, TRIED) for path in paths)
     kept = [HIDDEN]
@@ -100,15 +104,16 @@ def test_the_fast_search_scores_as_the_fit_it_stands_for(paths):
 
 
 def test_the_command_prints_json_and_writes_markdown(paths, monkeypatch, tmp_path):
-    monkeypatch.setattr(arm_search, "open_campaign", lambda path: Campaign.of(paths))
+    three = Campaign.of((*paths, made_path("c", 13)))
+    monkeypatch.setattr(arm_search, "open_campaign", lambda path: three)
     monkeypatch.setattr(pique, "candidates", lambda arm: TRIED)
     out = tmp_path / "pique.md"
-    words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "a", "--out", str(out)]
+    words = ["pique", "--data", "x", "--paths", "a", "b", "--also", "c", "--out", str(out)]
     ran = CliRunner().invoke(study_app, [*words, "--json"])
     assert ran.exit_code == 0, ran.output
     found = json.loads(ran.stdout)
     assert found["schema"] == "rig.study.pique/1"
-    assert len(found["rows"]) == 17
+    assert len(found["rows"]) == 20
     text = out.read_text()
     assert "thesis, table 3.2 (another robot)" in text
     assert "| 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in text

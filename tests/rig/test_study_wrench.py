@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rig.cli.main import main
 from rig.cli.study import study_app
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
@@ -76,3 +77,12 @@ def test_contact_stays_within_seven_newton_and_the_sensor_close_to_it():
     seen = ati(wrench, rng)
     assert not np.allclose(seen, wrench, atol=1e-3)
     assert np.sqrt(np.mean((seen - wrench)[:, :3] ** 2)) < 0.4
+
+
+def test_an_interrupted_study_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rig.studies.pique_wrench.run_wrench_study", stopped)
+    assert main(["study", "wrench", "--state", str(tmp_path)]) == 130
+    assert f"kept in {tmp_path}" in capsys.readouterr().err

@@ -9,12 +9,12 @@ from typer.testing import CliRunner
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
 from rig.cli.study import study_app
-from rig.simulation.arm import draw_arm
-from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrument
+from rig.simulation.arm import dahl, draw_arm
+from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, with_instrument
 from rig.simulation.psm_grasp import configurations, grasp_and_release
 from rig.simulation.psm_instruments import KINDS
 from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies import zhang_free, zhang_networks, zhang_physics
+from rig.studies import zhang_free, zhang_networks, zhang_physics, zhang_rest
 from rig.studies.zhang import PAPER, run_zhang
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
@@ -159,3 +159,29 @@ def here(one_seed, seeds, workers, start):
 def nothing_left(one_seed, seeds, workers, start):
     assert seeds == []
     return iter(())
+
+
+def test_motion_of_a_run_does_not_trail_a_smooth_path():
+    time = np.arange(200) / RATE_HZ
+    rise = np.outer(0.3 * time**4 - time**2, np.ones(GRIPPER + 1))
+    run = PsmRun(rise, np.zeros_like(rise), np.zeros_like(rise))
+    motion = zhang_physics.motion_of_run(run)
+    known = slice(zhang_physics.WINDOW, None)
+    np.testing.assert_allclose(motion.velocity[known, 0], (1.2 * time**3 - 2 * time)[known])
+    np.testing.assert_allclose(motion.acceleration[known, 0], (3.6 * time**2 - 2)[known])
+
+
+@torch_only
+def test_the_network_on_the_rest_learns_memory_and_leaves_noise_alone(psm):
+    rng = np.random.default_rng(8)
+    motion = with_gripper(random_path(rng, 120.0), 0.1, 0.8)
+    memory = dahl(motion.position[:, :1], np.array([0.1]))[:, 0]
+    noise = rng.normal(size=len(motion))
+    cut = 5 * len(motion) // 6
+    for joint in (0, 5):
+        rows = zhang_rest.rest_rows(psm.table, joint, motion)
+        assert zhang_rest.rest_network(rows[:cut:5], noise[:cut:5]) is None
+    rows = zhang_rest.rest_rows(psm.table, 0, motion)
+    found = zhang_rest.rest_network(rows[:cut:5], memory[:cut:5])
+    assert found is not None
+    assert np.std(memory[cut:] - found(rows[cut:])[:, 0]) < 0.1 * np.std(memory[cut:])
