@@ -21,7 +21,6 @@ from estimation.diagnosis.frozen import errors, freeze
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments, stand_in
 from estimation.diagnosis.instruments import projection as instrumented
-from estimation.diagnosis.maps import needed_channels, projection
 from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
@@ -29,6 +28,7 @@ from estimation.diagnosis.shared_sensors import Fault, denied
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import Bootstrap, Twin
+from estimation.diagnosis.variables import needed_channels, projection
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Model

@@ -13,8 +13,9 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.formula import formulas
 from estimation.diagnosis.frozen import Part
 from estimation.diagnosis.gates import Gates
-from estimation.diagnosis.maps import best_map, variables_of
+from estimation.diagnosis.maps import best_map
 from estimation.diagnosis.story import Claim
+from estimation.diagnosis.variables import variables_of
 
 WORTH = 0.1
 """Share of the squared error left that a formula must remove on runs left out."""
