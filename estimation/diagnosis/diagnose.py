@@ -177,7 +177,7 @@ def _balance(
     discovery = searched(Search(seen, tried, gates, sealed.seed, twin))
     claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME)
     if not gates.akin:  # else every parameter counts
-        claims = formed(claims, balance, gates, sealed.seed)
+        claims = formed(claims, balance, tried, gates, sealed.seed)
     beside = [term for c in claims for term in c.part.terms]
     claims = [
         c
