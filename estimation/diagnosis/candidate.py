@@ -73,6 +73,10 @@ Spans = Mapping[tuple[str, str], float]
 EARLY_KNEE = 0.25
 """Share of the usual speed below which damping that wears off with the speed is a direction."""
 
+LEAST_REACH = 0.05
+"""And reach of a loop along a torque, as a share of the widest range of that torque in a run."""
+
+
 MOST_TOGETHER = 48
 """Grid points of an effect with several shape parameters at most."""
 
@@ -133,7 +137,8 @@ class Candidate:
         A wave of which no run covers much more than a period is a slow change with the angle; a
         direction that takes half of the usual speed to turn round goes with the speed, and damping
         that is worn off long before it with the direction; what fades more slowly than a campaign
-        lasts is a line, or a step.
+        lasts is a line, or a step. A loop that a torque is through as soon as it turns is the noise
+        of its sensor: what lags behind noise is a quieter reading.
 
         Args:
             spans: Role and channel to the widest range that a run covers; of a speed the usual fast
@@ -141,10 +146,13 @@ class Candidate:
         """
         shape = {p.name: x for p, x in zip(self.effect.shape, self.shape, strict=True)}
         span = {role: spans[role, channel] for role, channel in self.channels}
+        torques = [spans[r, channel] for r, channel in self.channels if channel.endswith("_n_m")]
         if "order" in shape:
             angle = next(role for role in ANGLE_ROLES if role in span)
             return shape["order"] * span[angle] >= LEAST_PERIODS * 2 * math.pi
         if "width" in shape and "speed" in span and shape["width"] > SLOW_TURN * span["speed"]:
+            return False
+        if "reach" in shape and any(shape["reach"] < LEAST_REACH * x for x in torques):
             return False
         if "knee" in shape and "speed" in span and shape["knee"] < EARLY_KNEE * span["speed"]:
             return False

@@ -21,6 +21,8 @@ class Gates:
         veto: A map withdraws a name when it leaves at most this share of the name's error.
         form: A map of no other variables than those of what was named does so only when the name
             removes less than this share of what the map removes: no formula has the true form.
+        fair_form: Or, when the map leaves much of what the name leaves, less than this share.
+        left_of_form: How much that is.
         map_floor: The floor of a map: with its many columns it bends to
             the noise of a sensor that the balance reads (a share of 0.04 to 0.12 on the simulated
             rig with nothing missing, three seeds, no twins).
@@ -57,7 +59,9 @@ class Gates:
     rival: float = 0.5
     clearly: float = 0.97
     veto: float = 0.9
-    form: float = 0.8
+    form: float = 0.9
+    fair_form: float = 0.8
+    left_of_form: float = 0.3
     sure: float = 0.9
     map_floor: float = 0.2
     near: float = 0.7

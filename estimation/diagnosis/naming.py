@@ -131,7 +131,10 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
 def _of_their_form(search: Search, found: Sequence[Candidate], gain: float, flat: Map) -> bool:
     """Say whether a map only bends the formulas found: their variables, and little more gain."""
     known = {v for candidate in found for v in variables_of(candidate, search.balance)}
-    return within(flat.variables, known) and gain >= search.gates.form * flat.gain
+    share, left = gain / flat.gain, (1 - flat.gain) / (1 - gain)
+    clear, fair = search.gates.form, search.gates.fair_form
+    bends = share >= clear or (share >= fair and left >= search.gates.left_of_form)
+    return within(flat.variables, known) and bends
 
 
 def _vetoes(search: Search, flat: Map, mine: Losses) -> bool:
