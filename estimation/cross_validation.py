@@ -1,14 +1,18 @@
-"""The error of a declared model on runs it was not fitted on."""
+"""The error of a model or an estimator on runs it was not fitted on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.derived import settled_places
+from estimation.estimator import Estimator, Recipe
 from estimation.fitting import fit
 from estimation.model import Model, balance_channels, estimate
+from estimation.oneill import is_closing, processed
 from estimation.recording import FloatArray
+from estimation.scores import Score, score
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,46 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
         runs=len(errors),
         folds=folds,
     )
+
+
+def closing_score(
+    recipe: Recipe,
+    campaign: Campaign,
+    folds: int,
+    seed: int = 0,
+    on_fold: Callable[[], None] = lambda: None,
+) -> Score:
+    """Return the error of a recipe's estimators on closing samples, each run held out once.
+
+    Args:
+        recipe: What is fitted on all folds but one.
+        campaign: The runs.
+        folds: Number of folds.
+        seed: Seed of the folds.
+        on_fold: Called when a fold is done.
+
+    Raises:
+        CampaignError: Fewer runs than folds, or fewer than two.
+    """
+    pairs = []
+    for split in campaign.folds(folds, seed):
+        pairs += closing_pairs(recipe.fit(split.train), split.test)
+        on_fold()
+    return score(np.concatenate([e for e, _ in pairs]), np.concatenate([t for _, t in pairs]))
+
+
+def closing_pairs(
+    estimator: Estimator, runs: Campaign, causal: bool = False
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return estimate and sensor at the closing samples of each run, the sensor without lag."""
+    pairs = []
+    for recording in runs.evidence:
+        run = processed(recording, [estimator.target])
+        closing = is_closing(run)
+        pairs.append(
+            (estimator.predict(recording, causal)[closing], run[estimator.target][closing])
+        )
+    return pairs
 
 
 def _rms(values: FloatArray) -> float:

@@ -36,7 +36,7 @@ from estimation.filters import (
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
-from estimation.window import lowest, since_lowest
+from estimation.window import ALIKE, lowest, since_lowest
 
 GEAR_RATIO = 35.0
 """Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
@@ -195,12 +195,12 @@ def _derive(
             channels[name] = since_lowest(filtered[_turning(name)], window)
         elif name.endswith(TURNED):
             angle = filtered[_turning(name)]
-            channels[name] = (np.arange(len(angle)) - lowest(angle, window)) / sample_rate_hz
+            channels[name] = (np.arange(len(angle)) - lowest(angle, window, ALIKE)) / sample_rate_hz
         elif FALL in name:
             channels[name] = since_lowest(-filtered[_plain(name)], window)
         elif RISE in name:
             channel = filtered[_plain(name)]
-            channels[name] = channel - channel[lowest(filtered[TURNING], window)]
+            channels[name] = channel - channel[lowest(filtered[TURNING], window, ALIKE)]
         elif (ago := AGO.match(name)) is not None:
             channels[name] = _delayed(differentiated(_now(name)), ago["ms"], sample_rate_hz)
         elif name == MOTOR_LOAD:

@@ -38,6 +38,10 @@ class Settings:
 CHOICES = tuple(Settings(ridge, share) for share in (0.8, 0.5, 0.0) for ridge in (1e-4, 1e-5))
 """Settings that `chosen` chooses from, those that trust the runs' means least first."""
 
+HARDLY = 1e-4
+"""Spread of a column, relative to its size, below which it gets no weight: what little it varies
+would be blown up to the size of the others, and no number is left for them."""
+
 BETWEEN_RIDGE = 1e-2
 """Penalty of the weights that the runs' means are fitted with; runs are fewer than samples."""
 
@@ -156,11 +160,12 @@ class Pool:
     def spread(self) -> FloatArray:
         """Standard deviation of each column over all samples, shape (p,).
 
-        It is infinite where a column does not vary, and 1 for the first column, the constant.
+        It is infinite where a column hardly varies, and 1 for the first column, the constant.
         """
         mean = self.total / self.count
         variance = np.diag(self.gram) / self.count - mean**2
-        found = np.sqrt(np.where(variance > 1e-12 * np.maximum(mean**2, 1.0), variance, np.inf))
+        least = HARDLY**2 * np.maximum(mean**2, 1.0)
+        found = np.sqrt(np.where(variance > least, variance, np.inf))
         found[0] = 1.0
         return np.asarray(found)
 
@@ -168,7 +173,7 @@ class Pool:
 def solve(pool: Pool, shape: Shape, settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
 
-    A column that does not vary gets no weight.
+    A column that hardly varies gets no weight.
 
     Args:
         pool: The runs to fit.

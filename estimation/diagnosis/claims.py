@@ -6,9 +6,10 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.endogeneity import own_share
 from estimation.diagnosis.frozen import Part
 from estimation.diagnosis.gates import Gates
-from estimation.diagnosis.maps import Map, variables_of, within
+from estimation.diagnosis.maps import Map
 from estimation.diagnosis.naming import Discovery
 from estimation.diagnosis.story import Claim
+from estimation.diagnosis.variables import variables_of, within
 
 
 def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:

@@ -23,7 +23,6 @@ from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments, stand_in
 from estimation.diagnosis.instruments import projection as instrumented
 from estimation.diagnosis.limits import limits
-from estimation.diagnosis.maps import needed_channels, projection
 from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
@@ -31,6 +30,7 @@ from estimation.diagnosis.shared_sensors import Fault, denied
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import Bootstrap, Twin
+from estimation.diagnosis.variables import needed_channels, projection
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Model
@@ -179,7 +179,7 @@ def _balance(
     discovery = searched(Search(seen, tried, gates, sealed.seed, twin))
     claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME)
     if not gates.akin:  # else every parameter counts
-        claims = formed(claims, balance, gates, sealed.seed)
+        claims = formed(claims, balance, tried, gates, sealed.seed)
     beside = [term for c in claims for term in c.part.terms]
     claims = [
         c

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.maps import ORDERS, PLAYS, PROJECTED, Basis
+from estimation.diagnosis.variables import ORDERS, PLAYS, PROJECTED, Basis
 from estimation.effects.roles import CHANNELS as PLAYED_BY
 from estimation.effects.unknown_product import product, product_id
 from estimation.recording import FloatArray

@@ -39,6 +39,7 @@ class Gates:
         in_motion: What removes less than this share of the squared error in motion on the confirm
             runs must not add to that over all samples. At rest friction holds any torque, and what
             is clear in motion may be wrong there.
+        mapped: A map must help in more than this share of the confirm runs.
         at_rest: A map that adds more than this share to the squared error over all samples is
             refused.
         parameters: Named parameters of the whole model at most, or None for no limit.
@@ -66,6 +67,7 @@ class Gates:
     told: float = 0.01
     leftover: float = 0.15
     in_motion: float = 0.1
+    mapped: float = 2 / 3
     at_rest: float = 0.5
     parameters: int | None = None
     akin: bool = False

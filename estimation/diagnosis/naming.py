@@ -7,9 +7,10 @@ import numpy as np
 
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.evidence import Losses, resampled, runs_agree
-from estimation.diagnosis.maps import Map, best_map, variables_of, within
+from estimation.diagnosis.maps import Map, best_map
 from estimation.diagnosis.rivals import Tried, beaten, better, rivals_of, tried
 from estimation.diagnosis.search import Search, Trial
+from estimation.diagnosis.variables import variables_of, within
 from estimation.recording import FloatArray
 
 

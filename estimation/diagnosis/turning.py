@@ -1,8 +1,9 @@
-"""How fast friction turns round at a reversal, told by the samples at rest too.
+"""Shapes that samples in motion hardly tell, told by the samples at rest too.
 
 Names, amplitudes and decisions come from samples in motion, since at rest friction holds any
-torque. How wide its smooth sign is hardly shows there, and the errors that are reported count all
-samples. So among the widths that are as good in motion the one is taken that is best over all.
+torque. How wide its smooth sign is hardly shows there, nor where a bend begins at small loads, and
+the errors that are reported count all samples. So among the shapes that are as good in motion those
+are taken that are best over all.
 """
 
 from collections.abc import Sequence
@@ -17,14 +18,14 @@ from estimation.diagnosis.design import Run
 from estimation.recording import FloatArray
 
 FREE = 1.01
-"""A width is as good in motion when it leaves at most so many times the least squared error."""
+"""A shape is as good in motion when it leaves at most so many times the least squared error."""
 
 REACH = 3.0
-"""How far a width may move, in steps of its grid."""
+"""How far a shape may move, in steps of its grid."""
 
 
 def turned(balance: Balance, terms: Sequence[Candidate]) -> list[Candidate]:
-    """Return the effects with each smooth sign as wide as all samples tell.
+    """Return the effects with each shape as all samples tell it, but of those with memory.
 
     Args:
         balance: The balance on the runs that discover.
@@ -38,21 +39,21 @@ def turned(balance: Balance, terms: Sequence[Candidate]) -> list[Candidate]:
     most = FREE * balance.loss(best)
     for i, term in enumerate(terms):
         for k in range(len(term.shape)):
-            if term.effect.shape[k].name == "width" and "speed" in dict(term.channels):
-                best[i] = _widened(balance, best, (i, k), (blocks, aims), most)
+            if not term.effect.start():
+                best[i] = _settled(balance, best, (i, k), (blocks, aims), most)
                 for run, block in zip(balance.runs, blocks, strict=True):
                     block[i] = best[i].columns(run.channels)[_places(run)]
     return best
 
 
-def _widened(
+def _settled(
     balance: Balance,
     terms: list[Candidate],
     place: tuple[int, int],
     seen: tuple[list[list[FloatArray]], list[FloatArray]],
     most: float,
 ) -> Candidate:
-    """Return one effect at its best width over all samples."""
+    """Return one effect at its best value of one shape over all samples."""
     i, k = place
     blocks, aims = seen
 
@@ -77,7 +78,7 @@ def _widened(
 
 
 PENALTY, FAR = 100, 1e3
-"""Power that makes a width which costs anything in motion lose; beyond `FAR` all are as bad."""
+"""Power that makes a shape which costs anything in motion lose; beyond `FAR` all are as bad."""
 
 
 def _places(run: Run) -> NDArray[np.intp]:

@@ -31,6 +31,7 @@ from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
+from estimation.window import ALIKE
 
 TURNING_TRAVEL, TURNING_TURNED = (
     TURNING.replace("_angle_rad", suffix) for suffix in (TRAVEL, TURNED)
@@ -79,6 +80,7 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         "SECTIONS": _double_rows(np.delete(sections, 3, axis=1)),
         "WINDOWS": str(max(len(windows), 1)),
         "WINDOW": str(max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))),
+        "ALIKE": f"{ALIKE!r}",
         "PASTS": str(max(len(pasts), 1)),
         "KEEP": _keep(pasts, measured),
         "FILL": "\n".join(

@@ -44,7 +44,8 @@ static inline void name_start(name_state *s) { s->tick = 0; }
 
 static inline double name_travel(name_queue *q, uint32_t tick, double value) {
     if (tick == 0) q->first = q->count = 0;
-    while (q->count && q->value[(q->first + q->count - 1) % NAME_WINDOW] >= value) q->count--;
+    while (q->count && q->value[(q->first + q->count - 1) % NAME_WINDOW] >= value - @ALIKE@)
+        q->count--;
     if (q->count && tick - q->tick[q->first] >= NAME_WINDOW) {
         q->first = (q->first + 1) % NAME_WINDOW;
         q->count--;

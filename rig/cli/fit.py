@@ -29,6 +29,7 @@ def fit_states(
 ) -> None:
     """Fit products of physical states, and report the error on runs left out."""
     from estimation.bank.states import LOAD_SCALES, Bank
+    from estimation.channels import unit_of
     from estimation.estimators.bank import BankRecipe, held_out_score
     from rig.errors import UsageError
 
@@ -45,7 +46,7 @@ def fit_states(
     if error is not None:
         screen.print(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
-            f" rmse {error.rmse:.4g}."
+            f" rmse {error.rmse:.4g} {unit_of(target)}."
         )
     if out is not None:
         estimator.save(out)
@@ -55,22 +56,44 @@ def fit_states(
 
 
 def fit_network(
-    campaign: "Campaign", target: str, surrogate: str, seed: int, out: Path | None, json_: bool
+    campaign: "Campaign",
+    target: str,
+    surrogate: str,
+    folds: int,
+    seed: int,
+    out: Path | None,
+    json_: bool,
 ) -> None:
-    """Train a network with physical states as inputs."""
+    """Train a network with physical states as inputs, and report the error on runs left out."""
+    from estimation.channels import unit_of
+    from estimation.cross_validation import closing_score
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
 
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
-    estimator = recipe.fit(campaign)
+    kept = campaign.evidence
+    folds = min(folds, len(kept))
+    error = None
+    with progress() as bar:
+        task = bar.add_task("networks", total=1 + folds)
+        estimator = recipe.fit(campaign)
+        bar.advance(task)
+        if len(kept) > 1:
+            error = closing_score(recipe, kept, folds, seed, lambda: bar.advance(task))
     screen = results(json_)
     screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
+    if error is not None:
+        screen.print(
+            f"{target}, closing samples of {len(kept)} runs, each held out once:"
+            f" rmse {error.rmse:.4g} {unit_of(target)}."
+        )
     if out is not None:
         estimator.save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_:
-        emit_json({"target": target, "inputs": inputs, "nodes": STATE_NODES, "out": out})
+        told = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
+        emit_json(told | {"held_out": error, "out": out})
 
 
 def fit(
@@ -121,7 +144,7 @@ def fit(
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
         return
     if model == "network":
-        fit_network(campaign, target, surrogate, seed, out, json_)
+        fit_network(campaign, target, surrogate, folds, seed, out, json_)
         return
     models = models_in_use(Path(model))
     folds = min(folds, len(campaign.evidence))

@@ -64,7 +64,11 @@ def oneill(
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Make the results of O'Neill et al. 2018 again: Table I's linear rows, and its networks."""
+    """Make Tables I to V of O'Neill et al. 2018 again, and estimates that are better.
+
+    Alone it fits Table I's straight lines, in seconds. --networks trains the paper's networks, and
+    is long: it can be interrupted, and goes on where it was. --states and --kinds take minutes.
+    """
     from rig.reports import oneill as shown
     from rig.reports.render import write_report
     from rig.studies.oneill import open_reference, run_study
@@ -85,7 +89,7 @@ def oneill(
     every_kind = _fit_kinds(source, result.study.left_out, seed) if kinds else ()
     more = shown.More(deep, physical, every_kind)
     lines = [
-        shown.lead(result.study),
+        *shown.lead(result.study, more),
         f"Data: {source.name}.",
         *shown.all_notes(result.study, more),
     ]

@@ -8,11 +8,11 @@ from typing import Any
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import DesignError, Run, prepare, targets
 from estimation.diagnosis.instruments import projection as instrumented
-from estimation.diagnosis.maps import PROJECTED, projection
 from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import coarse
+from estimation.diagnosis.variables import PROJECTED, projection
 from estimation.files import write_text_atomic
 from estimation.recording import Recording
 from rig.config import load_config

@@ -1,7 +1,7 @@
 """What the display consumes: a block of samples and what was known when it arrived."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -62,6 +62,8 @@ class SampleBlock:
         lost: Samples lost since the start.
         devices: State of each device.
         limits: Watched limits; may be empty.
+        inside: Channel name to whether its estimate is within what its estimator was fitted on,
+            shape (n,) each; a channel whose estimator says nothing of that is not in it.
     """
 
     time_s: FloatArray
@@ -71,6 +73,7 @@ class SampleBlock:
     lost: int
     devices: tuple[DeviceStatus, ...]
     limits: tuple[LimitStatus, ...] = ()
+    inside: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check that the parts have one length and time increases.
@@ -78,8 +81,10 @@ class SampleBlock:
         Raises:
             BlockError: They do not.
         """
-        parts: dict[str, NDArray[Any]] = {"flags": self.flags, **self.columns, **self.estimates}
-        for name, values in parts.items():
+        parts: list[tuple[str, NDArray[Any]]] = [("flags", self.flags)]
+        for named in (self.columns, self.estimates, self.inside):
+            parts += named.items()
+        for name, values in parts:
             if values.shape != self.time_s.shape:
                 raise BlockError(
                     f"{name} of a block has shape {values.shape}, its time {self.time_s.shape}."

@@ -3,6 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from estimation import model_file
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator, BankStepper
@@ -51,15 +54,20 @@ class ModelEstimator:
         self.half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
 
     @property
-    def outside(self) -> bool:
-        """Whether most of the last samples lay outside the range that the estimator was fitted on.
+    def inside(self) -> NDArray[np.bool_] | None:
+        """Which of the last samples lay in the range that the estimator was fitted on, shape (n,).
 
-        A physical model says nothing of it sample by sample.
+        None for a physical model, which says nothing of it sample by sample.
         """
-        if not isinstance(self._stream, BankStepper | NetworkStepper):
-            return False
-        inside = self._stream.inside
-        return inside.size > 0 and not inside.mean() > 0.5
+        if isinstance(self._stream, BankStepper | NetworkStepper):
+            return self._stream.inside
+        return None
+
+    @property
+    def outside(self) -> bool:
+        """Whether most of the last samples lay outside that range."""
+        inside = self.inside
+        return inside is not None and inside.size > 0 and not inside.mean() > 0.5
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,).

@@ -74,7 +74,9 @@ def with_model_status(
     try:
         for block in blocks:
             outside = [e.target_channel for e in estimators if e.outside]
-            yield replace(block, devices=(*block.devices, status.of(block.estimates, outside)))
+            told = status.of(block.estimates, outside)
+            inside = {e.target_channel: e.inside for e in estimators if e.inside is not None}
+            yield replace(block, devices=(*block.devices, told), inside=inside if block else {})
     finally:
         close = getattr(blocks, "close", None)
         if close is not None:

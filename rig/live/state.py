@@ -107,6 +107,8 @@ class Summary:
         channel: The main quantity.
         error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
         error_samples: Samples in that number: those not flagged and with both values.
+        inside_rms: The same where the estimator says it is within what it was fitted on, or None.
+        inside_samples: Samples in that number.
     """
 
     ended: str
@@ -117,6 +119,8 @@ class Summary:
     channel: str
     error_rms: float | None
     error_samples: int
+    inside_rms: float | None = None
+    inside_samples: int = 0
 
 
 class LiveState:
@@ -140,6 +144,8 @@ class LiveState:
         self._flagged = np.zeros(len(FLAGS), np.int64)
         self._squared_error = 0.0
         self._error_samples = 0
+        self._inside_squared = 0.0
+        self._inside_samples = 0
 
     @property
     def time_s(self) -> float | None:
@@ -166,6 +172,10 @@ class LiveState:
         squared = signals[FIRST_CHANNEL + SQUARED_ERROR]
         self._squared_error += float(np.nansum(squared))
         self._error_samples += int(np.isfinite(squared).sum())
+        inside = block.inside.get(self.channels[0])
+        if inside is not None:
+            self._inside_squared += float(np.nansum(squared[inside]))
+            self._inside_samples += int(np.isfinite(squared[inside]).sum())
 
     def _signals(self, block: SampleBlock) -> FloatArray:
         """Return what the window keeps of a block, shape (signals, n), NaN where nothing is."""
@@ -196,7 +206,7 @@ class LiveState:
 
     def summary(self, ended: str) -> Summary:
         """Return what everything since the start came to; `ended` says how it ended."""
-        n = self._error_samples
+        n, known = self._error_samples, self._inside_samples
         return Summary(
             ended=ended,
             duration_s=self._duration_s,
@@ -206,6 +216,8 @@ class LiveState:
             channel=self.channels[0],
             error_rms=math.sqrt(self._squared_error / n) if n else None,
             error_samples=n,
+            inside_rms=math.sqrt(self._inside_squared / known) if known else None,
+            inside_samples=known,
         )
 
     def _sample_rate_hz(self) -> float | None:

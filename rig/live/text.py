@@ -146,4 +146,9 @@ def summary_lines(summary: Summary, unit: str) -> list[str]:
             f"{name_of(summary.channel)}, estimate against sensor: rms error "
             f"{with_unit(Value(summary.error_rms), unit)} over {summary.error_samples} samples."
         )
+    if summary.inside_rms is not None and summary.inside_samples < summary.error_samples:
+        lines.append(
+            f"Within what it was fitted on: {with_unit(Value(summary.inside_rms), unit)} over "
+            f"{summary.inside_samples} of these samples."
+        )
     return lines

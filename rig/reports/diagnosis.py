@@ -9,9 +9,9 @@ from markupsafe import Markup
 from estimation.channels import unit_of
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.frozen import Frozen
-from estimation.diagnosis.maps import channels_of
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.story import Story
+from estimation.diagnosis.variables import channels_of
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
 from rig.reports import figures

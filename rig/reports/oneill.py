@@ -7,19 +7,19 @@ import numpy as np
 from markupsafe import Markup
 
 from estimation import oneill
-from estimation.scores import Score
 from rig.reports import figures
+from rig.reports import oneill_goals as goals
 from rig.reports import oneill_networks as networks
 from rig.reports import oneill_states as states
+from rig.reports import oneill_tables as paper
 from rig.reports.render import render
 from rig.reports.table import TextTable, to_markdown
-from rig.studies.oneill import PROTOCOLS, PaperRow, Result, Study
+from rig.studies.oneill import PROTOCOLS, Result, Study
 from rig.studies.oneill_kinds import FILTERS, KindRow
 from rig.studies.oneill_networks import NetworkStudy
 from rig.studies.oneill_states import StateStudy
 
-TITLE = "Linear torque surrogates: Table I of O'Neill et al. 2018, made again"
-
+TITLE = "Grip torque and jaw angle from motor current: O'Neill et al. 2018, made again"
 
 HEADINGS = {
     "random": "samples at random",
@@ -34,15 +34,18 @@ def _mn_m(torque_n_m: float) -> str:
     return f"{1e3 * torque_n_m:.2f}"
 
 
-def lead(study: Study) -> str:
-    """Return the study's result in one sentence or two."""
+def lead(study: Study, more: "More | None" = None) -> list[str]:
+    """Return the study's result, a paragraph each: of all that was estimated, the best."""
+    if more is not None and (found := list(goals.lead(more.reached))):
+        return found
     kept = {row.surrogate: row for row in study.rows if row.protocol == "run-wise"}
     best = min(kept.values(), key=lambda row: row.score.rmse)
-    return (
+    return [
         f"A straight line through the {best.surrogate} estimates the proximal torque to"
         f" {_mn_m(best.score.rmse)} mN m on whole runs it has not seen (RMSE over"
-        f" {best.score.samples:,} closing samples of {best.runs} runs)."
-    )
+        f" {best.score.samples:,} closing samples of {best.runs} runs). Better estimators:"
+        " --states; the paper's networks, Tables I to V: --networks."
+    ]
 
 
 def notes(study: Study) -> list[str]:
@@ -63,34 +66,6 @@ def notes(study: Study) -> list[str]:
     return [counts, *left_out, *study.notes]
 
 
-def tables(study: Study) -> list[TextTable]:
-    """Return the study's tables."""
-    return [_table_i(study), _held_out_table(study)]
-
-
-def _table_i(study: Study) -> TextTable:
-    """Return our linear rows beside the paper's and beside others' reproduction."""
-    rows = []
-    for name in dict.fromkeys(row.surrogate for row in study.rows):
-        for row in study.rows:
-            if row.surrogate == name and row.protocol in ("authors", "random"):
-                cells = [*_errors(row.score), f"{row.score.samples:,}"]
-                rows.append([f"{name}, {row.protocol}", *cells])
-        rows.append([f"{name}, paper", *_errors(study.paper[name]), ""])
-        rows.append([f"{name}, others", "", "", _mn_m(study.others_reach_n_m[name]), "", "", ""])
-    columns = ["linear fit, mN m", "MAE", "95th pct", "RMSE", "R", "rho", "samples"]
-    note = "; ".join(f"{name}: {PROTOCOLS[name]}" for name in ("authors", "random"))
-    note += "; paper: Table I as printed; others: the authors' way on the public data, published."
-    if not study.measured:
-        note += " The paper's rows are of its own instrument, not of this data."
-    return TextTable("Proximal torque, linear rows of Table I", columns, rows, note)
-
-
-def _errors(row: Score | PaperRow) -> list[str]:
-    cells = [_mn_m(row.mae), _mn_m(row.p95), _mn_m(row.rmse)]
-    return [*cells, f"{row.pearson_r:.2f}", f"{row.spearman_rho:.2f}"]
-
-
 def _held_out_table(study: Study) -> TextTable:
     """Return the errors on runs, frequencies and power levels that were not fitted."""
     found: dict[str, dict[str, float]] = {}
@@ -103,7 +78,9 @@ def _held_out_table(study: Study) -> TextTable:
     ]
     note = "; ".join(f"{HEADINGS[name]}: {PROTOCOLS[name]}" for name in protocols) + "."
     columns = ["surrogate", *(HEADINGS[name] for name in protocols)]
-    return TextTable("RMSE by what was held out, mN m", columns, rows, note)
+    return TextTable(
+        "Straight lines, proximal torque, mN m: RMSE by what was held out", columns, rows, note
+    )
 
 
 @dataclass(frozen=True)
@@ -121,20 +98,19 @@ class More:
     kinds: tuple[KindRow, ...] = ()
 
     @property
+    def reached(self) -> list[goals.Reached]:
+        """What the best estimator reaches."""
+        return goals.reached(self.states, self.networks) if self.states is not None else []
+
+    @property
     def notes(self) -> list[str]:
         """Notes of both."""
         deep = networks.notes(self.networks) if self.networks is not None else []
         return [*deep, *(states.notes(self.states) if self.states is not None else [])]
 
-    @property
-    def tables(self) -> list[TextTable]:
-        """Tables of both."""
-        own = states.tables(self.states, self.networks) if self.states is not None else []
-        deep = networks.tables(self.networks) if self.networks is not None else []
-        return [*([_kinds_table(self.kinds)] if self.kinds else []), *own, *deep]
 
-
-def _kinds_table(kinds: tuple[KindRow, ...]) -> TextTable:
+def kinds_table(kinds: tuple[KindRow, ...]) -> TextTable:
+    """Return the errors of every kind of estimator."""
     found: dict[str, list[str]] = {}
     for row in kinds:
         found.setdefault(row.kind, [row.kind]).append(_mn_m(row.score.rmse))
@@ -157,9 +133,13 @@ def markdown(study: Study, more: More = NOTHING_MORE, drawn: Sequence[tuple[str,
         more: What goes beyond.
         drawn: Caption and place of each figure, relative to the page.
     """
-    parts = [f"# {TITLE}", lead(study), f"Data: {study.source}.", *all_notes(study, more)]
+    first, *others = all_tables(study, more)
+    known = [f"Data: {study.source}.", *all_notes(study, more)]
+    parts = [f"# {TITLE}", *lead(study, more), to_markdown(first).rstrip()]
+    parts += ["## Before comparing", "\n".join(f"- {note}" for note in known)]
+    parts += ["## Figures"] if drawn else []
     parts += [f"![{caption}]({place})\n\n{caption}" for caption, place in drawn]
-    parts += [to_markdown(table).rstrip() for table in all_tables(study, more)]
+    parts += [to_markdown(table).rstrip() for table in others]
     return "\n\n".join([*parts, study.provenance.line()]) + "\n"
 
 
@@ -169,8 +149,15 @@ def all_notes(study: Study, more: More) -> list[str]:
 
 
 def all_tables(study: Study, more: More) -> list[TextTable]:
-    """Return the tables of the study and of what goes beyond."""
-    return tables(study) + more.tables
+    """Return the tables: what is reached, the paper's, then all by what was held out."""
+    return [
+        *([goals.table(more.reached)] if more.reached else []),
+        *paper.tables(study, more.networks),
+        _held_out_table(study),
+        *(networks.tables(more.networks) if more.networks is not None else []),
+        *([kinds_table(more.kinds)] if more.kinds else []),
+        *(states.tables(more.states) if more.states is not None else []),
+    ]
 
 
 def page(result: Result, more: More = NOTHING_MORE) -> str:
@@ -180,7 +167,7 @@ def page(result: Result, more: More = NOTHING_MORE) -> str:
         "study.html",
         {
             "title": TITLE,
-            "lead": lead(study),
+            "lead": " ".join(lead(study, more)),
             "source": study.source,
             "notes": all_notes(study, more),
             "tables": all_tables(study, more),

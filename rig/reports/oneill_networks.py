@@ -1,4 +1,4 @@
-"""The network rows of O'Neill et al. 2018 as tables beside the paper's, and what goes beyond."""
+"""Networks on the data of O'Neill et al. 2018, by what was held out."""
 
 from collections import Counter
 
@@ -10,7 +10,6 @@ from rig.studies.oneill_paper import (
     DISTAL,
     GRIP_ARM_M,
     JAW,
-    PAPER,
     PAPER_GRIP_N,
     PAPER_GRIP_SHARE,
     PROXIMAL,
@@ -61,28 +60,9 @@ def notes(study: NetworkStudy) -> list[str]:
 
 
 def tables(study: NetworkStudy) -> list[TextTable]:
-    """Return the rows beside the paper's, and the errors by what was held out."""
-    poses = [pose for pose in study.samples if any(row.pose == pose for row in study.rows)]
-    shown = [_paper_table(study, pose, target) for pose in poses for target in SHOWN]
-    shown += [_held_out_table(study, pose) for pose in poses]
+    """Return the errors by what was held out, a table for each pose."""
+    shown = [_held_out_table(study, pose) for pose in study.samples]
     return [table for table in shown if table.rows]
-
-
-def _paper_table(study: NetworkStudy, pose: str, target: str) -> TextTable:
-    name, unit, scale = SHOWN[target]
-    rows = []
-    for row in study.rows:
-        if (row.pose, row.target, row.protocol) == (pose, target, "random"):
-            score = row.score
-            errors = [f"{scale * value:.2f}" for value in (score.mae, score.p95, score.rmse)]
-            fits = [f"{score.pearson_r:.3f}", f"{score.spearman_rho:.3f}"]
-            printed = PAPER.get((pose, row.way, target, row.surrogate))
-            paper = [f"{value:.2f}" for value in printed] if printed else ["", "", ""]
-            rows.append([f"{row.surrogate}, {row.way}", *errors, *fits, *paper])
-    columns = [f"{name}, {unit}", "MAE", "95th pct", "RMSE", "R", "rho"]
-    columns += ["paper MAE", "95th pct", "RMSE"]
-    note = "Random split of the samples, as the paper's; neighbours of a test sample are trained on"
-    return TextTable(f"Networks, {pose} pose: {name}", columns, rows, note + ".")
 
 
 def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:

@@ -1,32 +1,22 @@
 """Estimates from physical states as tables: errors by what was held out, intervals, ablation."""
 
+from collections.abc import Sequence
+
 from estimation.bank.fitting import CHOICES
 from estimation.bank.states import EFFECTS
 from estimation.derived import TRAVEL_WINDOW_S
 from rig.reports.oneill_networks import SHOWN
 from rig.reports.table import TextTable
-from rig.studies.oneill_networks import NetworkStudy
-from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
-from rig.studies.oneill_states import FOLDS, StateJob, StateRow, StateStudy, ablated
+from rig.studies.oneill_paper import JAW
+from rig.studies.oneill_state_rows import Level, StateRow, ablated
+from rig.studies.oneill_states import FOLDS, StateStudy
 
 PROTOCOLS = ("run-wise", "lofo", "lopo")
-
-GOALS = {
-    ("neutral", PROXIMAL): 3.0,
-    ("neutral", DISTAL): 2.75,
-    ("neutral", JAW): 0.29,
-    ("pitch", DISTAL): 3.5,
-    ("pitch", JAW): 0.45,
-    ("roll", DISTAL): 5.5,
-    ("roll", JAW): 0.7,
-}
-"""Run-wise error aimed at, in the unit shown."""
 
 
 def notes(study: StateStudy) -> list[str]:
     """Return what a reader must know about the rows."""
     return [
-        *_lead(study),
         f"Physical states: {study.weights} weights of products of states and of a ripple in the"
         f" spindle's angle, linear, by ridge regression; penalty and share of the runs' means that"
         f" is left out are chosen in every fit, out of {len(CHOICES)}, by runs left out of it in"
@@ -41,31 +31,10 @@ def notes(study: StateStudy) -> list[str]:
     ]
 
 
-def _lead(study: StateStudy) -> list[str]:
-    """Return the run-wise errors from the command in a sentence, where they were measured."""
-    rows = {row.job: row for row in study.rows}
-    told = []
-    for filters in ("zero-phase", "live"):
-        own = [rows.get(StateJob("neutral", "command", target, filters)) for target in SHOWN]
-        if all(own):
-            errors = [
-                f"{name} {_scaled(row)} {unit}"
-                for row, (name, unit, _) in zip(own, SHOWN.values(), strict=True)
-            ]
-            told.append(f"{filters}: {', '.join(errors)}")
-    if not told:
-        return []
-    return [f"From the command by physical states, on whole runs not seen, {'; '.join(told)}."]
-
-
-def tables(study: StateStudy, deep: NetworkStudy | None) -> list[TextTable]:
-    """Return the tables.
-
-    Args:
-        study: The results.
-        deep: Results of the networks, for the paper's network beside.
-    """
-    return [_errors(study, deep), _intervals(study), _ablation(study)]
+def tables(study: StateStudy) -> list[TextTable]:
+    """Return the tables."""
+    found = [_errors(study), _levels(study), _intervals(study), _ablation(study)]
+    return [table for table in found if table.rows]
 
 
 def _name(row: StateRow) -> str:
@@ -88,7 +57,7 @@ def _worse(row: StateRow | None, first: StateRow) -> str:
     return f"{_scaled(row)} ({100 * (row.score.rmse / first.score.rmse - 1):+.0f} %)"
 
 
-def _errors(study: StateStudy, deep: NetworkStudy | None) -> TextTable:
+def _errors(study: StateStudy) -> TextTable:
     found: dict[str, dict[str, StateRow]] = {}
     for row in study.rows:
         if not row.job.without:
@@ -96,44 +65,71 @@ def _errors(study: StateStudy, deep: NetworkStudy | None) -> TextTable:
     cells = []
     for name, by in found.items():
         first = by["run-wise"]
-        goal = GOALS.get((first.job.pose, first.job.target))
-        cells.append([
-            name, _paper_network(first, deep), _scaled(first),
-            *(_worse(by.get(p), first) for p in PROTOCOLS[1:]),
-            "" if goal is None else f"{goal:g}", _scaled(first, "run_offset"),
-        ])  # fmt: skip
-    columns = ["RMSE", "paper's network, runs", "runs", "a frequency (LOFO)"]
-    columns += ["a power level (LOPO)", "goal, runs", "of it the runs' offsets"]
+        unseen = [_worse(by.get(p), first) for p in PROTOCOLS[1:]]
+        cells.append([name, _scaled(first), *unseen, _scaled(first, "run_offset")])
+    columns = ["RMSE", "runs", "a frequency (LOFO)", "a power level (LOPO)"]
+    columns += ["runs' offsets"]
     note = (
-        f"Runs: {FOLDS} folds of whole runs, the same ones for the paper's network (30 nodes,"
-        " trained without lag). The runs' offsets: root mean square of each held-out run's mean"
-        " error; an estimate that forgets after half a second cannot know them."
+        f"Runs: {FOLDS} folds of whole runs, as of the networks. The runs' offsets: root mean"
+        " square of each held-out run's mean error; an estimate that forgets after half a second"
+        " cannot know them."
     )
     return TextTable("Physical states: RMSE by what was held out", columns, cells, note)
 
 
-def _paper_network(row: StateRow, deep: NetworkStudy | None) -> str:
-    job = row.job
-    for other in deep.rows if deep is not None else ():
-        own = (other.pose, other.surrogate, other.target, other.way, other.protocol)
-        if own == (job.pose, job.surrogate, job.target, "end-to-end", "run-wise"):
-            return f"{SHOWN[job.target][2] * other.score.rmse:.2f}"
-    return ""
+def _levels(study: StateStudy) -> TextTable:
+    """Return errors at the ends of the levels, where a fit reaches beyond them, and between."""
+    cells = []
+    for row in study.rows:
+        if row.levels and row.job.filters == "live":
+            parts = (row.levels[:1], row.levels[1:-1], row.levels[-1:])
+            cells.append([
+                f"{_name(row)}, {row.job.protocol}",
+                *(cell for part in parts for cell in _level_cells(row, part)),
+            ])  # fmt: skip
+    columns = ["left out", "the lowest", "covers", "one between", "covers", "the highest", "covers"]
+    note = (
+        "RMSE of the frequency (lofo) or power level (lopo) left out, and what its interval of 95 %"
+        " covers: beyond the levels that were fitted on, and between them. An interval is"
+        " made of how runs that were fitted differ; runs beyond all of them are no such runs."
+    )
+    return TextTable("Physical states, live: between levels and beyond them", columns, cells, note)
+
+
+def _level_cells(row: StateRow, levels: Sequence[Level]) -> list[str]:
+    samples = sum(level.samples for level in levels)
+    if not samples:
+        return ["", ""]
+    square = sum(level.samples * level.rmse**2 for level in levels) / samples
+    covered = sum(level.samples * level.covered for level in levels) / samples
+    scale, digits = SHOWN[row.job.target][2], 3 if row.job.target == JAW else 2
+    return [f"{scale * square**0.5:.{digits}f}", f"{covered:.0%}"]
 
 
 def _intervals(study: StateStudy) -> TextTable:
     cells = [
         [
             f"{_name(row)}, {row.job.protocol}",
-            *(f"{v:.1%}" for v in (row.covered, row.covered_median, row.covered_worst, row.inside)),
+            f"{row.covered:.1%}",
+            " to ".join(f"{share:.0%}" for share in row.covered_between),
+            *(f"{v:.1%}" for v in (row.covered_median, row.covered_worst, row.inside)),
             _scaled(row, "rmse_inside"),
         ]
         for row in study.rows
         if not row.job.without
     ]
-    columns = ["interval of 95 %", "covers", "median run", "worst run", "valid", "RMSE where valid"]
+    columns = [
+        "interval of 95 %",
+        "covers",
+        "by chance",
+        "median run",
+        "worst run",
+        "valid",
+        "RMSE where valid",
+    ]
     note = (
-        "Covers: share of the samples of held-out runs inside their interval. Valid: share inside"
+        "Covers: share of the samples of held-out runs inside their interval; by chance: what 95 %"
+        " of campaigns drawn from these runs would cover. Valid: share inside"
         " the range of position, load, speed and acceleration that was fitted."
     )
     return TextTable(

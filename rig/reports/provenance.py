@@ -33,6 +33,8 @@ class Provenance:
     def now(cls, seed: int) -> "Provenance":
         """Return the provenance of what this process makes now."""
         words = [Path(word).name if "/" in word else word for word in sys.argv]
+        if words and words[0] == "__main__.py":
+            words[0] = f"python -m {Path(sys.argv[0]).parent.name}"
         return cls(
             date=datetime.now(UTC).strftime("%Y-%m-%dT%H:%MZ"),
             commit=commit(Path(rig.__file__).parents[1]),

@@ -14,6 +14,7 @@ import numpy as np
 from estimation import model_file, oneill
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.cross_validation import closing_pairs
 from estimation.estimator import Estimator, Recipe, load
 from estimation.estimators.bank import BankRecipe
 from estimation.estimators.model import ModelEstimator, ModelRecipe
@@ -95,7 +96,7 @@ def run_kinds(
             estimator = _kept(recipe.fit(fold.train))
             for filters in FILTERS:
                 pairs = found.setdefault((kind, filters), [])
-                pairs += _estimates(estimator, fold.test, filters == "live")
+                pairs += closing_pairs(estimator, fold.test, filters == "live")
             on_fit(count * len(wanted) + place + 1, len(folds) * len(wanted))
     return tuple(
         KindRow(
@@ -115,15 +116,3 @@ def _kept(estimator: Estimator) -> Estimator:
             path = path.with_suffix(".toml")
         estimator.save(path)
         return load(path)
-
-
-def _estimates(
-    estimator: Estimator, runs: Campaign, causal: bool
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Return estimate and sensor at the closing samples of each run, the sensor without lag."""
-    pairs = []
-    for recording in runs.evidence:
-        run = oneill.processed(recording, [TARGET])
-        closing = oneill.is_closing(run)
-        pairs.append((estimator.predict(recording, causal)[closing], run[TARGET][closing]))
-    return pairs

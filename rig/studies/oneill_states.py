@@ -5,7 +5,7 @@ five folds are those of the network rows, so that both stand side by side.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -24,76 +24,23 @@ from estimation.estimators.bank import (
     rows_of,
 )
 from estimation.recording import FloatArray, Recording
-from estimation.scores import Score, score
 from rig.studies.oneill_data import pose_runs
 from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
 from rig.studies.oneill_shown import Closing, Shown, shown
+from rig.studies.oneill_state_rows import (
+    CONDITIONS,
+    LOADS,
+    POSES,
+    StateJob,
+    StateRow,
+    scored,
+)
 
 FOLDS = 5
-POSES = {"neutral": "", "pitch": "wrist_pitch_rad", "roll": "wrist_roll_rad"}
-LOADS = {
-    "command": "motor_command_ratio",
-    "current": "motor_current_a",
-    "sensor": PROXIMAL,
-}
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
 DRAWN = (Bank(LOADS["command"]), "live")
 """What the figures show."""
-
-
-@dataclass(frozen=True)
-class StateJob:
-    """One estimator under one protocol.
-
-    Attributes:
-        pose: Key of `POSES`.
-        surrogate: Key of `LOADS`.
-        target: Channel that is estimated.
-        filters: `zero-phase`, or `live` for inputs filtered causally.
-        protocol: `run-wise`, `lofo` or `lopo`.
-        without: Effect left out, a key of `EFFECTS`, or empty.
-    """
-
-    pose: str
-    surrogate: str
-    target: str
-    filters: str = "zero-phase"
-    protocol: str = "run-wise"
-    without: str = ""
-
-    @property
-    def bank(self) -> Bank:
-        """What is fitted."""
-        without = (self.without,) if self.without else ()
-        return Bank(LOADS[self.surrogate], POSES[self.pose], without)
-
-
-@dataclass(frozen=True)
-class StateRow:
-    """Error of one job, in the target's SI unit.
-
-    Attributes:
-        job: What was fitted and held out.
-        runs: Runs held out.
-        score: Errors over all closing samples of the held-out runs.
-        run_offset: Root mean square of the runs' mean errors.
-        covered: Share of the samples inside their interval.
-        covered_median: Median of that share over runs.
-        covered_worst: Smallest share of a run.
-        inside: Share of the samples inside the range that was fitted.
-        rmse_inside: Error over these samples; NaN where there are none.
-    """
-
-    job: StateJob
-    runs: int
-    score: Score
-    run_offset: float
-    covered: float
-    covered_median: float
-    covered_worst: float
-    inside: float
-    rmse_inside: float
 
 
 @dataclass(frozen=True)
@@ -236,7 +183,7 @@ def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
     if protocol == "run-wise":
         order = np.random.default_rng(seed).permutation(len(runs))
         return [order[k::FOLDS] for k in range(FOLDS)] if len(runs) >= FOLDS else []
-    condition = {"lofo": "frequency_hz", "lopo": "load_command_a"}[protocol]
+    condition = CONDITIONS[protocol]
     if any(condition not in run.conditions for run in runs):
         return []
     values = np.array([float(run.conditions[condition]) for run in runs])
@@ -286,7 +233,11 @@ def _rows(
         design = bank.design(rows)
         for job, found in estimates.items():
             found.append(fitted[job][k].of_design(design, rows))
-    return [_row(job, found, runs) for job, found in estimates.items()]
+    conditions = [run.conditions for run in runs]
+    return [
+        scored(job, found, [run.truth[job.target] for run in runs], conditions)
+        for job, found in estimates.items()
+    ]
 
 
 def _fitted(
@@ -299,29 +250,3 @@ def _fitted(
         estimator = fit_runs(rest, job.bank, job.target)
         found |= dict.fromkeys(map(int, held_out), estimator)
     return found
-
-
-def _row(job: StateJob, estimates: Sequence[Estimates], runs: Sequence[_Run]) -> StateRow:
-    truths = [run.truth[job.target] for run in runs]
-    errors = [e.value - truth for e, truth in zip(estimates, truths, strict=True)]
-    covered = [np.abs(e) <= own.half_width for own, e in zip(estimates, errors, strict=True)]
-    inside = np.concatenate([own.inside for own in estimates])
-    shares = [float(np.mean(part)) for part in covered]
-    whole = np.concatenate(errors)
-    return StateRow(
-        job=job,
-        runs=len(runs),
-        score=score(np.concatenate([own.value for own in estimates]), np.concatenate(truths)),
-        run_offset=float(np.sqrt(np.mean([e.mean() ** 2 for e in errors]))),
-        covered=float(np.mean(np.concatenate(covered))),
-        covered_median=float(np.median(shares)),
-        covered_worst=min(shares),
-        inside=float(inside.mean()),
-        rmse_inside=float(np.sqrt(np.mean(whole[inside] ** 2))) if inside.any() else float("nan"),
-    )
-
-
-def ablated(rows: Sequence[StateRow], target: str) -> dict[str, StateRow]:
-    """Return the ablation's rows of a target by the effect left out; the whole one under ''."""
-    whole = StateJob("neutral", "command", target)
-    return {r.job.without: r for r in rows if replace(r.job, without="") == whole}

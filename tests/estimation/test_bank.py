@@ -155,6 +155,18 @@ def test_the_means_of_runs_are_fitted_once_more_by_few_weights():
     assert both[2] == alone[2]
 
 
+def test_a_column_that_hardly_varies_gets_no_weight():
+    rng = np.random.default_rng(0)
+    slope = rng.normal(size=400)
+    design = np.column_stack([np.ones(400), slope, 0.5 + 1e-6 * rng.normal(size=400)])
+    truth = 2.0 + 3.0 * slope + 0.01 * rng.normal(size=400)
+    weights = solve(
+        Pool.of([Normal.of(design, truth[:, None])]), Shape.plain(3), Settings(offset_share=0.0)
+    )[:, 0]
+    assert weights[2] == 0.0
+    np.testing.assert_allclose(weights[:2], [2.0, 3.0], rtol=2e-3)
+
+
 def test_its_interval_holds_on_a_run_it_has_not_seen(runs):
     inside = []
     for k in (0, 4, 8):

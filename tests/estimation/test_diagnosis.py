@@ -12,8 +12,8 @@ from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.limits import limits
-from estimation.diagnosis.maps import bases
 from estimation.diagnosis.split import SplitError, data_hash, split
+from estimation.diagnosis.variables import bases
 from estimation.errors import EstimationError
 from estimation.recording import Flag, Instrument, Stretch
 from tests.estimation import synthetic

@@ -8,6 +8,7 @@ import pytest
 
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.cross_validation import closing_score
 from estimation.derived import TRAVEL_WINDOW_S, causal_channels, zero_phase_channels
 from estimation.estimator import Estimator, Recipe, load
 from estimation.estimators.bank import BankRecipe
@@ -66,6 +67,20 @@ def closing_error(estimator: Estimator, run: Recording, causal: bool = False) ->
     truth = processed(run, [TARGET])
     both = closing_samples(truth.with_columns(estimate_n_m=estimator.predict(run, causal)))
     return float(np.sqrt(np.mean((both["estimate_n_m"] - both[TARGET]) ** 2)))
+
+
+def test_an_error_on_runs_left_out_is_by_estimators_that_have_not_seen_them(runs):
+    done: list[None] = []
+    few = Campaign.of(runs[:3])
+    found = closing_score(RECIPES["linear"], few, 3, on_fold=lambda: done.append(None))
+    assert len(done) == 3
+    errors = [
+        closing_error(RECIPES["linear"].fit(split.train), run)
+        for split in few.folds(3, 0)
+        for run in split.test
+    ]
+    assert min(errors) <= found.rmse <= max(errors)
+    assert found.samples == sum(len(closing_samples(processed(run, [TARGET]))) for run in few)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -10,8 +10,8 @@ from estimation.campaign import Campaign
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.design import prepare
-from estimation.diagnosis.maps import needed_channels
 from estimation.diagnosis.next_experiment import Worth, worth
+from estimation.diagnosis.variables import needed_channels
 from estimation.fitting import fit
 from estimation.recording import Recording
 

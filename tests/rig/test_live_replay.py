@@ -38,6 +38,7 @@ class Smoothed:
     target_channel = GRIP
     half_width = None
     outside = False
+    inside = None
     model = None
 
     def __init__(self):

@@ -9,6 +9,7 @@ from estimation.recording import Flag
 from rig.live.block import BlockError, DeviceStatus, SampleBlock
 from rig.live.sparkline import round_scale, sparkline
 from rig.live.state import LiveState
+from rig.live.text import summary_lines
 from rig.live.window import Window
 
 GRIP = "distal_torque_n_m"
@@ -59,6 +60,19 @@ def test_error_rms_is_of_the_last_five_seconds_and_in_the_summary_of_all():
     assert summary.error_rms == pytest.approx(np.sqrt((0.3**2 + 0.003**2) / 2))
     assert summary.error_samples == 10_000
     assert summary.duration_s == pytest.approx(9.999)
+
+
+def test_the_error_within_what_was_fitted_is_told_apart():
+    inside = {GRIP: np.arange(1000) < 400}
+    estimate = {GRIP: np.where(inside[GRIP], 0.103, 0.4)}
+    summary = state_of(block(0, 1000, estimates=estimate, inside=inside)).summary("finished")
+    assert summary.inside_rms == pytest.approx(0.003)
+    assert summary.inside_samples == 400
+    *_, line = summary_lines(summary, "N m")
+    assert line == "Within what it was fitted on: 3.0 mN m over 400 of these samples."
+    unsaid = state_of(block(0, 1000, estimates=estimate)).summary("finished")
+    assert unsaid.inside_rms is None
+    assert "Within" not in " ".join(summary_lines(unsaid, "N m"))
 
 
 def test_sample_rate_is_measured_over_device_time():

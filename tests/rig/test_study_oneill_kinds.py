@@ -35,5 +35,5 @@ def test_physics_is_better_than_a_straight_line(rows):
 
 
 def test_the_table_has_a_row_for_each_kind(rows):
-    (table,) = shown.More(kinds=rows).tables
+    table = shown.kinds_table(rows)
     assert [len(row) for row in table.rows] == [3] * len({row.kind for row in rows})
