@@ -128,6 +128,21 @@ def fit(
     )
 
 
+def evidence_of(fitted: Model, campaign: Campaign, seed: int = 0) -> Evidence:
+    """Return how well a model that was fitted elsewhere does on the runs it was fitted on.
+
+    Args:
+        fitted: The model.
+        campaign: The runs, counted as `fit` counts them.
+        seed: Seed of the bootstrap behind its spreads.
+
+    Raises:
+        FitError: No valid sample.
+        MissingChannelError: A run lacks a channel of the model.
+    """
+    return _evidence(fitted, _prepared(fitted, campaign, None), seed)
+
+
 def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]:
     """Read the runs and find every n-th valid sample of them."""
     runs = []

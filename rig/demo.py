@@ -21,6 +21,7 @@ from estimation.residual import Structure, largest_structure
 from rig.config import Config, load_config
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.written import written_models
 from rig.importers.registry import open_campaign
 from rig.logger import open_logger
 from rig.protocol import load_protocol
@@ -115,9 +116,8 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     done = run_diagnosis(
         open_campaign(logs), [declared], Ledger(ledger), seed=seed, quick=True, on_stage=on_stage
     )
-    (story,) = done.stories.values()
     model_path = folder / f"{MODEL}.model.toml"
-    model_file.write(story.model, model_path)
+    model_file.write_all(written_models(done), model_path)
     page = diagnosis_page.page(done, Provenance.now(seed))
     report = write_report(folder / "diagnosis.html", page)
     return Demo(

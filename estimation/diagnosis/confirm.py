@@ -27,9 +27,24 @@ def confirmed(story: Story, gates: Gates) -> Story:
             last = trial
         else:
             refused.append(f"{claim.family}: {reason}")
+    kept = _settled(kept, last)
     values = tuple(intervals(story.balance, last.terms, seed=0))
     story = replace(story, claims=tuple(kept), refused=tuple(refused), after=last, values=values)
     return _written(story, gates)
+
+
+def _settled(claims: Sequence[Claim], last: Frozen) -> list[Claim]:
+    """Return the claims, the formula beside each name with the numbers of the joint fit."""
+    told = []
+    end = len(last.terms) - sum(len(claim.part.terms) for claim in claims)
+    for claim in claims:
+        end += len(claim.part.terms)
+        if claim.form is not None:
+            own = last.terms[:end]
+            weights = last.weights[: sum(len(term.effect.amplitudes) for term in own)]
+            claim = replace(claim, form=claim.form.settled(own, weights))
+        told.append(claim)
+    return told
 
 
 def without(story: Story, places: Collection[int]) -> Story:

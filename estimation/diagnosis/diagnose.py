@@ -14,6 +14,7 @@ from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.claims import claims_of
 from estimation.diagnosis.confirm import confirmed, without
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
+from estimation.diagnosis.endogeneity import own_share
 from estimation.diagnosis.findings import causes_of, echoes, findings_of, moved
 from estimation.diagnosis.forms import formed
 from estimation.diagnosis.formula import formulas
@@ -21,6 +22,7 @@ from estimation.diagnosis.frozen import errors, freeze
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import instruments, stand_in
 from estimation.diagnosis.instruments import projection as instrumented
+from estimation.diagnosis.limits import limits
 from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
@@ -116,7 +118,7 @@ def diagnose(
         moved={name: moved(s) for name, s in stories.items()},
         sealed=sealed,
         undecided={name: str(error) for name, error in failed.items()},
-        notes=(*audit(discovering), *_notes(sealed, twins, stories)),
+        notes=(*audit(discovering), *limits(sealed, twins, stories, gates)),
         seconds=time.monotonic() - began,
     )
     return diagnosis, stories
@@ -200,6 +202,7 @@ def _balance(
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
         unused=(*rested, *also),
+        own_share=own_share(seen),
     )
 
 
@@ -221,41 +224,3 @@ def _usable(
                 raise
             unused.append(recording.name)
     return runs, unused
-
-
-def _notes(
-    sealed: Sealed, twins: Mapping[str, object] | None, stories: Mapping[str, Story]
-) -> list[str]:
-    """Return what the diagnosis cannot tell, in words."""
-    notes = []
-    if not sealed.may_name:
-        notes.append(
-            f"{len(sealed.discover)} runs discover; with fewer than {LEAST_TO_NAME} no effect is"
-            " named."
-        )
-    if not twins:
-        notes.append(
-            "The search was held against shuffled residuals only, not against simulated twins of"
-            " the declared model: artefacts of filters and feedback are not ruled out that way."
-        )
-    for name, story in stories.items():
-        used = sum(int(run.used.sum()) for run in story.confirm)
-        valid = sum(int(run.valid.sum()) for run in story.confirm)
-        if story.unused:
-            notes.append(f"{name}: without a usable sample: {', '.join(story.unused)}.")
-        notes += [
-            f"{name}: what the equation of {c.family} leaves of its own cause is told by"
-            f" {c.form.text}."
-            for c in story.claims
-            if c.form is not None
-        ]
-        if used < valid:
-            notes.append(
-                f"{name}: reported errors count all samples; {1 - used / valid:.0%} of the confirm"
-                " samples are at rest, where friction holds any torque: no fit, search or decision"
-                " uses them."
-            )
-    notes += [
-        f"{name}: not claimed: {what}." for name, story in stories.items() for what in story.refused
-    ]
-    return notes

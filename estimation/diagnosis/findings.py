@@ -127,6 +127,7 @@ def _findings(story: Story) -> list[Told]:
                     confidence=named.confidence if named else None,
                     parameters=_parameters(story, k) if named else {},
                     formulas=_stated(story, claim, samples),
+                    form=claim.form.text if claim.form else "",
                 ),
                 _added(last, now, story.balance.runs),
                 story,

@@ -66,13 +66,19 @@ class Formula:
     @property
     def text(self) -> str:
         """The formula as a person writes it, in SI units."""
-        parts = []
-        for term, weight in zip(self.terms, self.weights, strict=True):
-            kind = term.effect
-            assert isinstance(kind, Product)  # noqa: S101 - narrows the type
-            names = {role: self.words[channel] for role, channel in term.channels}
-            parts.append(f"{weight:.3g} {kind.in_words(names, term.shape)}")
-        return " + ".join(parts).replace("+ -", "- ")
+        weighed = zip(self.weights, self.products, strict=True)
+        return " + ".join(f"{weight:.3g} {words}" for weight, words in weighed).replace("+ -", "- ")
+
+    @property
+    def products(self) -> list[str]:
+        """Its terms in words, without their amplitudes."""
+        return [self._in_words(term) for term in self.terms]
+
+    def _in_words(self, term: Candidate) -> str:
+        kind = term.effect
+        assert isinstance(kind, Product)  # noqa: S101 - narrows the type
+        names = {role: self.words[channel] for role, channel in term.channels}
+        return kind.in_words(names, term.shape)
 
     def settled(self, terms: Sequence[Candidate], weights: FloatArray) -> "Formula":
         """Return the same formula as it stands at the end of a joint fit's effects.

@@ -65,6 +65,8 @@ class Finding:
         balance: Balance of its origin.
         also_in: Other balances that the same cause shows in.
         formulas: Formulas of `depends_on` that do about equally well; the first one is written.
+        form: Formula beside a named effect, of what its equation leaves of its own cause; empty
+            without one. What is left after the finding, and its model, count it.
         family: Id of the effect, or `unknown`.
         verdict: What is claimed of it.
         alternatives: Families it cannot be told from on these runs.
@@ -92,6 +94,7 @@ class Finding:
     parameters: Mapping[str, Value] = field(default_factory=dict)
     also_in: tuple[str, ...] = ()
     formulas: tuple[Stated, ...] = ()
+    form: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +209,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         # an interval with an end that is not known is none
         if known["ci95"] is not None and not all(map(math.isfinite, known["ci95"])):
             known["ci95"] = None
-    optional = ["formulas"] if finding.formulas else []
+    optional = [name for name in ("formulas", "form") if fields[name]]
     return {name: fields[name] for name in [*ORDER, *optional]}
 
 

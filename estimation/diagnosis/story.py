@@ -63,6 +63,7 @@ class Story:
         candidates: Grid points tried.
         families: Families tried.
         unused: Runs without a usable sample in this balance.
+        own_share: Least share of a force's declared column that the other declared ones do not say.
     """
 
     balance: Balance
@@ -78,6 +79,7 @@ class Story:
     candidates: int
     families: tuple[str, ...]
     unused: tuple[str, ...] = ()
+    own_share: float = 1.0
 
     @property
     def model(self) -> Model:

@@ -53,7 +53,7 @@ def diagnose(
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.written import with_cost_of_causal_filters
+    from rig.diagnosis.written import with_cost_of_causal_filters, written_models
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
     from rig.reports.provenance import Provenance
@@ -79,7 +79,7 @@ def diagnose(
     for note in done.diagnosis.notes:
         screen.print(note, markup=False)
     if model_out is not None:
-        model_file.write_all([story.model for story in done.stories.values()], model_out)
+        model_file.write_all(written_models(done), model_out)
         screen.print(f"Model: {model_out}", markup=False)
     if report is not None:
         where = write_report(report / "diagnosis.html", page(done, Provenance.now(seed)))

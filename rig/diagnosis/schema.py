@@ -59,6 +59,9 @@ class Finding(_Strict):
     formulas: list[Formula] = []
     """Formulas that do about equally well, the one that a model file holds first; may be left out.
     """
+    form: str = ""
+    """Formula beside a named effect, of what its equation leaves of its own cause; may be left out.
+    """
 
 
 class Runs(_Strict):

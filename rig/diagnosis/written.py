@@ -1,13 +1,15 @@
-"""What the model that a diagnosis leaves loses when it runs live, with causal filters."""
+"""The model that a diagnosis leaves, and what it loses when it runs live, with causal filters."""
 
 from collections.abc import Iterable
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.story import Story
+from estimation.fitting import evidence_of
 from estimation.model import Model, predict
 from estimation.recording import Recording
 from rig.diagnosis.run import Diagnosed
@@ -33,6 +35,19 @@ def with_cost_of_causal_filters(done: Diagnosed) -> Diagnosed:
         )
     diagnosis = replace(done.diagnosis, notes=(*done.diagnosis.notes, *notes))
     return replace(done, diagnosis=diagnosis)
+
+
+def written_models(done: Diagnosed) -> list[Model]:
+    """Return the models that a diagnosis leaves, each with its date and its errors.
+
+    A watch then knows from the first run on what is usual, and a display how sure an estimate is.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    discover = Campaign.of([r for r in done.recordings if r.name in done.sealed.discover])
+    return [
+        replace(story.model, evidence=replace(evidence_of(story.model, discover), made_at=now))
+        for story in done.stories.values()
+    ]
 
 
 def confirm_errors(

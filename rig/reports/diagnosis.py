@@ -1,7 +1,7 @@
 """A diagnosis on one page: the sentence, the plots, the numbers, and what it cannot tell."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -23,6 +23,11 @@ from rig.reports.table import TextTable
 CONFIDENCE = (
     "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
     " gain is real and general; it has not been calibrated on known cases."
+)
+
+FUNCTIONS = (
+    "bump(x; c, s) = exp(-((x - c) / s)^2), step(x; c, s) = (1 + tanh((x - c) / s)) / 2,"
+    " play(x; s): how far a slack of s on either side is crossed, -1 to 1."
 )
 
 
@@ -61,6 +66,8 @@ def tables(done: Diagnosed) -> list[TextTable]:
     shown = [_errors(done.diagnosis)]
     if any(f.parameters for f in done.diagnosis.findings):
         shown.append(_parameters(done.diagnosis.findings))
+    if any(f.form for f in done.diagnosis.findings):
+        shown.append(_forms(done.stories))
     if any(f.formulas for f in done.diagnosis.findings):
         shown.append(_formulas(done.diagnosis))
     for name, story in done.stories.items():
@@ -106,6 +113,29 @@ def _with_interval(known: Value) -> list[str]:
     return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
 
 
+def _forms(stories: Mapping[str, Story]) -> TextTable:
+    """Return the terms beside each named effect, for what its equation leaves."""
+    rows = []
+    for name, story in stories.items():
+        for claim in story.claims:
+            if claim.form is None:
+                continue
+            for term, words in zip(claim.form.terms, claim.form.products, strict=True):
+                own = story.values[story.after.terms.index(term)]
+                unit = term.term.unit(term.effect.amplitudes[0], story.balance.model.target)
+                known = Value(own["amplitude"].value, unit, own["amplitude"].ci95)
+                rows.append([f"{name}, {claim.family}: times {words}", *_with_interval(known)])
+    columns = ["term, angles in rad", "value", "95 %", "unit"]
+    return TextTable(
+        "Beside the equation of what was found",
+        columns,
+        rows,
+        "An equation of the catalogue is one form of a cause, and a rig's own is a little another."
+        " These terms of the same variables tell what the equation leaves; they are no second"
+        f" cause. A model file holds them as unknown.*. {FUNCTIONS}",
+    )
+
+
 def _formulas(diagnosis: Diagnosis) -> TextTable:
     rows = []
     for finding in diagnosis.findings:
@@ -118,8 +148,7 @@ def _formulas(diagnosis: Diagnosis) -> TextTable:
         ["formula, SI units", "gain, runs left out", "error on the confirm runs"],
         rows,
         "These do about equally well on the runs that discovered; a model file holds the first."
-        " bump(x; c, s) = exp(-((x - c) / s)^2), step(x; c, s) = (1 + tanh((x - c) / s)) / 2,"
-        " play(x; s): how far a slack of s on either side is crossed, -1 to 1.",
+        f" {FUNCTIONS}",
     )
 
 

@@ -32,7 +32,13 @@ def _sentence(finding: Finding, unit: str, which: str) -> str:
         f" ({finding.runs_improved} of {finding.runs_total} runs better)"
     )
     also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
-    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{_formula(finding, unit)}"
+    form = (
+        f" What its equation leaves of its own cause is told by {finding.form} (SI units); the"
+        " error counts it."
+        if finding.form
+        else ""
+    )
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{form}{_formula(finding, unit)}"
 
 
 def _formula(finding: Finding, unit: str) -> str:

@@ -11,6 +11,7 @@ from estimation import model_file
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
 from estimation.diagnosis.gates import Gates
+from estimation.diagnosis.limits import limits
 from estimation.diagnosis.split import SplitError, data_hash, split
 from estimation.diagnosis.variables import bases
 from estimation.errors import EstimationError
@@ -66,6 +67,11 @@ def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
     assert fitted.is_fitted
     assert "spring.position" in {term.effect.id for term in fitted.terms}
     assert model_file.parse(model_file.to_toml(fitted)) == fitted
+    assert not any("stands alone" in note for note in diagnosis.notes)
+    alike = {"motor": replace(stories["motor"], own_share=0.004)}
+    (note,) = (n for n in limits(diagnosis.sealed, None, alike, QUICK) if "stands alone" in n)
+    assert "motor_current_a only 0.4% is its own" in note
+    assert "rig record --protocol diagnosis" in note
 
 
 def uneven_ripple(motor_rad, speed_rad_s, load_n_m):
@@ -78,10 +84,12 @@ def test_a_formula_stands_beside_a_name_for_what_its_equation_leaves_of_its_own_
     assert (finding.family, finding.verdict) == ("ripple.motor", "identified")
     assert finding.parameters["order"].value == pytest.approx(3.0, abs=0.01)
     assert finding.rmse_after < 1.1e-3  # the sensor's noise is 1 mN m; the rest of the wave 1.4
-    (note,) = (n for n in diagnosis.notes if "of its own cause" in n)
-    assert "motor_angle" in note
     fitted = stories["motor"].model
-    assert any(term.effect.family == "unknown" for term in fitted.terms)
+    written = [t for t in fitted.terms if t.effect.family == "unknown"]
+    assert written
+    for term in written:  # the formula that is told has the numbers of the one that is written
+        assert f"{term.values['amplitude'].value:.3g} " in finding.form
+    assert "motor_angle" in finding.form
     assert model_file.parse(model_file.to_toml(fitted)) == fitted
 
 

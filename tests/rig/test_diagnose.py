@@ -54,7 +54,12 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     assert (found["next_experiment"] is None) == (not finding["alternatives"])
     assert found["exploratory"] is False
     assert found["rmse_after"]["motor"] < found["rmse_before"]["motor"]
-    assert "spring.position" in {t.effect.id for t in model_file.read(model).terms}
+    written = model_file.read(model)
+    assert "spring.position" in {t.effect.id for t in written.terms}
+    # as after `rig fit`, a watch and a display know at once what is usual
+    assert list(written.evidence.runs) == found["runs"]["discover"]
+    assert written.evidence.rmse == pytest.approx(found["rmse_after"]["motor"], rel=0.5)
+    assert written.evidence.made_at
     page = (report / "diagnosis.html").read_text()
     assert "spring.position is missing" in page
     assert page.count("<svg") == 2
