@@ -45,7 +45,13 @@ def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bo
         # the effect is proved; that its name fell to this map makes it no smaller
         claims.append(_map_claim(vetoes[0], may_name))
     last = discovery.steps[-1] if discovery.steps else None
-    if not claims and last is not None and last.stands_out(gates) and last.worth >= gates.some:
+    if (
+        not claims
+        and last is not None
+        and last.stands_out(gates)
+        and last.worth >= gates.some
+        and last.agree < gates.even
+    ):
         claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
     return claims
 

@@ -30,6 +30,7 @@ class Gates:
             least this share of that gain.
         some: Least share of squared error removed by what does not help in run after run, for it to
             be told as something missing.
+        even: And the p-value over the runs at which it harms as many as it helps.
         kept: Least share of what an effect adds that is left when it is fitted through instruments:
             less, and it is made of the noise of a regressor.
         noise: Largest share of what an effect removes that may be the noise of a force's sensor.
@@ -66,6 +67,7 @@ class Gates:
     map_floor: float = 0.2
     near: float = 0.7
     some: float = 0.1
+    even: float = 0.5
     kept: float = 0.5
     noise: float = 0.2
     told: float = 0.01
