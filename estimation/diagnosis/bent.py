@@ -19,19 +19,22 @@ POWERS = (1, 2)
 
 
 def bent_losses(
-    balance: Balance, others: Sequence[Candidate], candidate: Candidate, left: Sequence[FloatArray]
+    balance: Balance,
+    base: Sequence[FloatArray],
+    candidate: Candidate,
+    left: Sequence[FloatArray],
 ) -> Losses:
     """Return the losses of runs left out of an effect whose form may bend.
 
     Args:
         balance: The balance.
-        others: Effects that are refitted beside it.
+        base: What is refitted beside it, from `Balance.base`.
         candidate: The effect.
-        left: What the others leave of each run, shape (n,).
+        left: What the base leaves of each run, shape (n,).
     """
     columns = _columns(balance, candidate)
     aims = [r[:, None] for r in left]
-    return leave_one_run_out(balance.base(others), columns, [columns[0].shape[1]], aims, RIDGE)
+    return leave_one_run_out(base, columns, [columns[0].shape[1]], aims, RIDGE)
 
 
 def _columns(balance: Balance, candidate: Candidate) -> list[FloatArray]:

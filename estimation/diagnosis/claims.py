@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from estimation.diagnosis.balance import Balance
-from estimation.diagnosis.endogeneity import own_share
 from estimation.diagnosis.frozen import Part
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.maps import Map
@@ -12,10 +11,19 @@ from estimation.diagnosis.story import Claim
 from estimation.diagnosis.variables import variables_of, within
 
 
-def claims_of(discovery: Discovery, balance: Balance, gates: Gates, may_name: bool) -> list[Claim]:
-    """Return what is claimed, and no more than that."""
+def claims_of(
+    discovery: Discovery, balance: Balance, gates: Gates, may_name: bool, told: bool
+) -> list[Claim]:
+    """Return what is claimed, and no more than that.
+
+    Args:
+        discovery: What the search found.
+        balance: The balance it searched.
+        gates: What a claim must pass.
+        may_name: Whether enough runs discover to name an effect.
+        told: Whether the runs tell the declared gains, without which no name stands alone.
+    """
     claims: list[Claim] = []
-    told = own_share(balance) >= gates.told
     for named in discovery.named:
         if named.veto is not None:
             continue  # the map of what is left then speaks for it

@@ -177,7 +177,8 @@ def _balance(
         source = maker(fitted, discover)
         twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
     discovery = searched(Search(seen, tried, gates, sealed.seed, twin))
-    claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME)
+    share = own_share(seen)
+    claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME, share >= gates.told)
     if not gates.akin:  # else every parameter counts
         claims = formed(claims, balance, tried, gates, sealed.seed)
     beside = [term for c in claims for term in c.part.terms]
@@ -202,7 +203,7 @@ def _balance(
         candidates=len(tried),
         families=tuple(dict.fromkeys(c.family for c in tried)),
         unused=(*rested, *also),
-        own_share=own_share(seen),
+        own_share=share,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.evidence import Losses, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map
-from estimation.diagnosis.rivals import Tried, beaten, better, rivals_of, tried
+from estimation.diagnosis.rivals import Beside, Tried, beaten, better, rivals_of, tried
 from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.variables import variables_of, within
 from estimation.recording import FloatArray
@@ -58,12 +58,10 @@ class Contest:
     """An effect beside the others that were found, and its rivals in its place.
 
     Attributes:
-        losses: Of the effect beside the others.
         rivalry: The effect, and its rivals.
         others: The others.
     """
 
-    losses: Losses
     rivalry: tuple[Tried, list[Tried]]
     others: list[Candidate]
 
@@ -91,14 +89,16 @@ def searched(search: Search) -> Discovery:
 
 def _contest(search: Search, found: Sequence[Candidate], k: int) -> Contest:
     others = [f for j, f in enumerate(found) if j != k]
-    mine = search.beside(found, range(len(found)), k)
-    rivals = rivals_of(search, others, found[k], float(mine.gain[0, 0]))
-    return Contest(mine, (tried(search, others, found[k]), rivals), others)
+    beside = Beside.of(search, others)
+    own = tried(search, beside, found[k])
+    rivals = rivals_of(search, beside, found[k], float(own.plain.gain[0, 0]))
+    return Contest((own, rivals), others)
 
 
 def _named(search: Search, trial: Trial, contest: Contest) -> Named:
     """Ask what else an effect could be, how sure its name is, and whether a map does better."""
-    mine, (own, rivals), others = contest.losses, contest.rivalry, contest.others
+    (own, rivals), others = contest.rivalry, contest.others
+    mine = own.plain
     total, gain = mine.base[:, 0], float(mine.gain[0, 0])
     near = [
         r

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, related
-from estimation.diagnosis.evidence import leave_one_run_out, runs_agree
+from estimation.diagnosis.evidence import Losses, leave_one_run_out, runs_agree
 from estimation.diagnosis.search import Search
 from estimation.recording import FloatArray
 
@@ -21,18 +21,44 @@ ROUGHLY = 0.8
 
 
 @dataclass(frozen=True)
+class Beside:
+    """What stands beside a named effect, laid out once for it and all its rivals.
+
+    Attributes:
+        others: The other effects found.
+        base: What is refitted, of each run.
+        left: What that leaves of each run, shape (n,).
+    """
+
+    others: Sequence[Candidate]
+    base: Sequence[FloatArray]
+    left: Sequence[FloatArray]
+
+    @classmethod
+    def of(cls, search: Search, others: Sequence[Candidate]) -> "Beside":
+        """Lay out the declared effects and others."""
+        terms = [*search.balance.terms, *others]
+        return cls(others, search.balance.base(terms), search.balance.left(terms))
+
+
+@dataclass(frozen=True)
 class Tried:
     """An effect in the place of a named one, beside all others that were found.
 
     Attributes:
         candidate: The effect at its own best shape.
-        losses: Squared error of each run left out, shape (runs,).
-        bent: The same in any form a little bent.
+        plain: Losses without it and with it.
+        bent: Squared error of each run left out in any form a little bent, shape (runs,).
     """
 
     candidate: Candidate
-    losses: FloatArray
+    plain: Losses
     bent: FloatArray
+
+    @property
+    def losses(self) -> FloatArray:
+        """Squared error of each run left out, shape (runs,)."""
+        return self.plain.joint[:, 0, 0]
 
     def depends_as(self, other: "Tried") -> bool:
         """Say whether two effects depend on the same channels: only their form tells them apart."""
@@ -40,35 +66,31 @@ class Tried:
         return one == two
 
 
-def tried(search: Search, others: Sequence[Candidate], candidate: Candidate) -> Tried:
+def tried(search: Search, beside: Beside, candidate: Candidate) -> Tried:
     """Put an effect beside others."""
-    terms = [*search.balance.terms, *others]
-    left = search.balance.left(terms)
     block = search.balance.columns([candidate])
-    aims = [r[:, None] for r in left]
-    plain = leave_one_run_out(search.balance.base(terms), block, [block[0].shape[1]], aims)
-    bent = bent_losses(search.balance, terms, candidate, left)
-    return Tried(candidate, plain.joint[:, 0, 0], bent.joint[:, 0, 0])
+    aims = [r[:, None] for r in beside.left]
+    plain = leave_one_run_out(beside.base, block, [block[0].shape[1]], aims)
+    bent = bent_losses(search.balance, beside.base, candidate, beside.left)
+    return Tried(candidate, plain, bent.joint[:, 0, 0])
 
 
-def rivals_of(
-    search: Search, others: Sequence[Candidate], named: Candidate, gain: float
-) -> list[Tried]:
+def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> list[Tried]:
     """Return the other families that could do it, each at its own best shape, best first.
 
     Args:
         search: The search that found it.
-        others: The other effects found.
+        beside: What stands beside the effect.
         named: The effect.
         gain: Share of the squared error it removes beside the others.
     """
     found: list[Tried] = []
-    for rival in search.ranked(others, 0):
+    for rival in search.ranked(beside.others, 0):
         if rival.family == named.family or rival.gain < ROUGHLY * search.gates.rival * gain:
             continue
-        best = _polished(search, others, rival.candidates[0])
+        best = _polished(search, beside.others, rival.candidates[0])
         if search.shows(best) or best.family in named.effect.same_as:
-            found.append(tried(search, others, best))
+            found.append(tried(search, beside, best))
         if len(found) == MOST:
             break
     return found

@@ -32,17 +32,19 @@ def turned(balance: Balance, terms: Sequence[Candidate]) -> list[Candidate]:
         terms: The effects.
     """
     best = list(terms)
-    if all(len(_places(run)) == len(run.kept) for run in balance.runs):
+    places = [_places(run) for run in balance.runs]
+    if all(len(at) == len(run.kept) for at, run in zip(places, balance.runs, strict=True)):
         return best
-    aims = [run.channels[balance.model.target][_places(run)] for run in balance.runs]
-    blocks = [[c.columns(run.channels)[_places(run)] for c in best] for run in balance.runs]
+    pairs = list(zip(places, balance.runs, strict=True))
+    sampled = [{name: x[at] for name, x in run.channels.items()} for at, run in pairs]
+    blocks = [[c.columns(run.channels)[at] for c in best] for at, run in pairs]
     most = FREE * balance.loss(best)
     for i, term in enumerate(terms):
         for k in range(len(term.shape)):
             if not term.effect.start():
-                best[i] = _settled(balance, best, (i, k), (blocks, aims), most)
-                for run, block in zip(balance.runs, blocks, strict=True):
-                    block[i] = best[i].columns(run.channels)[_places(run)]
+                best[i] = _settled(balance, best, (i, k), (blocks, sampled), most)
+                for channels, block in zip(sampled, blocks, strict=True):
+                    block[i] = best[i].columns(channels)
     return best
 
 
@@ -50,12 +52,12 @@ def _settled(
     balance: Balance,
     terms: list[Candidate],
     place: tuple[int, int],
-    seen: tuple[list[list[FloatArray]], list[FloatArray]],
+    seen: tuple[list[list[FloatArray]], list[dict[str, FloatArray]]],
     most: float,
 ) -> Candidate:
     """Return one effect at its best value of one shape over all samples."""
     i, k = place
-    blocks, aims = seen
+    blocks, sampled = seen  # an effect without memory needs no other samples
 
     def error(steps: float) -> float:
         moved = terms[i].moved(k, steps)
@@ -65,9 +67,12 @@ def _settled(
         if moved != terms[i]:
             balance.tables_of.pop(moved, None)  # a point of a search, not to be kept
         total = 0.0
-        for run, block, aim in zip(balance.runs, blocks, aims, strict=True):
-            own = moved.columns(run.channels)[_places(run)]
-            left = aim - np.hstack([*block[:i], own, *block[i + 1 :]]) @ weights
+        for channels, block in zip(sampled, blocks, strict=True):
+            own = moved.columns(channels)
+            left = (
+                channels[balance.model.target]
+                - np.hstack([*block[:i], own, *block[i + 1 :]]) @ weights
+            )
             total += float(np.sum((left - left.mean()) ** 2))
         return total * min(max(motion / most, 1.0), FAR) ** PENALTY
 

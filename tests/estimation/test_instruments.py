@@ -167,7 +167,7 @@ def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
     columns = balance.columns([friction])
     aims = [r[:, None] for r in left]
     plain = leave_one_run_out(balance.base(balance.terms), columns, [1], aims)
-    bent = bent_losses(balance, balance.terms, friction, left)
+    bent = bent_losses(balance, balance.base(balance.terms), friction, left)
     assert bent.joint.sum() < 0.7 * plain.joint.sum()
 
 
