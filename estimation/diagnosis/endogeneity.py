@@ -10,18 +10,27 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.derived import measured_channels
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
-from estimation.diagnosis.instruments import FORCES, Fit, as_told, fitted, instrument_columns
+from estimation.diagnosis.instruments import (
+    FORCES,
+    Fit,
+    as_told,
+    fitted,
+    instrument_columns,
+    instruments,
+)
 from estimation.diagnosis.least_squares import least_squares, orthonormal
 from estimation.recording import FloatArray
 
-MEDIAN_OF_SQUARE = 0.4549
-"""Of a standard normal variable."""
+STRETCH = 50
+"""Samples over which the noise of a force is told from its course: half a second at 100 Hz."""
+
+BEND = 2
+"""Degree of that course: what a motion does in half a second."""
 
 PULL = 1e-8
 """On columns of length 1: settles those that the others hold."""
@@ -79,7 +88,8 @@ def noise_share(
         added: Columns of each run.
         every: Only every so manieth sample, where `added` has no others.
     """
-    read = _reads_force(terms)
+    forces = forces_read(terms)
+    read = np.array([force is not None for force in forces])
     if not read.any():
         return 0.0
     columns = balance.columns(terms)
@@ -92,9 +102,22 @@ def noise_share(
     alone, left = _solved(gram[:count, :count], gram[:count, -1])
     beside, less = _solved(gram[:-1, :-1], gram[:-1, -1])
     power = np.einsum("nk,nk->k", own, own)[read]
-    noise = np.array([_noise_power(columns, int(k)) for k in np.flatnonzero(read)])
+    noise = np.array(
+        [
+            _noise_power(balance.runs, [c[:, k] for c in columns], force)
+            for k, force in enumerate(forces)
+            if force is not None
+        ]
+    )
     gains = (alone[read] ** 2 - beside[:count][read] ** 2) / np.maximum(power, TINY)
     return len(aim) * float(gains @ noise) / max(left - less, TINY)
+
+
+def forces_read(terms: Sequence[Candidate]) -> list[str | None]:
+    """Return of each column of effects the force whose reading it is made of, or None."""
+    forces = [next((c for _, c in term.channels if c in FORCES), None) for term in terms]
+    sizes = [len(term.effect.amplitudes) for term in terms]
+    return [force for force, size in zip(forces, sizes, strict=True) for _ in range(size)]
 
 
 def own_share(balance: Balance) -> float:
@@ -105,16 +128,12 @@ def own_share(balance: Balance) -> float:
     """
     base = np.vstack(balance.base(balance.terms))
     shares = [1.0]
-    for k in np.flatnonzero(_reads_force(balance.terms)):
+    for k, force in enumerate(forces_read(balance.terms)):
+        if force is None:
+            continue
         own = _beside(np.delete(base, k, axis=1), base[:, [k]])
         shares.append(float(np.sum(own**2) / max(np.sum(base[:, k] ** 2), TINY)))
     return min(shares)
-
-
-def _reads_force(terms: Sequence[Candidate]) -> NDArray[np.bool_]:
-    """Say of each column of effects whether it is made of a force's reading."""
-    sizes = [len(term.effect.amplitudes) for term in terms]
-    return np.repeat([any(c in FORCES for _, c in term.channels) for term in terms], sizes)
 
 
 def _solved(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
@@ -123,13 +142,31 @@ def _solved(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
     return weights, float(1.0 + weights @ (gram @ weights - 2.0 * right))
 
 
-def _noise_power(columns: Sequence[FloatArray], k: int) -> float:
-    """Return the power of white noise in a column, by its third differences; a filter lowers it.
+def _noise_power(runs: Sequence[Run], column: Sequence[FloatArray], force: str) -> float:
+    """Return the power of the noise in a column made of a force, white and slow.
 
-    By their median: a few sharp turns do not count as noise.
+    It is what motion and the other forces do not tell of the column in a stretch where that goes
+    its way smoothly: the median stretch, since a few sharp turns are no noise.
     """
-    jumps = np.concatenate([np.diff(c[:, k], 3) for c in columns])
-    return float(np.median(jumps**2)) / (MEDIAN_OF_SQUARE * 20.0)
+    others = [f for f in FORCES if f != force and all(f in run.channels for run in runs)]
+    told = [_told_by_motion(run, others) for run in runs]
+    weights = least_squares(np.vstack(told), np.concatenate(column))
+    left = [values - table @ weights for values, table in zip(column, told, strict=True)]
+    cut = [values[: len(values) // STRETCH * STRETCH].reshape(-1, STRETCH) for values in left]
+    course, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, STRETCH), BEND + 1))
+    stretches = np.vstack(cut)
+    rough = stretches - stretches @ course @ course.T
+    powers = np.sum(rough**2, axis=1) / (STRETCH - BEND - 1)
+    return float(np.median(powers)) if len(powers) else 0.0
+
+
+def _told_by_motion(run: Run, forces: Sequence[str]) -> FloatArray:
+    """Return the instruments of a run at its regressed samples; forces alone where none moves."""
+    if instruments(run.channels):
+        told = instrument_columns(run.channels, forces)
+    else:
+        told = np.column_stack([np.ones(len(run.valid)), *(run.channels[f] for f in forces)])
+    return run.centred(told)
 
 
 def _noisy(terms: Iterable[Candidate]) -> set[str]:

@@ -14,9 +14,8 @@ import numpy as np
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
-from estimation.diagnosis.endogeneity import noise_share
+from estimation.diagnosis.endogeneity import forces_read, noise_share
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
-from estimation.diagnosis.instruments import FORCES
 from estimation.diagnosis.variables import Basis, bases
 from estimation.recording import FloatArray
 
@@ -130,7 +129,7 @@ def best_map(
 
 def _is_of_noise(balance: Balance, terms: Sequence[Candidate], found: Map) -> bool:
     """Say whether a map tells a force in place of its sensor, without that sensor's noise."""
-    if any(basis.channel in FORCES for basis in found.bases):
+    if {basis.channel for basis in found.bases} & {*forces_read(terms)}:
         return False  # it reads that sensor, noise and all
     parts = zip(*(_thinned(balance, basis) for basis in found.bases), strict=True)
     columns = [_centred(_products(part), balance.demean) for part in parts]

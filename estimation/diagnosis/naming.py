@@ -8,7 +8,7 @@ import numpy as np
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.evidence import Losses, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map
-from estimation.diagnosis.rivals import Beside, Tried, beaten, better, rivals_of, tried
+from estimation.diagnosis.rivals import Beside, Tried, beaten, better, rivals_of, tried, with_alike
 from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.variables import variables_of, within
 from estimation.recording import FloatArray
@@ -74,7 +74,9 @@ def searched(search: Search) -> Discovery:
     contests: dict[int, Contest] = {}
     for k in range(len(stay)):
         contests[k] = _contest(search, stay, k)
-        if (best := better(search, *contests[k].rivalry, contests[k].others)) is not None:
+        own, rivals = contests[k].rivalry
+        shown = [r for r in rivals if r.shown]
+        if (best := better(search, own, shown, contests[k].others)) is not None:
             stay[k] = best
             contests = {}  # what stood beside this effect was held against another one
     named = [
@@ -97,7 +99,8 @@ def _contest(search: Search, found: Sequence[Candidate], k: int) -> Contest:
 
 def _named(search: Search, trial: Trial, contest: Contest) -> Named:
     """Ask what else an effect could be, how sure its name is, and whether a map does better."""
-    (own, rivals), others = contest.rivalry, contest.others
+    (own, offered), others = contest.rivalry, contest.others
+    rivals = [r for r in offered if r.shown]
     mine = own.plain
     total, gain = mine.base[:, 0], float(mine.gain[0, 0])
     near = [
@@ -107,6 +110,8 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
         and runs_agree(total, r.losses) <= search.gates.agree
         and (search.hardly_told or not beaten(search, own, r))
     ]
+    if near:
+        near = with_alike(near, own, offered)
     near.sort(key=lambda r: float(r.losses.sum()))
     wins = _wins(own.losses, [r.losses for r in rivals], search.seed)
     terms = [*search.balance.terms, *others]

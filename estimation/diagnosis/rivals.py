@@ -7,6 +7,8 @@ is given any form a little bent, and the one that is clearly better then has the
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.evidence import Losses, leave_one_run_out, runs_agree
@@ -18,6 +20,9 @@ MOST = 8
 
 ROUGHLY = 0.8
 """Share of the least gain of a rival above which it is worth polishing."""
+
+ALIKE = 0.85
+"""Squared cosine of what two effects add above which they do the same on these runs."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +54,15 @@ class Tried:
         candidate: The effect at its own best shape.
         plain: Losses without it and with it.
         bent: Squared error of each run left out in any form a little bent, shape (runs,).
+        added: What it adds that nothing beside it does, over all runs, shape (n,).
+        shown: Whether the runs show it as what it is.
     """
 
     candidate: Candidate
     plain: Losses
     bent: FloatArray
+    added: FloatArray
+    shown: bool = True
 
     @property
     def losses(self) -> FloatArray:
@@ -65,14 +74,25 @@ class Tried:
         one, two = ({name for _, name in t.candidate.channels} for t in (self, other))
         return one == two
 
+    def does_as(self, other: "Tried") -> bool:
+        """Say whether two effects do the same on these runs."""
+        size = float(self.added @ self.added) * float(other.added @ other.added)
+        return float(self.added @ other.added) ** 2 >= ALIKE * size > 0
 
-def tried(search: Search, beside: Beside, candidate: Candidate) -> Tried:
+
+def tried(search: Search, beside: Beside, candidate: Candidate, shown: bool = True) -> Tried:
     """Put an effect beside others."""
     block = search.balance.columns([candidate])
     aims = [r[:, None] for r in beside.left]
     plain = leave_one_run_out(beside.base, block, [block[0].shape[1]], aims)
     bent = bent_losses(search.balance, beside.base, candidate, beside.left)
-    return Tried(candidate, plain, bent.joint[:, 0, 0])
+    added = _added(np.vstack(beside.base), np.vstack(block), np.concatenate(beside.left))
+    return Tried(candidate, plain, bent.joint[:, 0, 0], added, shown)
+
+
+def _added(base: FloatArray, columns: FloatArray, aim: FloatArray) -> FloatArray:
+    own = columns - base @ np.linalg.lstsq(base, columns, rcond=1e-10)[0]
+    return np.asarray(own @ np.linalg.lstsq(own, aim, rcond=1e-10)[0])
 
 
 def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> list[Tried]:
@@ -89,10 +109,26 @@ def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> 
         if rival.family == named.family or rival.gain < ROUGHLY * search.gates.rival * gain:
             continue
         best = _polished(search, beside.others, rival.candidates[0])
-        if search.shows(best) or best.family in named.effect.same_as:
-            found.append(tried(search, beside, best))
-        if len(found) == MOST:
+        shown = search.shows(best) or best.family in named.effect.same_as
+        found.append(tried(search, beside, best, shown))
+        if sum(r.shown for r in found) == MOST:
             break
+    return found
+
+
+def with_alike(near: Sequence[Tried], named: Tried, rivals: Sequence[Tried]) -> list[Tried]:
+    """Return unbeaten rivals and all that do on these runs what one of them does.
+
+    At one speed friction that grows with the load does what it does when it grows with both: where
+    one of the two is possible, so is the other, though the runs do not show it as what it is.
+    """
+    found = list(near)
+    unbeaten = {rival.candidate for rival in near}
+    for rival in rivals:
+        if rival.candidate in unbeaten:
+            continue
+        if any(rival.does_as(one) for one in (named, *found)):
+            found.append(rival)
     return found
 
 
