@@ -28,6 +28,8 @@ class Gates:
             rig with nothing missing, three seeds, no twins).
         near: An effect that passes is taken before one that gains more and does not, when it has at
             least this share of that gain.
+        together: A pair is taken in place of a first effect that passes when it leaves at most this
+            share of what that effect and the best one after it leave.
         some: Least share of squared error removed by what does not help in run after run, for it to
             be told as something missing.
         even: And the p-value over the runs at which it harms as many as it helps.
@@ -39,6 +41,8 @@ class Gates:
             there, and no map withdraws one.
         leftover: Least share that an effect has in what all found in a balance remove together:
             what a name's form leaves of its own cause is no second cause.
+        most_left: Unless it removes at least this share of what the others leave: a form that is
+            off leaves a little of many things (at most a third, 21 single effects).
         in_motion: What removes less than this share of the squared error in motion on the confirm
             runs must not add to that over all samples. At rest friction holds any torque, and what
             is clear in motion may be wrong there.
@@ -66,12 +70,14 @@ class Gates:
     sure: float = 0.9
     map_floor: float = 0.2
     near: float = 0.7
+    together: float = 0.8
     some: float = 0.1
     even: float = 0.5
     kept: float = 0.5
     noise: float = 0.2
     told: float = 0.01
     leftover: float = 0.15
+    most_left: float = 0.5
     in_motion: float = 0.1
     mapped: float = 2 / 3
     at_rest: float = 0.5

@@ -105,12 +105,12 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
     total, gain = mine.base[:, 0], float(mine.gain[0, 0])
     near = [
         r
-        for r in rivals
+        for r in (offered if search.hardly_told else rivals)
         if 1 - r.losses.sum() / total.sum() >= search.gates.rival * gain
         and runs_agree(total, r.losses) <= search.gates.agree
         and (search.hardly_told or not beaten(search, own, r))
     ]
-    if near:
+    if any(r.candidate.family not in own.candidate.effect.same_as for r in near):
         near = with_alike(near, own, offered)
     near.sort(key=lambda r: float(r.losses.sum()))
     wins = _wins(own.losses, [r.losses for r in rivals], search.seed)

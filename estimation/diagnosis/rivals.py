@@ -21,7 +21,7 @@ MOST = 8
 ROUGHLY = 0.8
 """Share of the least gain of a rival above which it is worth polishing."""
 
-ALIKE = 0.85
+ALIKE = 0.9
 """Squared cosine of what two effects add above which they do the same on these runs."""
 
 

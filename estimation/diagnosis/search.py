@@ -113,8 +113,8 @@ class Search:
             ranked = self.ranked(found, self.gates.draws)
             ranking = ranking or ranked
             trial = self._best(ranked, found)
-            if trial is not None and not found and not trial.passes(self.gates):
-                trial = self._pair(ranked) or trial
+            if trial is not None and not found:
+                trial = self._pair(ranked, self._alone(trial, ranked)) or trial
             if trial is None:
                 break
             trial = self._against_twins(trial)
@@ -262,24 +262,41 @@ class Search:
         left = aim - columns @ np.linalg.lstsq(columns, aim, rcond=1e-10)[0]
         return float(left @ left)
 
-    def _pair(self, ranked: Sequence[Trial]) -> Trial | None:
-        """Return the best pair of effects that mask one another, if it passes every gate."""
+    def _alone(self, first: Trial, ranked: Sequence[Trial]) -> float:
+        """Return the gain above which a pair is taken in place of the best first step.
+
+        Where that step passes, what it and the best one after it remove: two effects that mask one
+        another together lead the search to a third that has a little of both.
+        """
+        if not first.passes(self.gates):
+            return 1.2 * ranked[0].gain + self.gates.floor
+        left = 1.0 - first.gain
+        if second := next(iter(self.ranked(first.candidates, 0)), None):
+            left *= float(second.losses.sum() / first.losses.sum())
+        return 1.0 - self.gates.together * left
+
+    def _pair(self, ranked: Sequence[Trial], least: float) -> Trial | None:
+        """Return the best pair of effects of at least this gain, if it passes every gate."""
         tops = [t.candidates[0] for t in ranked[:12]]
         pairs = [p for p in itertools.combinations(tops, 2) if not related(*p)]
         if not pairs:
             return None
         terms = self.balance.terms
         left = self.balance.left(terms)
-        drawn = surrogates(left, self.gates.draws, self.seed + 1)
-        aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
+        base = self.balance.base(terms)
         blocks = [self.balance.columns(pair) for pair in pairs]
         joined = [np.hstack(parts) for parts in zip(*blocks, strict=True)]
         sizes = [block[0].shape[1] for block in blocks]
-        losses = leave_one_run_out(self.balance.base(terms), joined, sizes, aims)
+        plain = leave_one_run_out(base, joined, sizes, [r[:, None] for r in left])
+        if plain.gain.max() < least:
+            return None
+        drawn = surrogates(left, self.gates.draws, self.seed + 1)
+        aims = [np.column_stack([r, s]) for r, s in zip(left, drawn, strict=True)]
+        losses = leave_one_run_out(base, joined, sizes, aims)
         null: FloatArray = losses.gain[:, 1:].max(axis=0)
         for k in np.argsort(-losses.gain[:, 0])[:5]:
             trial = self._trial(pairs[k], losses, int(k), null)
-            worth = trial.gain >= 1.2 * ranked[0].gain + self.gates.floor
+            worth = trial.gain >= least
             if not (worth and trial.passes(self.gates) and self._signs_hold(terms, pairs[k])):
                 continue
             if not self._hangs_on_noise(trial, ()):
@@ -290,15 +307,18 @@ class Search:
         """Return the places of the effects that are still needed beside the others."""
         kept = list(range(len(found)))
         while len(kept) > 1:
-            gains = {}
+            gains, shares = {}, {}
             for k in kept:
                 losses = self.beside(found, kept, k)
                 loss, joint = losses.base[:, 0], losses.joint[:, 0, 0]
                 enough = runs_agree(loss, joint) <= self.gates.agree
                 gains[k] = float(loss.sum() - joint.sum()) if enough else -1.0
+                shares[k] = gains[k] / float(loss.sum())
             weakest = min(kept, key=lambda k: gains[k])
-            least = max(self.floor, self.gates.leftover * self._explained(found, kept))
-            if gains[weakest] >= least:
+            small = gains[weakest] < self.gates.leftover * self._explained(found, kept)
+            if gains[weakest] >= self.floor and not (
+                small and shares[weakest] < self.gates.most_left
+            ):
                 break
             kept.remove(weakest)
         return kept
