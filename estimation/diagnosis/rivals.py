@@ -155,14 +155,21 @@ def beaten(search: Search, named: Tried, rival: Tried) -> bool:
 def better(
     search: Search, named: Tried, rivals: Sequence[Tried], others: Sequence[Candidate]
 ) -> Candidate | None:
-    """Return the rival of other channels that does clearly better in any form, or None."""
+    """Return the rival of other channels that does better, or None.
+
+    Clearly better in any form; or unbeaten, and better both as it is and in any form: of two that
+    the runs do not tell apart the likelier one leads.
+    """
     offered = [
         r
         for r in rivals
         if not r.depends_as(named) and not any(related(r.candidate, f) for f in others)
     ]
     best = min(offered, key=lambda r: float(r.bent.sum()), default=None)
-    if best is None or best.bent.sum() > search.gates.veto * named.bent.sum():
+    if best is None:
         return None
-    agreed = runs_agree(named.bent, best.bent) <= search.gates.agree
-    return best.candidate if agreed else None
+    clearly = best.bent.sum() <= search.gates.veto * named.bent.sum()
+    if clearly and runs_agree(named.bent, best.bent) <= search.gates.agree:
+        return best.candidate
+    less = best.bent.sum() < named.bent.sum() and best.losses.sum() < named.losses.sum()
+    return best.candidate if less and not beaten(search, named, best) else None
