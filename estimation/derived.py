@@ -272,7 +272,7 @@ def zero_phase_channels(
     measured = {name: recording[name] for name in measured_channels(wanted)}
     filtered = filter_recording(replace(recording, columns=measured), low_pass)
     period_s = 1.0 / recording.sample_rate_hz
-    ticks = np.rint((recording.time_s - recording.time_s[0]) / period_s).astype(np.int64)
+    ticks = recording.ticks
     whole = {
         name: np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
         for name, values in filtered.columns.items()

@@ -226,7 +226,7 @@ def filter_recording(recording: Recording, low_pass: LowPass = PAPER) -> Recordi
     """
     rate_hz = recording.sample_rate_hz
     names = list(recording.columns)
-    ticks = np.rint((recording.time_s - recording.time_s[0]) * rate_hz).astype(np.int64)
+    ticks = recording.ticks
     if ticks[-1] > 10 * len(recording) or np.any(np.diff(ticks) < 1):
         raise FilterError(
             f"The clock of run {recording.name!r} does not tick evenly.",

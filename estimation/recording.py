@@ -214,6 +214,15 @@ class Recording:
             raise RecordingError(f"Run {self.name!r} has {len(self)} samples: no sample rate.")
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """Periods since the first sample, shape (n,).
+
+        Counted from sample to sample: over a long run the median period is off by more than one.
+        """
+        steps = np.rint(np.diff(self.time_s) * self.sample_rate_hz)
+        return np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
+
     def at(self, places: NDArray[np.intp]) -> "Recording":
         """Return the samples at these places alone, in their order, shape (k,)."""
         return replace(

@@ -16,12 +16,14 @@ from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.instruments import (
+    ACCELERATION,
+    ANGLE,
     FORCES,
+    SPEED,
     Fit,
     as_told,
     fitted,
     instrument_columns,
-    instruments,
 )
 from estimation.diagnosis.least_squares import least_squares, orthonormal
 from estimation.recording import FloatArray
@@ -146,10 +148,14 @@ def _noise_power(runs: Sequence[Run], column: Sequence[FloatArray], force: str) 
     """Return the power of the noise in a column made of a force, white and slow.
 
     It is what motion and the other forces do not tell of the column in a stretch where that goes
-    its way smoothly: the median stretch, since a few sharp turns are no noise.
+    its way smoothly: the median stretch, since a few sharp turns are no noise. 0 where the motion
+    of the motor is not measured: nothing then says what is noise.
     """
-    others = [f for f in FORCES if f != force and all(f in run.channels for run in runs)]
-    told = [_told_by_motion(run, others) for run in runs]
+    there = set.intersection(*({*run.channels} for run in runs))
+    if not {SPEED, ACCELERATION, ANGLE} <= there:
+        return 0.0
+    others = [f for f in FORCES if f in there and f != force]
+    told = [run.centred(instrument_columns(run.channels, others)) for run in runs]
     weights = least_squares(np.vstack(told), np.concatenate(column))
     left = [values - table @ weights for values, table in zip(column, told, strict=True)]
     cut = [values[: len(values) // STRETCH * STRETCH].reshape(-1, STRETCH) for values in left]
@@ -158,15 +164,6 @@ def _noise_power(runs: Sequence[Run], column: Sequence[FloatArray], force: str) 
     rough = stretches - stretches @ course @ course.T
     powers = np.sum(rough**2, axis=1) / (STRETCH - BEND - 1)
     return float(np.median(powers)) if len(powers) else 0.0
-
-
-def _told_by_motion(run: Run, forces: Sequence[str]) -> FloatArray:
-    """Return the instruments of a run at its regressed samples; forces alone where none moves."""
-    if instruments(run.channels):
-        told = instrument_columns(run.channels, forces)
-    else:
-        told = np.column_stack([np.ones(len(run.valid)), *(run.channels[f] for f in forces)])
-    return run.centred(told)
 
 
 def _noisy(terms: Iterable[Candidate]) -> set[str]:

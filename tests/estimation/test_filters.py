@@ -159,6 +159,17 @@ def test_a_clock_that_jumps_is_named():
         filter_recording(Recording("r", time_s, {"fsr_v": np.zeros(200)}))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_clock_of_its_own_that_jitters_is_even(seed):
+    random = np.random.default_rng(seed)
+    count = 14_000
+    skew = 1.0 + 1e-4 * random.uniform(-1.0, 1.0)
+    time_s = np.arange(count) * PERIOD_S * skew + 2e-5 * random.uniform(-1.0, 1.0, count)
+    run = Recording("r", time_s, {"fsr_v": random.normal(size=count)})
+    assert np.array_equal(run.ticks, np.arange(count))
+    assert len(filter_recording(run)) == count
+
+
 WANTED = ["motor_velocity_rad_s", "spindle_acceleration_rad_s2", "gearbox_differential_rad"]
 WANTED_LIVE = [*WANTED, "spindle_travel_rad"]
 
