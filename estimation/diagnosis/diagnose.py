@@ -175,7 +175,7 @@ def _balance(
     twin = None
     if maker is not None:
         source = maker(fitted, discover)
-        twin = Bootstrap(source, fitted, tried, wanted, gates.chance, mapper).p_value
+        twin = Bootstrap(source, fitted, tried, wanted, gates, mapper).p_value
     discovery = searched(Search(seen, tried, gates, sealed.seed, twin))
     share = own_share(seen)
     claims = claims_of(discovery, seen, gates, len(runs) >= LEAST_TO_NAME, share >= gates.told)

@@ -1,7 +1,7 @@
 """The search: which effect of the catalogue removes the residual, and whether that is proved."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -155,8 +155,10 @@ class Search:
         return best
 
     def _hangs_on_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
-        if not trial.passes(self.gates):
-            return False  # it is refused for less
+        # else it is refused for less
+        return trial.passes(self.gates) and self._is_of_noise(trial, found)
+
+    def _is_of_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
         terms = [*self.balance.terms, *found]
         noise = noise_share(self.balance, terms, self.balance.columns(trial.candidates))
         if noise > self.gates.noise:
@@ -176,15 +178,21 @@ class Search:
 
     def ranked(self, found: Sequence[Candidate], count: int) -> list[Trial]:
         """Return each admissible family's best trial beside what is found, best first."""
+        return list(self._admissible(found, count))
+
+    def largest(self) -> Trial | None:
+        """Return what the search would take first, without asking whether it is chance."""
+        return next((t for t in self._admissible([], 0) if not self._is_of_noise(t, [])), None)
+
+    def _admissible(self, found: Sequence[Candidate], count: int) -> Iterator[Trial]:
         losses, null = self._scored([*self.balance.terms, *found], count)
         gains = losses.gain[:, 0]
-        order = np.argsort(-gains)
-        trials: dict[str, Trial] = {}
+        seen: set[str] = set()
         refused: dict[str, int] = {}
-        for k in order:
+        for k in np.argsort(-gains):
             candidate = self.pool[k]
             family = candidate.family
-            if family in trials or refused.get(family, 0) > 3 or gains[k] <= 0:
+            if family in seen or refused.get(family, 0) > 3 or gains[k] <= 0:
                 continue
             if candidate.is_limit:
                 continue
@@ -195,8 +203,8 @@ class Search:
             if not self._signs_hold([*self.balance.terms, *found], [candidate]):
                 refused[family] = refused.get(family, 0) + 1
                 continue
-            trials[family] = self._trial((candidate,), losses, k, null)
-        return list(trials.values())
+            seen.add(family)
+            yield self._trial((candidate,), losses, int(k), null)
 
     def _too_large(self, found: Sequence[Candidate]) -> bool:
         """Say whether the model with these effects has more parameters than allowed."""

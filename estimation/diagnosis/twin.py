@@ -13,9 +13,10 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance, lay_out
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.design import Mapper, Run, prepare, tables
-from estimation.diagnosis.evidence import leave_one_run_out
+from estimation.diagnosis.design import Mapper, Run, prepare
+from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.instruments import projection, stand_in
+from estimation.diagnosis.search import Search
 from estimation.model import Model
 from estimation.recording import Recording
 
@@ -42,7 +43,7 @@ class Bootstrap:
         model: Fitted declared model.
         pool: The catalogue's candidates.
         channels: Channels to prepare.
-        level: P-value that decides.
+        gates: What an effect must pass; its chance is the p-value that decides.
         mapper: Maps over seeds; an executor's makes it parallel, then `twin` must be picklable.
         falls: Of each twin so far the catalogue's largest fall of mean squared error, and the
             largest share of it that any candidate removes.
@@ -52,7 +53,7 @@ class Bootstrap:
     model: Model
     pool: Sequence[Candidate]
     channels: Sequence[str]
-    level: float
+    gates: Gates
     mapper: Mapper = map
     falls: list[tuple[float, float]] = field(default_factory=list)
 
@@ -64,7 +65,9 @@ class Bootstrap:
         """
         while not self._decided(fall, share):
             seeds = range(len(self.falls), len(self.falls) + BATCH)
-            work = partial(largest_fall, self.twin, self.model, self.pool, self.channels)
+            work = partial(
+                largest_fall, self.twin, self.model, self.pool, self.channels, self.gates
+            )
             self.falls += list(self.mapper(work, seeds))
         return max(self._p(0, fall), self._p(1, share))
 
@@ -80,11 +83,11 @@ class Bootstrap:
     def _decided(self, fall: float, share: float) -> bool:
         done = len(self.falls)
         worst = max(self._above(0, fall), self._above(1, share))
-        if (1 + worst) / (1 + MOST) > self.level:
+        if (1 + worst) / (1 + MOST) > self.gates.chance:
             return True
         if done < LEAST:
             return False
-        won = (1 + worst) / (1 + done) <= self.level
+        won = (1 + worst) / (1 + done) <= self.gates.chance
         clear = worst == 0 and max(self._tail(0, fall), self._tail(1, share)) < CLEAR
         return won or clear or done >= MOST
 
@@ -93,15 +96,20 @@ class Bootstrap:
         found = np.array([pair[k] for pair in self.falls])
         spread = float(np.std(found, ddof=1)) * math.sqrt(6) / math.pi
         middle = float(np.mean(found)) - 0.5772 * spread
-        if spread <= 0:
-            return 1.0
+        if spread <= 0:  # as where no twin shows anything that the search would take
+            return 0.0 if value > middle else 1.0
         return float(-np.expm1(-np.exp(-min((value - middle) / spread, 700.0))))
 
 
 def largest_fall(
-    twin: Twin, model: Model, pool: Sequence[Candidate], channels: Sequence[str], seed: int
+    twin: Twin,
+    model: Model,
+    pool: Sequence[Candidate],
+    channels: Sequence[str],
+    gates: Gates,
+    seed: int,
 ) -> tuple[float, float]:
-    """Return the largest fall of mean squared error the catalogue reaches on one twin.
+    """Return the fall of mean squared error of what the search takes first on one twin.
 
     And the share of that error that falls.
 
@@ -110,17 +118,18 @@ def largest_fall(
         model: Fitted declared model.
         pool: The catalogue's candidates.
         channels: Channels to prepare.
+        gates: What keeps an effect from being taken: its signs, and a sensor's noise.
         seed: Seed of the twin.
     """
     runs = [coarse(prepare(recording, channels, model)) for recording in twin(seed)]
     told, standing = projection(runs, pool, model.target), stand_in(runs, model.target)
     balance: Balance = lay_out(model, [told(standing(run)) for run in runs])
-    table = tables(balance.runs, pool, balance.demean)
-    aims = [r[:, None] for r in balance.left(balance.terms)]
-    sizes = [len(c.effect.amplitudes) for c in pool]
-    losses = leave_one_run_out(balance.base(balance.terms), table, sizes, aims)
-    fall = losses.base.sum() - losses.joint[:, :, 0].sum(axis=0).min()
-    return float(fall) / sum(len(y) for y in balance.target), float(fall / losses.base.sum())
+    search = Search(balance, list(pool), gates)
+    trial = search.largest()
+    if trial is None:
+        return 0.0, 0.0
+    samples = sum(len(y) for y in balance.target)
+    return trial.worth * search.declared_loss / samples, trial.gain
 
 
 def coarse(run: Run) -> Run:

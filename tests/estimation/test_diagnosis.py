@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.diagnosis.balance import lay_out
+from estimation.diagnosis.candidate import pool
+from estimation.diagnosis.design import prepare
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.limits import limits
+from estimation.diagnosis.search import Search
 from estimation.diagnosis.split import SplitError, data_hash, split
 from estimation.diagnosis.variables import bases
 from estimation.errors import EstimationError
+from estimation.fitting import fit
 from estimation.recording import Flag, Instrument, Stretch
 from tests.estimation import synthetic
 
@@ -91,6 +97,47 @@ def test_a_formula_stands_beside_a_name_for_what_its_equation_leaves_of_its_own_
         assert f"{term.values['amplitude'].value:.3g} " in finding.form
     assert "motor_angle" in finding.form
     assert model_file.parse(model_file.to_toml(fitted)) == fitted
+
+
+def spring_and_ripple(motor_rad, speed_rad_s, load_n_m):
+    return spring(motor_rad, speed_rad_s, load_n_m) + 0.0025 * np.sin(3 * motor_rad)
+
+
+def test_a_small_second_cause_is_told_where_it_is_most_of_what_the_first_leaves():
+    diagnosis, _ = diagnosed(runs(spring_and_ripple))
+    assert {f.family for f in diagnosis.findings} == {"spring.position", "ripple.motor"}
+    assert {f.verdict for f in diagnosis.findings} == {"identified"}
+
+
+@pytest.mark.parametrize(
+    ("together", "first"),
+    [
+        (0.8, {"friction.drag", "friction.stribeck"}),
+        (0.0, {"friction.dwell"}),  # what misleads a search by single steps
+    ],
+)
+def test_two_effects_that_mask_one_another_are_found_together(together, first):
+    recordings = runs(count=8)
+    measured = sorted(recordings[0].columns)
+    offered = [
+        candidates[len(candidates) // 2]
+        for name in ("friction.drag", "friction.stribeck", "friction.dwell")
+        if (candidates := [c for c in pool(MOTOR, measured) if c.id == name and not c.is_limit])
+    ]
+    wanted = [MOTOR.target, *MOTOR.channels, *(name for c in offered for _, name in c.channels)]
+    made = [prepare(recording, list(dict.fromkeys(wanted)), MOTOR) for recording in recordings]
+    balance = lay_out(fit(MOTOR, Campaign.of(recordings), bootstrap=0), made)
+    base = np.vstack(balance.base(balance.terms))
+    torque = np.zeros(len(base))
+    for candidate in offered[:2]:  # as much of the one as of the other
+        column = np.vstack(balance.columns([candidate]))[:, 0]
+        own = column - base @ np.linalg.lstsq(base, column, rcond=1e-10)[0]
+        torque += 0.01 * np.sqrt(len(own)) * column / np.linalg.norm(own)
+    cuts = np.cumsum([len(y) for y in balance.target])[:-1]
+    target = [y + t for y, t in zip(balance.target, np.split(torque, cuts), strict=True)]
+    gates = replace(QUICK, together=together)
+    _, trials, _, _ = Search(replace(balance, target=target), offered, gates).forwards()
+    assert {c.family for c in trials[0].candidates} == first
 
 
 def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():

@@ -171,8 +171,11 @@ def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
     assert bent.joint.sum() < 0.7 * plain.joint.sum()
 
 
+@pytest.mark.parametrize("slow", [False, True])
 @pytest.mark.parametrize("slips", [False, True])
-def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effect_does_not(slips):
+def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effect_does_not(
+    slips, slow
+):
     def ripple(motor, speed, load):
         return 2e-3 * np.sin(0.3 * motor)
 
@@ -180,6 +183,8 @@ def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effe
     for k in range(5):
         clean = pushed(run(f"r{k}", 0.1, 0.05, seed=3, extra=ripple if slips else None))
         noise = 4 * NOISE_A * np.random.default_rng(100 + k).normal(size=len(clean))
+        if slow:  # of a time constant of 50 ms, and the same power below the filter
+            noise = signal.lfilter([0.1], [1.0, -0.98], noise)
         runs.append(clean.with_columns(**{CURRENT: clean[CURRENT] + noise}))
     model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
     wanted = [*model.channels, model.target, "motor_angle_rad", CURRENT]
@@ -193,7 +198,7 @@ def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effe
         found = columns(np.sin(0.3 * clean["motor_angle_rad"]))
         assert noise_share(balance, balance.terms, found) < 0.1
     else:  # all runs are alike, so the place in a run tells the current
-        assert noise_share(balance, balance.terms, columns(clean[CURRENT])) > 0.5
+        assert noise_share(balance, balance.terms, columns(clean[CURRENT])) > 0.4
 
 
 def pushed(recording: Recording) -> Recording:
