@@ -46,8 +46,8 @@ BEHIND = {"motor": ("jaw_angle",), "gearbox": ("jaw_angle",), "cable": ("current
 """Variables that reach a balance only through its load, and would stand for that load; and the
 current in the cable's, where it tells the target: whatever the cable lacks is in it."""
 
-ANGLES = {"spindle_angle", "jaw_angle", "motor_angle"}
-"""Angles of one rig move together."""
+TOGETHER = ({"spindle_angle", "jaw_angle", "motor_angle"}, {"load", "current"})
+"""Variables of one rig that move together: its angles, and what the motor holds by its current."""
 
 OF_SPEED = ("viscous", "viscous_asymmetry", "drag", "stribeck", "load_viscous")
 """Frictions that go with the speed, not with its sign alone."""
@@ -118,8 +118,8 @@ def variables_of(effect: Candidate, balance: Balance) -> tuple[str, ...]:
 
 
 def within(variables: Sequence[str], others: Collection[str]) -> bool:
-    """Say whether variables are no more than others; the angles of one rig move together."""
-    known = {*others, *(ANGLES if ANGLES & {*others} else ())}
+    """Say whether variables are no more than others, and what moves together with those."""
+    known = {*others}.union(*(group for group in TOGETHER if group & {*others}))
     return {*variables} <= known
 
 
