@@ -29,7 +29,8 @@ class Gates:
         near: An effect that passes is taken before one that gains more and does not, when it has at
             least this share of that gain.
         together: A pair is taken in place of a first effect that passes when it leaves at most this
-            share of what that effect and the best one after it leave.
+            share of what that effect and the best one after it leave, and removes more than these
+            by the floor.
         some: Least share of squared error removed by what does not help in run after run, for it to
             be told as something missing.
         even: And the p-value over the runs at which it harms as many as it helps.
@@ -70,14 +71,14 @@ class Gates:
     sure: float = 0.9
     map_floor: float = 0.2
     near: float = 0.7
-    together: float = 0.8
+    together: float = 0.6
     some: float = 0.1
     even: float = 0.5
     kept: float = 0.5
     noise: float = 0.2
     told: float = 0.01
     leftover: float = 0.15
-    most_left: float = 0.5
+    most_left: float = 0.4
     in_motion: float = 0.1
     mapped: float = 2 / 3
     at_rest: float = 0.5

@@ -281,7 +281,7 @@ class Search:
         left = 1.0 - first.gain
         if second := next(iter(self.ranked(first.candidates, 0)), None):
             left *= float(second.losses.sum() / first.losses.sum())
-        return 1.0 - self.gates.together * left
+        return 1.0 - min(self.gates.together * left, left - self.gates.floor)
 
     def _pair(self, ranked: Sequence[Trial], least: float) -> Trial | None:
         """Return the best pair of effects of at least this gain, if it passes every gate."""

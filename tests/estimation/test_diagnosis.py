@@ -116,7 +116,7 @@ def test_a_small_second_cause_is_told_where_it_is_most_of_what_the_first_leaves(
 @pytest.mark.parametrize(
     ("together", "first"),
     [
-        (0.8, "friction.viscous_asymmetry + spring.position"),
+        (0.6, "friction.viscous_asymmetry + spring.position"),
         (0.0, "friction.drag"),  # what misleads a search by single steps
     ],
 )
