@@ -35,6 +35,9 @@ SHAKEN = ("inertia.missing", UNKNOWN)
 SHAKEN_ECHO, SHAKEN_LARGER = 0.4, 1.5
 """The same for what any motion faster than usual shows: parts that move, and what has no name."""
 
+MOTION = {"velocity", "acceleration"}
+"""Variables of what such a motion alone shows: it has a cause, where another balance names one."""
+
 SAME_RATE = 0.03
 """Two waves are one when their periods a turn differ by less than this share."""
 
@@ -75,11 +78,19 @@ class Told:
     place: int
     share: float
 
+    @property
+    def is_motion(self) -> bool:
+        """Whether it is unnamed and depends on motion alone."""
+        of = {*self.finding.depends_on}
+        return self.finding.family == UNKNOWN and bool(of) and of <= MOTION
+
     def is_surer_than(self, other: "Told") -> bool:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
         if others.family == ENCODER and not others.alternatives and mine.balance in OF_TORQUE:
             return self.share >= ECHO  # no encoder makes a torque
+        if other.is_motion and mine.verdict == "identified":
+            return True
         told = others.family.startswith("sensor.") and _same_sensor(others, mine)
         if told or self.share < NEARLY * other.share:
             return False
@@ -180,8 +191,10 @@ def echoes(causes: Sequence[Told]) -> dict[str, set[int]]:
     for told in causes:
         shaken = told.finding.family in SHAKEN
         most, times = (SHAKEN_ECHO, SHAKEN_LARGER) if shaken else (ECHO, LARGER)
-        larger = (c for c in causes if c.finding.balance != told.finding.balance)
-        if told.share < most and any(c.share > times * told.share for c in larger):
+        larger = [c for c in causes if c.finding.balance != told.finding.balance]
+        named = [c for c in larger if c.finding.verdict == "identified"]
+        echo = told.share < most and any(c.share > times * told.share for c in larger)
+        if echo or (told.is_motion and any(c.share > told.share for c in named)):
             small.setdefault(told.finding.balance, set()).add(told.place)
     return small
 

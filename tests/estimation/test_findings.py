@@ -68,6 +68,18 @@ def test_what_any_faster_motion_shows_is_sooner_taken_for_an_echo(family, small)
     assert bool(echoes([lag, other])) is small
 
 
+@pytest.mark.parametrize(
+    ("depends_on", "echo"),
+    [(("velocity", "acceleration"), True), (("velocity", "spindle_angle"), False)],
+)
+def test_what_has_no_name_and_is_motion_alone_gives_way_to_a_cause_that_has_one(depends_on, echo):
+    unnamed = replace(finding("stretch", "unknown", depends_on), verdict="depends_on")
+    shaking = Told(unnamed, {}, None, 0, 0.6)
+    lag = Told(finding("motor", "motor.electrical"), {}, None, 0, 0.7)
+    assert bool(echoes([lag, shaking])) is echo
+    assert replace(lag, share=0.3).is_surer_than(shaking) is echo
+
+
 def test_findings_come_in_the_order_found_however_much_each_explains():
     small, large = finding("motor", "friction.drag"), finding("motor", "ripple.motor")
     told = [  # in the order of what each explains
