@@ -110,7 +110,8 @@ def _named(search: Search, trial: Trial, contest: Contest) -> Named:
         and runs_agree(total, r.losses) <= search.gates.agree
         and (search.hardly_told or not beaten(search, own, r))
     ]
-    if any(r.candidate.family not in own.candidate.effect.same_as for r in near):
+    same = own.candidate.effect.same_as
+    if any(r.candidate.family not in same and not r.depends_as(own) for r in near):
         near = with_alike(near, own, offered)
     near.sort(key=lambda r: float(r.losses.sum()))
     wins = _wins(own.losses, [r.losses for r in rivals], search.seed)

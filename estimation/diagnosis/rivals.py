@@ -117,15 +117,15 @@ def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> 
 
 
 def with_alike(near: Sequence[Tried], named: Tried, rivals: Sequence[Tried]) -> list[Tried]:
-    """Return unbeaten rivals and all that do on these runs what one of them does.
+    """Return unbeaten rivals and those that do the same, which the runs do not show as they are.
 
     At one speed friction that grows with the load does what it does when it grows with both: where
-    one of the two is possible, so is the other, though the runs do not show it as what it is.
+    one of the two is possible, so is the other.
     """
     found = list(near)
     unbeaten = {rival.candidate for rival in near}
     for rival in rivals:
-        if rival.candidate in unbeaten:
+        if rival.shown or rival.candidate in unbeaten:
             continue
         if any(rival.does_as(one) for one in (named, *found)):
             found.append(rival)
@@ -155,21 +155,29 @@ def beaten(search: Search, named: Tried, rival: Tried) -> bool:
 def better(
     search: Search, named: Tried, rivals: Sequence[Tried], others: Sequence[Candidate]
 ) -> Candidate | None:
-    """Return the rival of other channels that does better, or None.
+    """Return the rival that should have the place of a named effect, or None.
 
-    Clearly better in any form; or unbeaten, and better both as it is and in any form: of two that
-    the runs do not tell apart the likelier one leads.
+    One of other channels that is clearly better in any form; else the likeliest of those that are
+    not beaten and better as they are, and in any form where they read other channels.
     """
-    offered = [
+    offered = [r for r in rivals if not any(related(r.candidate, f) for f in others)]
+    others_best = min(
+        (r for r in offered if not r.depends_as(named)),
+        key=lambda r: float(r.bent.sum()),
+        default=None,
+    )
+    if (
+        others_best is not None
+        and others_best.bent.sum() <= search.gates.veto * named.bent.sum()
+        and runs_agree(named.bent, others_best.bent) <= search.gates.agree
+    ):
+        return others_best.candidate
+    likelier = [
         r
-        for r in rivals
-        if not r.depends_as(named) and not any(related(r.candidate, f) for f in others)
+        for r in offered
+        if r.losses.sum() < named.losses.sum()
+        and (r.depends_as(named) or r.bent.sum() < named.bent.sum())
+        and not beaten(search, named, r)
     ]
-    best = min(offered, key=lambda r: float(r.bent.sum()), default=None)
-    if best is None:
-        return None
-    clearly = best.bent.sum() <= search.gates.veto * named.bent.sum()
-    if clearly and runs_agree(named.bent, best.bent) <= search.gates.agree:
-        return best.candidate
-    less = best.bent.sum() < named.bent.sum() and best.losses.sum() < named.losses.sum()
-    return best.candidate if less and not beaten(search, named, best) else None
+    best = min(likelier, key=lambda r: float(r.losses.sum()), default=None)
+    return best.candidate if best is not None else None

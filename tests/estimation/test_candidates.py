@@ -15,8 +15,8 @@ CHANNELS = ("motor_current_a", "motor_angle_rad", "spindle_angle_rad")
 LINEAR = Model("linear", "motor", "proximal_torque_n_m", (Term(effect("motor.torque_constant")),))
 
 
-def wave(order: float) -> Candidate:
-    return Candidate.of(Term(effect("ripple.output")), [order])
+def wave(order: float, kind: str = "ripple.output") -> Candidate:
+    return Candidate.of(Term(effect(kind)), [order])
 
 
 def swept(span_rad: float, speed_rad_s: float = 10.0) -> Run:
@@ -31,6 +31,13 @@ def swept(span_rad: float, speed_rad_s: float = 10.0) -> Run:
 def test_a_wave_is_only_a_wave_where_a_run_covers_a_period():
     kept = covered([wave(4.0), wave(8.0)], [swept(0.5), swept(1.0)])
     assert [c.shape for c in kept] == [(8.0,)]
+
+
+def test_a_wave_with_harmonics_takes_two_periods():
+    kinds = ("ripple.output", "ripple.output.harmonics")
+    kept = covered([wave(9.0, kind) for kind in kinds], [swept(1.0)])
+    assert [c.id for c in kept] == ["ripple.output"]
+    assert len(covered([wave(13.0, kind) for kind in kinds], [swept(1.0)])) == 2
 
 
 def test_an_effect_without_a_wave_is_always_covered():

@@ -26,8 +26,9 @@ def test_a_set_holds_what_does_the_same_as_one_of_it_though_the_runs_do_not_show
     named = tried("motor.saturation", "motor_current_a", added=(1.0, 0.0))
     unbeaten = tried("friction.load", "proximal_torque_n_m", added=(0.6, 0.8))
     same = tried("friction.load_viscous", "motor_velocity_rad_s", (0.58, 0.82), shown=False)
-    other = tried("motor.thermal", "time_s", added=(-0.6, 0.8))
-    assert with_alike([unbeaten], named, [unbeaten, same, other]) == [unbeaten, same]
+    other = tried("motor.thermal", "time_s", added=(-0.6, 0.8), shown=False)
+    beaten = tried("friction.capstan", "proximal_torque_n_m", added=(0.58, 0.82))
+    assert with_alike([unbeaten], named, [unbeaten, same, other, beaten]) == [unbeaten, same]
 
 
 @pytest.mark.parametrize(
@@ -42,4 +43,11 @@ def test_a_set_holds_what_does_the_same_as_one_of_it_though_the_runs_do_not_show
 def test_the_likelier_of_two_that_are_not_told_apart_leads(left, bent, leads):
     named = tried("motor.saturation", "motor_current_a")
     rival = tried("friction.load", "proximal_torque_n_m", left=left, bent=bent)
+    assert better(SEARCH, named, [rival], []) == (rival.candidate if leads else None)
+
+
+@pytest.mark.parametrize(("left", "leads"), [(0.99, True), (1.01, False)])
+def test_of_two_that_read_the_same_the_form_that_leaves_less_leads(left, leads):
+    named = tried("sensor.lag", "distal_torque_n_m", bent=0.9)
+    rival = tried("sensor.delay", "distal_torque_n_m", left=left, bent=1.0)
     assert better(SEARCH, named, [rival], []) == (rival.candidate if leads else None)
