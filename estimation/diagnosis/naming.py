@@ -1,12 +1,12 @@
 """Naming: what else each effect found could be, how sure its name is, and what is left."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.evidence import Losses, resampled, runs_agree
+from estimation.diagnosis.evidence import Losses, leave_one_run_out, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map
 from estimation.diagnosis.rivals import Beside, Tried, beaten, better, rivals_of, tried, with_alike
 from estimation.diagnosis.search import Search, Trial
@@ -83,10 +83,40 @@ def searched(search: Search) -> Discovery:
         _named(search, trials[j], contests.get(k) or _contest(search, stay, k))
         for k, j in enumerate(kept)
     ]
+    named = withdrawn(named, search)
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
     left = best_map(search.balance, terms, search.gates.draws, search.seed)
     return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+
+
+def withdrawn(named: Sequence[Named], search: Search) -> list[Named]:
+    """Withdraw names too that a map leaves nothing to do, which withdrew those they stood beside.
+
+    Of two effects that together imitate a third neither is there.
+    """
+    maps = [n.veto for n in named if n.veto is not None]
+    if not maps:
+        return list(named)
+    stays = [n.candidate for n in named if n.veto is None]
+    mapped = [
+        np.hstack([run.centred(found.columns(run)) for found in maps])
+        for run in search.balance.runs
+    ]
+    told = []
+    for one in named:
+        if one.veto is None:
+            beside = Beside.of(search, [c for c in stays if c != one.candidate])
+            base = [np.hstack(parts) for parts in zip(beside.base, mapped, strict=True)]
+            block = search.balance.columns([one.candidate])
+            aims = [r[:, None] for r in beside.left]
+            losses = leave_one_run_out(base, block, [block[0].shape[1]], aims)
+            alone, joint = losses.base[:, 0], losses.joint[:, 0, 0]
+            worth = alone.sum() - joint.sum() >= search.floor
+            if not worth or runs_agree(alone, joint) > search.gates.agree:
+                one = replace(one, veto=maps[0])
+        told.append(one)
+    return told
 
 
 def _contest(search: Search, found: Sequence[Candidate], k: int) -> Contest:

@@ -16,9 +16,11 @@ from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.evidence import chance, leave_one_run_out, runs_agree, surrogates
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.limits import limits
-from estimation.diagnosis.search import Search
+from estimation.diagnosis.maps import best_map
+from estimation.diagnosis.naming import Named, withdrawn
+from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import SplitError, data_hash, split
-from estimation.diagnosis.variables import bases
+from estimation.diagnosis.variables import bases, needed_channels
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.recording import Flag, Instrument, Stretch
@@ -99,6 +101,8 @@ def test_a_formula_stands_beside_a_name_for_what_its_equation_leaves_of_its_own_
     assert model_file.parse(model_file.to_toml(fitted)) == fitted
 
 
+MEASURED = ("motor_angle_rad", "motor_current_a", "spindle_angle_rad", "proximal_torque_n_m")
+
 MASKED = np.array([[1.0, 0.0, 0.7], [0.0, 1.0, 0.7], [0.0, 0.0, 0.3]])
 """Three independent columns to two effects and a third that has a little of both."""
 
@@ -140,6 +144,24 @@ def test_two_effects_that_mask_one_another_are_found_together(together, first):
     search = Search(balance, offered, replace(QUICK, together=together))
     search.table = columns
     assert search.forwards()[1][0].family == first
+
+
+def test_a_name_falls_with_the_one_it_stood_beside_where_the_map_leaves_it_nothing():
+    recordings = runs(spring_and_ripple, count=8)
+    wanted = list(
+        dict.fromkeys([MOTOR.target, *MOTOR.channels, *needed_channels("motor", MEASURED)])
+    )
+    made = [prepare(recording, list(dict.fromkeys(wanted)), MOTOR) for recording in recordings]
+    balance = lay_out(fit(MOTOR, Campaign.of(recordings), bootstrap=0), made)
+    search = Search(balance, [], QUICK)
+    flat = best_map(balance, balance.terms, 0, 0, only={"spindle_angle"})
+    kinds = {c.id: c for c in pool(MOTOR, MEASURED) if c.id != "ripple.motor" or c.shape == (3.0,)}
+    names = ("friction.drag", "spring.position", "ripple.motor")
+    trial = Trial((), 0.5, 0.5, np.zeros(8))
+    named = [Named(kinds[name], trial, 0.5) for name in names]
+    left = withdrawn([replace(named[0], veto=flat), *named[1:]], search)
+    assert [n.candidate.family for n in left if n.veto is None] == ["ripple.motor"]
+    assert withdrawn(named, search) == named
 
 
 def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
