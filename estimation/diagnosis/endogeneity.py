@@ -26,6 +26,7 @@ from estimation.diagnosis.instruments import (
     instrument_columns,
 )
 from estimation.diagnosis.least_squares import least_squares, orthonormal
+from estimation.effects.effect import Pointwise
 from estimation.recording import FloatArray
 
 STRETCH = 50
@@ -113,6 +114,19 @@ def noise_share(
     )
     gains = (alone[read] ** 2 - beside[:count][read] ** 2) / np.maximum(power, TINY)
     return len(aim) * float(gains @ noise) / max(left - less, TINY)
+
+
+def bends_force(terms: Sequence[Candidate], added: Sequence[Candidate]) -> bool:
+    """Say whether an effect is a function of a force that declared terms read, sample by sample.
+
+    It then has the noise of that reading as well: what the declared gain loses of it, it has.
+    """
+    read = {*forces_read(terms)}
+    return any(
+        isinstance(c.effect, Pointwise)
+        and any(read & {name, *measured_channels([name])} for _, name in c.channels)
+        for c in added
+    )
 
 
 def forces_read(terms: Sequence[Candidate]) -> list[str | None]:

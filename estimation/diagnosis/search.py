@@ -10,7 +10,7 @@ import numpy as np
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.design import spans_of, tables
-from estimation.diagnosis.endogeneity import kept_share, noise_share, own_share
+from estimation.diagnosis.endogeneity import bends_force, kept_share, noise_share, own_share
 from estimation.diagnosis.evidence import (
     Losses,
     chance,
@@ -160,9 +160,10 @@ class Search:
 
     def _is_of_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
         terms = [*self.balance.terms, *found]
-        noise = noise_share(self.balance, terms, self.balance.columns(trial.candidates))
-        if noise > self.gates.noise:
-            return True
+        if not bends_force(terms, trial.candidates):
+            noise = noise_share(self.balance, terms, self.balance.columns(trial.candidates))
+            if noise > self.gates.noise:
+                return True
         share = kept_share(self.balance, terms, trial.candidates)
         return share is not None and share < self.gates.kept
 
