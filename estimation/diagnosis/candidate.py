@@ -64,8 +64,9 @@ ANGLE_ROLES = ("motor_angle", "output_angle", "encoder")
 LEAST_PERIODS = 1.2
 """Periods of a wave that some run must cover, or it is no wave."""
 
-LEAST_PERIODS_OF_HARMONICS = 2.0
-"""And of one with harmonics, which has any form in a single period."""
+LEAST_PERIODS_OF_A_FAULT = 2.0
+"""And of one with harmonics, which has any form in a single period, or of one that an encoder is
+blamed for: a spring that bends leaves a wave and a half."""
 
 SLOW_TURN = 0.5
 """Share of the usual speed above which a smooth sign of the speed is no sign."""
@@ -152,8 +153,8 @@ class Candidate:
         torques = [spans[r, channel] for r, channel in self.channels if channel.endswith("_n_m")]
         if "order" in shape:
             angle = next(role for role in ANGLE_ROLES if role in span)
-            plain = len(self.effect.amplitudes) <= 2  # a sine and a cosine
-            least = LEAST_PERIODS if plain else LEAST_PERIODS_OF_HARMONICS
+            plain = len(self.effect.amplitudes) <= 2 and not self.family.startswith("sensor.")
+            least = LEAST_PERIODS if plain else LEAST_PERIODS_OF_A_FAULT
             return shape["order"] * span[angle] >= least * 2 * math.pi
         if "width" in shape and "speed" in span and shape["width"] > SLOW_TURN * span["speed"]:
             return False

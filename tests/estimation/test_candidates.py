@@ -16,7 +16,8 @@ LINEAR = Model("linear", "motor", "proximal_torque_n_m", (Term(effect("motor.tor
 
 
 def wave(order: float, kind: str = "ripple.output") -> Candidate:
-    return Candidate.of(Term(effect(kind)), [order])
+    term = Term(effect(kind), channels=dict.fromkeys(effect(kind).roles, "spindle_angle_rad"))
+    return Candidate.of(term, [order])
 
 
 def swept(span_rad: float, speed_rad_s: float = 10.0) -> Run:
@@ -33,8 +34,9 @@ def test_a_wave_is_only_a_wave_where_a_run_covers_a_period():
     assert [c.shape for c in kept] == [(8.0,)]
 
 
-def test_a_wave_with_harmonics_takes_two_periods():
-    kinds = ("ripple.output", "ripple.output.harmonics")
+@pytest.mark.parametrize("other", ["ripple.output.harmonics", "sensor.encoder_inl"])
+def test_a_wave_with_harmonics_or_of_an_encoder_takes_two_periods(other):
+    kinds = ("ripple.output", other)
     kept = covered([wave(9.0, kind) for kind in kinds], [swept(1.0)])
     assert [c.id for c in kept] == ["ripple.output"]
     assert len(covered([wave(13.0, kind) for kind in kinds], [swept(1.0)])) == 2
