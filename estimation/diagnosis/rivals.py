@@ -117,15 +117,15 @@ def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> 
 
 
 def with_alike(near: Sequence[Tried], named: Tried, rivals: Sequence[Tried]) -> list[Tried]:
-    """Return unbeaten rivals and those that do the same, which the runs do not show as they are.
+    """Return unbeaten rivals and all that do on these runs what one of them does.
 
     At one speed friction that grows with the load does what it does when it grows with both: where
-    one of the two is possible, so is the other.
+    one of the two is possible, so is the other, whether or not the runs show it as what it is.
     """
     found = list(near)
     unbeaten = {rival.candidate for rival in near}
     for rival in rivals:
-        if rival.shown or rival.candidate in unbeaten:
+        if rival.candidate in unbeaten:
             continue
         if any(rival.does_as(one) for one in (named, *found)):
             found.append(rival)
