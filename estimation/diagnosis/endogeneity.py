@@ -25,7 +25,7 @@ from estimation.diagnosis.instruments import (
     fitted,
     instrument_columns,
 )
-from estimation.diagnosis.least_squares import least_squares, orthonormal
+from estimation.diagnosis.least_squares import beyond, least_squares, orthonormal
 from estimation.effects.effect import Pointwise
 from estimation.recording import FloatArray
 
@@ -71,7 +71,7 @@ def kept_share(
     count = sum(len(c.effect.amplitudes) for c in added)
     plain = least_squares(seen, aim)[-count:]
     through = least_squares(basis @ (basis.T @ seen), aim)[-count:]
-    own_columns = _beside(seen[:, :-count], seen[:, -count:])
+    own_columns = beyond(seen[:, :-count], seen[:, -count:])
     size, left = own_columns @ plain, own_columns @ through
     return float(size @ left / max(float(size @ size), np.finfo(float).tiny))
 
@@ -147,7 +147,7 @@ def own_share(balance: Balance) -> float:
     for k, force in enumerate(forces_read(balance.terms)):
         if force is None:
             continue
-        own = _beside(np.delete(base, k, axis=1), base[:, [k]])
+        own = beyond(np.delete(base, k, axis=1), base[:, [k]])
         shares.append(float(np.sum(own**2) / max(np.sum(base[:, k] ** 2), TINY)))
     return min(shares)
 
@@ -190,10 +190,3 @@ def _told(run: Run, fits: dict[str, Fit]) -> Run:
     """Return the run with its noisy channels as the other sensors tell them."""
     told = {name: as_told(run, fit) for name, fit in fits.items()}
     return replace(run, channels={**run.channels, **told})
-
-
-def _beside(base: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return what columns have that others do not."""
-    if not base.shape[1]:
-        return columns
-    return np.asarray(columns - base @ np.linalg.lstsq(base, columns, rcond=1e-10)[0])

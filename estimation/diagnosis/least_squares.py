@@ -21,3 +21,10 @@ def orthonormal(columns: FloatArray) -> FloatArray:
     wide = columns[:, scale > 0] / scale[scale > 0]
     left, size, _ = np.linalg.svd(wide, full_matrices=False)
     return np.asarray(left[:, size > ALIKE * size.max(initial=1e-300)])
+
+
+def beyond(base: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return what columns have that others do not, shape (n, k)."""
+    if not base.shape[1]:
+        return columns
+    return np.asarray(columns - base @ np.linalg.lstsq(base, columns, rcond=1e-10)[0])

@@ -12,6 +12,7 @@ import numpy as np
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.evidence import Losses, leave_one_run_out, runs_agree
+from estimation.diagnosis.least_squares import beyond
 from estimation.diagnosis.search import Search
 from estimation.recording import FloatArray
 
@@ -86,13 +87,9 @@ def tried(search: Search, beside: Beside, candidate: Candidate, shown: bool = Tr
     aims = [r[:, None] for r in beside.left]
     plain = leave_one_run_out(beside.base, block, [block[0].shape[1]], aims)
     bent = bent_losses(search.balance, beside.base, candidate, beside.left)
-    added = _added(np.vstack(beside.base), np.vstack(block), np.concatenate(beside.left))
+    own = beyond(np.vstack(beside.base), np.vstack(block))
+    added = own @ np.linalg.lstsq(own, np.concatenate(beside.left), rcond=1e-10)[0]
     return Tried(candidate, plain, bent.joint[:, 0, 0], added, shown)
-
-
-def _added(base: FloatArray, columns: FloatArray, aim: FloatArray) -> FloatArray:
-    own = columns - base @ np.linalg.lstsq(base, columns, rcond=1e-10)[0]
-    return np.asarray(own @ np.linalg.lstsq(own, aim, rcond=1e-10)[0])
 
 
 def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> list[Tried]:

@@ -280,7 +280,7 @@ class Search:
         if not first.passes(self.gates):
             return 1.2 * ranked[0].gain + self.gates.floor
         left = 1.0 - first.gain
-        if second := next(iter(self.ranked(first.candidates, 0)), None):
+        if second := next(self._admissible(first.candidates, 0), None):
             left *= float(second.losses.sum() / first.losses.sum())
         return 1.0 - min(self.gates.together * left, left - self.gates.floor)
 

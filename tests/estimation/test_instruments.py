@@ -198,7 +198,8 @@ def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effe
         found = columns(np.sin(0.3 * clean["motor_angle_rad"]))
         assert noise_share(balance, balance.terms, found) < 0.1
     else:  # all runs are alike, so the place in a run tells the current
-        assert noise_share(balance, balance.terms, columns(clean[CURRENT])) > 0.4
+        least = 0.4 if slow else 0.5  # half a second's course takes some of the slow noise
+        assert noise_share(balance, balance.terms, columns(clean[CURRENT])) > least
 
 
 def pushed(recording: Recording) -> Recording:
