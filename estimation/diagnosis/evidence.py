@@ -80,6 +80,13 @@ def leave_one_run_out(
     return Losses(alone[:, 0], joint)
 
 
+def losses_of(
+    base: Sequence[FloatArray], block: Sequence[FloatArray], left: Sequence[FloatArray]
+) -> Losses:
+    """Score one block of columns beside a base on what that leaves of each run, shape (n,)."""
+    return leave_one_run_out(base, block, [block[0].shape[1]], [r[:, None] for r in left])
+
+
 def _deciding(base: Sequence[FloatArray]) -> NDArray[np.bool_]:
     """Say of each run whether some direction of the base is told by hardly any other."""
     if not base[0].shape[1]:

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.evidence import Losses, leave_one_run_out, resampled, runs_agree
+from estimation.diagnosis.evidence import Losses, losses_of, resampled, runs_agree
 from estimation.diagnosis.maps import Map, best_map
 from estimation.diagnosis.rivals import Beside, Tried, beaten, better, rivals_of, tried, with_alike
 from estimation.diagnosis.search import Search, Trial
+from estimation.diagnosis.steps import backwards, forwards
 from estimation.diagnosis.variables import variables_of, within
 from estimation.recording import FloatArray
 
@@ -68,9 +69,9 @@ class Contest:
 
 def searched(search: Search) -> Discovery:
     """Search forwards, in pairs, and backwards; then ask what else each effect could be."""
-    found, trials, steps, ranking = search.forwards()
-    kept = search.backwards(found)
-    stay = [found[j] for j in kept]
+    made = forwards(search)
+    kept = backwards(search, made.found)
+    stay = [made.found[j] for j in kept]
     contests: dict[int, Contest] = {}
     for k in range(len(stay)):
         contests[k] = _contest(search, stay, k)
@@ -80,14 +81,14 @@ def searched(search: Search) -> Discovery:
             stay[k] = best
             contests = {}  # what stood beside this effect was held against another one
     named = [
-        _named(search, trials[j], contests.get(k) or _contest(search, stay, k))
+        _named(search, made.trials[j], contests.get(k) or _contest(search, stay, k))
         for k, j in enumerate(kept)
     ]
     named = withdrawn(named, search)
     stays = [n.candidate for n in named if n.veto is None]
     terms = [*search.balance.terms, *stays]
     left = best_map(search.balance, terms, search.gates.draws, search.seed)
-    return Discovery(tuple(named), tuple(steps), tuple(ranking), left)
+    return Discovery(tuple(named), tuple(made.steps), tuple(made.ranking), left)
 
 
 def withdrawn(named: Sequence[Named], search: Search) -> list[Named]:
@@ -108,9 +109,7 @@ def withdrawn(named: Sequence[Named], search: Search) -> list[Named]:
         if one.veto is None:
             beside = Beside.of(search, [c for c in stays if c != one.candidate])
             base = [np.hstack(parts) for parts in zip(beside.base, mapped, strict=True)]
-            block = search.balance.columns([one.candidate])
-            aims = [r[:, None] for r in beside.left]
-            losses = leave_one_run_out(base, block, [block[0].shape[1]], aims)
+            losses = losses_of(base, search.balance.columns([one.candidate]), beside.left)
             alone, joint = losses.base[:, 0], losses.joint[:, 0, 0]
             worth = alone.sum() - joint.sum() >= search.floor
             if not worth or runs_agree(alone, joint) > search.gates.agree:

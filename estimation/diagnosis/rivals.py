@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, related
-from estimation.diagnosis.evidence import Losses, leave_one_run_out, runs_agree
+from estimation.diagnosis.evidence import Losses, losses_of, runs_agree
 from estimation.diagnosis.least_squares import beyond
 from estimation.diagnosis.search import Search
 from estimation.recording import FloatArray
@@ -84,8 +84,7 @@ class Tried:
 def tried(search: Search, beside: Beside, candidate: Candidate, shown: bool = True) -> Tried:
     """Put an effect beside others."""
     block = search.balance.columns([candidate])
-    aims = [r[:, None] for r in beside.left]
-    plain = leave_one_run_out(beside.base, block, [block[0].shape[1]], aims)
+    plain = losses_of(beside.base, block, beside.left)
     bent = bent_losses(search.balance, beside.base, candidate, beside.left)
     own = beyond(np.vstack(beside.base), np.vstack(block))
     added = own @ np.linalg.lstsq(own, np.concatenate(beside.left), rcond=1e-10)[0]

@@ -19,6 +19,7 @@ from estimation.diagnosis.frozen import Frozen, Part, freeze
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import Sealed, split
+from estimation.diagnosis.steps import forwards
 from estimation.effects import effect
 from estimation.fitting import fit
 from estimation.model import Model, Term
@@ -220,13 +221,14 @@ def _row(
     def found(trial: Trial) -> None:
         on_stage(f"{what}: {trial.family}, {100 * trial.gain:.0f} % of what was left")
 
-    effects, trials, _, _ = search.forwards(found)
+    made = forwards(search, found)
+    effects = made.found
     on_stage(f"{what}: opening the confirm runs")
     held = _prepared([r for r in recordings if r.name in sealed.confirm], wanted, declared)
     stages = [
         freeze(search.balance, [Part(e) for e in effects[:k]]) for k in range(len(effects) + 1)
     ]
-    return _scored(task, stages, effects, trials, held, tried)
+    return _scored(task, stages, effects, made.trials, held, tried)
 
 
 def _scored(

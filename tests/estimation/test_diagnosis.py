@@ -20,6 +20,7 @@ from estimation.diagnosis.maps import best_map
 from estimation.diagnosis.naming import Named, withdrawn
 from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import SplitError, data_hash, split
+from estimation.diagnosis.steps import forwards
 from estimation.diagnosis.variables import bases, needed_channels
 from estimation.errors import EstimationError
 from estimation.fitting import fit
@@ -143,7 +144,7 @@ def test_two_effects_that_mask_one_another_are_found_together(together, first):
     balance = replace(balance, target=target, tables_of=tables_of)
     search = Search(balance, offered, replace(QUICK, together=together))
     search.table = columns
-    assert search.forwards()[1][0].family == first
+    assert forwards(search).trials[0].family == first
 
 
 def test_a_name_falls_with_the_one_it_stood_beside_where_the_map_leaves_it_nothing():
