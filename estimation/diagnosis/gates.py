@@ -37,6 +37,9 @@ class Gates:
         kept: Least share of what an effect adds that is left when it is fitted through instruments:
             less, and it is made of the noise of a regressor.
         noise: Largest share of what an effect removes that may be the noise of a force's sensor.
+        steady: Least mean over the runs of what time alone moves, over its spread from run to run:
+            less, and it is the wander of a zero (8 to 28 for a drift of a third of a strong one,
+            1.0 to 2.2 for zeros that wander, four campaigns of the simulated rig).
         told: Where less than this share of a force's reading is its own, beside what the other
             declared terms say too, the runs hardly tell the model's gain on it: no name is beaten
             there, and no map withdraws one.
@@ -76,6 +79,7 @@ class Gates:
     even: float = 0.5
     kept: float = 0.5
     noise: float = 0.2
+    steady: float = 3.0
     told: float = 0.01
     leftover: float = 0.15
     most_left: float = 0.4

@@ -106,6 +106,7 @@ def rivals_of(search: Search, beside: Beside, named: Candidate, gain: float) -> 
             continue
         best = _polished(search, beside.others, rival.candidates[0])
         shown = search.shows(best) or best.family in named.effect.same_as
+        shown = shown and not search.wanders([best], beside.others)
         found.append(tried(search, beside, best, shown))
         if sum(r.shown for r in found) == MOST:
             break

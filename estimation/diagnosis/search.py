@@ -18,6 +18,7 @@ from estimation.diagnosis.evidence import (
     surrogates,
 )
 from estimation.diagnosis.gates import Gates
+from estimation.diagnosis.wander import steadiness
 from estimation.recording import FloatArray
 
 TwinNull = Callable[[float, float], float]
@@ -97,9 +98,16 @@ class Search:
         spans = spans_of([candidate], self.balance.runs)
         return candidate.shows(spans) and not candidate.is_limit
 
+    def wanders(self, added: Sequence[Candidate], found: Sequence[Candidate]) -> bool:
+        """Say whether effects of time alone go another way in each run beside what is found."""
+        steady = steadiness(self.balance, [*self.balance.terms, *found], added)
+        return steady is not None and steady < self.gates.steady
+
     def is_of_noise(self, trial: Trial, found: Sequence[Candidate]) -> bool:
         """Say whether what a trial removes may be the noise of what the sensors read."""
         terms = [*self.balance.terms, *found]
+        if self.wanders(trial.candidates, found):
+            return True
         if not bends_force(terms, trial.candidates):
             noise = noise_share(self.balance, terms, self.balance.columns(trial.candidates))
             if noise > self.gates.noise:

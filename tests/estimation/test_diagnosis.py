@@ -22,6 +22,7 @@ from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import SplitError, data_hash, split
 from estimation.diagnosis.steps import forwards
 from estimation.diagnosis.variables import bases, needed_channels
+from estimation.diagnosis.wander import steadiness
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.recording import Flag, Instrument, Stretch
@@ -393,3 +394,30 @@ def test_chance_is_never_zero_and_agreement_needs_five_runs():
     assert runs_agree(np.ones(5), np.full(5, 0.5) + 0.01 * np.arange(5)) <= 0.05
     assert runs_agree(np.ones(4), np.full(4, 0.5) + 0.01 * np.arange(4)) > 0.05
     assert runs_agree(np.ones(5), np.ones(5)) == 1.0
+
+
+@pytest.mark.parametrize(("walk_n_m", "is_fault"), [(0.0, True), (1.8e-3, False)])
+def test_a_zero_that_wanders_is_no_drift_whatever_its_mean_over_the_runs(walk_n_m, is_fault):
+    random = np.random.default_rng(4)
+    recordings = []
+    for run in runs(count=10):
+        slope_n_m_s = (3e-3 + walk_n_m * random.normal()) / 6.0
+        drifting = run["proximal_torque_n_m"] + slope_n_m_s * run["time_s"]
+        recordings.append(run.with_columns(proximal_torque_n_m=drifting))
+    wanted = [MOTOR.target, *MOTOR.channels, *needed_channels("motor", MEASURED), "time_s"]
+    made = [prepare(recording, list(dict.fromkeys(wanted)), MOTOR) for recording in recordings]
+    balance = lay_out(fit(MOTOR, Campaign.of(recordings), bootstrap=0), made)
+    drift = next(c for c in pool(MOTOR, MEASURED) if c.id == "sensor.drift")
+    search = Search(balance, [drift], QUICK)
+    (trial,) = search.ranked([], QUICK.draws)
+    assert trial.passes(QUICK)  # its mean is no chance, in either case
+    assert search.is_of_noise(trial, []) is not is_fault
+
+
+def test_what_moves_with_more_than_time_is_not_asked_whether_it_wanders():
+    recordings = runs(spring, count=8)
+    wanted = [MOTOR.target, *MOTOR.channels, *needed_channels("motor", MEASURED)]
+    made = [prepare(recording, list(dict.fromkeys(wanted)), MOTOR) for recording in recordings]
+    balance = lay_out(fit(MOTOR, Campaign.of(recordings), bootstrap=0), made)
+    kinds = {c.id: c for c in pool(MOTOR, MEASURED)}
+    assert steadiness(balance, balance.terms, [kinds["spring.position"]]) is None
