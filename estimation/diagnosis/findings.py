@@ -56,6 +56,12 @@ SENSORS = {
 ENCODER, OF_TORQUE = "sensor.encoder_inl", ("motor", "cable")
 """A fault of an angle's reading, and balances of torque that no such fault can reach."""
 
+UNREAD = ("cable", "stretch")
+"""A torque at the jaw shows in the first by itself, in the second by what it stretches."""
+
+ANGLES = {"motor_angle", "spindle_angle", "jaw_angle"}
+"""Variables that tell where the rig stands."""
+
 LIKE = {"sensor.lag": ("sensor.delay",), "sensor.delay": ("sensor.lag",)}
 """Faults that two balances may name differently."""
 
@@ -87,7 +93,7 @@ class Told:
     def is_surer_than(self, other: "Told") -> bool:
         """Say whether it names, better than a finding of another balance, what both show."""
         mine, others = self.finding, other.finding
-        if others.family == ENCODER and not others.alternatives and mine.balance in OF_TORQUE:
+        if others.family == ENCODER and mine.balance in OF_TORQUE:
             return self.share >= ECHO  # no encoder makes a torque
         if other.is_motion and mine.verdict == "identified":
             return True
@@ -99,6 +105,20 @@ class Told:
         if mine.verdict == "identified":
             return self.share > other.share
         return (mine.confidence or 0.0) > (others.confidence or 0.0)
+
+    def acts_behind(self, other: "Told") -> bool:
+        """Say whether this is a torque that no sensor reads, and another balance shows its stretch.
+
+        That goes with the angle alone, in whatever form: as if the angle's sensor were at fault, or
+        as a function of it that has no name.
+        """
+        mine, others = self.finding, other.finding
+        if (mine.balance, others.balance) != UNREAD or self.share < ECHO:
+            return False
+        if not all(f.depends_on and {*f.depends_on} <= ANGLES for f in (mine, others)):
+            return False
+        unnamed = others.family == UNKNOWN and mine.family != UNKNOWN
+        return unnamed or others.family.startswith("sensor.")
 
     def is_cause_of(self, other: "Told") -> bool:
         """Say whether a finding of another balance is told by this one already."""
@@ -213,8 +233,9 @@ def causes_of(stories: Mapping[str, Story]) -> list[Told]:
     for told in found:
         for k, first in enumerate(kept):
             shown = (first.finding.balance, *first.finding.also_in)
-            if told.finding.balance not in shown and first.is_cause_of(told):
-                lead = told if told.is_surer_than(first) else first
+            behind = told.acts_behind(first)
+            if told.finding.balance not in shown and (behind or first.is_cause_of(told)):
+                lead = told if behind or told.is_surer_than(first) else first
                 also = tuple(b for b in (*shown, told.finding.balance) if b != lead.finding.balance)
                 kept[k] = replace(lead, finding=replace(lead.finding, also_in=also))
                 break

@@ -122,3 +122,32 @@ def test_a_torque_sensors_fault_gives_way_to_a_name_that_explains_as_much(
     fault = Told(finding("stretch", "sensor.crosstalk"), {}, None, 0, 0.8)
     other = Told(replace(finding("cable", family), verdict=verdict), {}, None, 0, share)
     assert other.is_surer_than(fault) is surer
+
+
+@pytest.mark.parametrize(
+    ("here", "family", "there", "behind"),
+    [
+        ("spindle_angle", "sensor.encoder_inl", "jaw_angle", True),
+        ("spindle_angle", "sensor.gain_nonlinear", "spindle_angle", True),
+        ("spindle_angle", "sensor.gain_nonlinear", "load", False),
+        ("load", "sensor.encoder_inl", "jaw_angle", False),
+        ("spindle_angle", "unknown", "jaw_angle", True),
+        ("spindle_angle", "coupling.kinematic", "jaw_angle", False),
+    ],
+)
+def test_a_torque_that_no_sensor_reads_is_behind_what_goes_with_the_angle(
+    here, family, there, behind
+):
+    weight = Told(finding("cable", "gravity.payload", (here,)), {}, None, 0, 0.5)
+    stretch = Told(finding("stretch", family, (there,)), {}, None, 0, 0.8)
+    assert weight.acts_behind(stretch) is behind
+    assert not stretch.acts_behind(weight)
+    assert not replace(weight, share=0.2).acts_behind(stretch)
+
+
+def test_a_map_without_a_name_speaks_for_a_sensor_but_not_for_another_map():
+    unnamed = replace(finding("cable", "unknown", ("spindle_angle",)), verdict="depends_on")
+    detent = Told(unnamed, {}, None, 0, 0.5)
+    wave = Told(finding("stretch", "sensor.encoder_inl", ("jaw_angle",)), {}, None, 0, 0.8)
+    assert detent.acts_behind(wave)
+    assert not detent.acts_behind(replace(wave, finding=replace(unnamed, balance="stretch")))
