@@ -27,6 +27,7 @@ from estimation.diagnosis.naming import searched
 from estimation.diagnosis.result import Diagnosis, Error
 from estimation.diagnosis.search import Search
 from estimation.diagnosis.shared_sensors import Fault, denied
+from estimation.diagnosis.some_runs import IN_NO_MODEL, missing_in_some_runs
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import Bootstrap, Twin
@@ -107,6 +108,10 @@ def diagnose(
             stories[name] = confirmed(without(stories[name], places), gates)
         causes = causes_of(stories)
     findings = findings_of(causes, list(stories))
+    notes = (*audit(discovering), *limits(sealed, twins, stories, gates))
+    if not findings and (partial := missing_in_some_runs(stories, gates)) is not None:
+        findings = [partial]
+        notes = (*notes, f"{partial.balance}: {IN_NO_MODEL}")
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
     }
@@ -118,7 +123,7 @@ def diagnose(
         moved={name: moved(s) for name, s in stories.items()},
         sealed=sealed,
         undecided={name: str(error) for name, error in failed.items()},
-        notes=(*audit(discovering), *limits(sealed, twins, stories, gates)),
+        notes=notes,
         seconds=time.monotonic() - began,
     )
     return diagnosis, stories

@@ -20,7 +20,11 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         ]
     else:
         which = "runs seen before" if diagnosis.exploratory else "runs not touched"
-        lines = [_sentence(f, diagnosis.unit[f.balance], which) for f in diagnosis.findings]
+        runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
+        lines = [
+            _sentence(f, diagnosis.unit[f.balance], which) + _where(f, runs)
+            for f in diagnosis.findings
+        ]
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
 
 
@@ -39,6 +43,14 @@ def _sentence(finding: Finding, unit: str, which: str) -> str:
         else ""
     )
     return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{form}{_formula(finding, unit)}"
+
+
+def _where(finding: Finding, runs: int) -> str:
+    """Return which runs a finding shows in, where a third of them and more do not show it."""
+    shown = finding.runs_affected
+    if not 0 < 3 * len(shown) <= 2 * runs:
+        return ""
+    return f" It shows in {len(shown)} of {runs} runs: {', '.join(shown)}."
 
 
 def _formula(finding: Finding, unit: str) -> str:
