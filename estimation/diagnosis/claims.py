@@ -36,15 +36,17 @@ def claims_of(
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
     left = discovery.left_map
     mapped = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
-    if (
-        left is not None
-        and left.p <= gates.level
-        and left.variables not in mapped
-        and not _told_already(left, claims)
-    ):
-        worth = left.gain * _share_left(claims, balance)
+    if left is not None and left.p <= gates.level and left.variables not in mapped:
+        share = _share_left(claims, balance)
+        worth = left.gain * share
+        clear = worth >= gates.map_floor and left.agree <= gates.agree
+        told_already = _told_already(left, claims)
         # also what a named effect's form leaves of its own cause is no second cause
-        if worth >= gates.map_floor and left.agree <= gates.agree:
+        if clear and not told_already:
+            claims.append(_map_claim(left, may_name))
+        elif clear and worth > 1.0 - share:
+            # a name that removes less than a map of its own variables would, beside it, is not it
+            claims = [c for c in claims if not within(c.depends_on, left.variables)]
             claims.append(_map_claim(left, may_name))
         elif worth >= gates.map_floor and not claims:
             claims.append(Claim(Part(map=left), "something_missing", None, ()))
