@@ -35,6 +35,9 @@ SHAKEN = ("inertia.missing", UNKNOWN)
 SHAKEN_ECHO, SHAKEN_LARGER = 0.4, 1.5
 """The same for what any motion faster than usual shows: parts that move, and what has no name."""
 
+PLAIN = 0.05
+"""What is surely named, and no such motion, is told from this share on."""
+
 MOTION = {"velocity", "acceleration"}
 """Variables of what such a motion alone shows: it has a cause, where another balance names one."""
 
@@ -211,6 +214,8 @@ def echoes(causes: Sequence[Told]) -> dict[str, set[int]]:
     for told in causes:
         shaken = told.finding.family in SHAKEN
         most, times = (SHAKEN_ECHO, SHAKEN_LARGER) if shaken else (ECHO, LARGER)
+        if told.finding.verdict == "identified" and not shaken:
+            most = PLAIN
         larger = [c for c in causes if c.finding.balance != told.finding.balance]
         named = [c for c in larger if c.finding.verdict == "identified"]
         echo = told.share < most and any(c.share > times * told.share for c in larger)

@@ -18,6 +18,7 @@ class Gates:
         clearly: A rival of other variables is beaten by an effect that leaves less than this share
             of the error that the rival leaves, both in any form: less may be a matter of how well
             their regressors are known.
+        clearly_alike: The same for a rival that does nearly the same on these runs.
         veto: A map withdraws a name when it leaves at most this share of the name's error.
         form: A map of no other variables than those of what was named does so only when the name
             removes less than this share of what the map removes: no formula has the true form.
@@ -67,6 +68,7 @@ class Gates:
     surrogates: int = 199
     rival: float = 0.5
     clearly: float = 0.97
+    clearly_alike: float = 0.85
     veto: float = 0.9
     form: float = 0.9
     fair_form: float = 0.8

@@ -139,13 +139,16 @@ def _polished(search: Search, others: Sequence[Candidate], rival: Candidate) -> 
 def beaten(search: Search, named: Tried, rival: Tried) -> bool:
     """Say whether a named effect leaves less than a rival in run after run, and not just a little.
 
-    Of effects that only another experiment tells apart neither beats the other.
+    Of effects that only another experiment tells apart neither beats the other. What does nearly
+    the same on these runs is told apart by the form alone, and no formula has the true form.
     """
     if named.depends_as(rival):
         if rival.candidate.family in named.candidate.effect.same_as:
             return False
         return runs_agree(rival.losses, named.losses) <= search.gates.agree
-    enough = named.bent.sum() < search.gates.clearly * rival.bent.sum()
+    alike = named.does_as(rival)
+    share = search.gates.clearly_alike if alike else search.gates.clearly
+    enough = named.bent.sum() < share * rival.bent.sum()
     return bool(enough) and runs_agree(rival.bent, named.bent) <= search.gates.agree
 
 

@@ -53,6 +53,21 @@ def test_a_wave_that_a_sensor_is_blamed_for_is_one_with_the_wave_of_another_bala
     assert same_fault(gear, motor)
 
 
+@pytest.mark.parametrize(
+    ("verdict", "share", "small"),
+    [
+        ("identified", 0.04, True),
+        ("identified", 0.08, False),
+        ("one_of", 0.08, True),
+        ("one_of", 0.4, False),
+    ],
+)
+def test_what_is_surely_named_is_sooner_told_from_an_echo(verdict, share, small):
+    dwell = Told(finding("cable", "friction.dwell"), {}, None, 0, 0.9)
+    named = replace(finding("motor", "friction.coulomb_asymmetry"), verdict=verdict)
+    assert bool(echoes([dwell, Told(named, {}, None, 0, share)])) is small
+
+
 @pytest.mark.parametrize(("share", "small"), [(0.1, {"gearbox": {0}}), (0.5, {})])
 def test_a_small_claim_beside_a_large_one_elsewhere_is_not_told_from_its_echo(share, small):
     ripple = Told(finding("motor", "ripple.motor"), {}, None, 0, 0.9)

@@ -8,7 +8,7 @@ import pytest
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.evidence import Losses
 from estimation.diagnosis.gates import Gates
-from estimation.diagnosis.rivals import Tried, better, with_alike
+from estimation.diagnosis.rivals import Tried, beaten, better, with_alike
 
 SEARCH = SimpleNamespace(gates=Gates())
 RUNS = 8
@@ -50,3 +50,18 @@ def test_of_two_that_read_the_same_the_form_that_leaves_less_leads(left, leads):
     named = tried("sensor.lag", "distal_torque_n_m", bent=0.9)
     rival = tried("sensor.delay", "distal_torque_n_m", left=left, bent=1.0)
     assert better(SEARCH, named, [rival], []) == (rival.candidate if leads else None)
+
+
+@pytest.mark.parametrize(
+    ("added", "bent", "lost"),
+    [
+        ((1.0, 0.1), 1.10, False),  # it does nearly the same: a tenth may be the form
+        ((1.0, 0.1), 1.25, True),
+        ((0.6, 0.8), 1.10, True),
+        ((0.6, 0.8), 1.02, False),
+    ],
+)
+def test_what_does_nearly_the_same_is_beaten_by_more_than_its_form(added, bent, lost):
+    named = tried("friction.load", "proximal_torque_n_m", added=(1.0, 0.0))
+    rival = tried("motor.saturation", "motor_current_a", added, bent=bent)
+    assert beaten(SEARCH, named, rival) is lost
