@@ -109,9 +109,9 @@ def diagnose(
         causes = causes_of(stories)
     findings = findings_of(causes, list(stories))
     notes = (*audit(discovering), *limits(sealed, twins, stories, gates))
-    if not findings and (partial := missing_in_some_runs(stories, gates)) is not None:
-        findings = [partial]
-        notes = (*notes, f"{partial.balance}: {IN_NO_MODEL}")
+    if not findings and (only := missing_in_some_runs(stories, gates)) is not None:
+        findings = [only]
+        notes = (*notes, f"{only.balance}: {IN_NO_MODEL}")
     found: dict[str, Error] = {
         name: errors(s.before, s.after, s.confirm, sealed.seed) for name, s in stories.items()
     }
