@@ -34,22 +34,10 @@ def claims_of(
             claims.append(Claim(Part(named.candidate), verdict, named, of))
         else:
             claims.append(Claim(Part(named.candidate), "something_missing", named, ()))
-    left = discovery.left_map
     mapped = {n.candidate.effect.any_function_of for n in discovery.named if n.veto is None}
+    left = discovery.left_map
     if left is not None and left.p <= gates.level and left.variables not in mapped:
-        share = _share_left(claims, balance)
-        worth = left.gain * share
-        clear = worth >= gates.map_floor and left.agree <= gates.agree
-        told_already = _told_already(left, claims)
-        # also what a named effect's form leaves of its own cause is no second cause
-        if clear and not told_already:
-            claims.append(_map_claim(left, may_name))
-        elif clear and worth > 1.0 - share:
-            # a name that removes less than a map of its own variables would, beside it, is not it
-            claims = [c for c in claims if not within(c.depends_on, left.variables)]
-            claims.append(_map_claim(left, may_name))
-        elif worth >= gates.map_floor and not claims:
-            claims.append(Claim(Part(map=left), "something_missing", None, ()))
+        claims = _beside_map(claims, left, balance, gates, may_name)
     vetoes = [named.veto for named in discovery.named if named.veto is not None]
     if not claims and vetoes:
         # the effect is proved; that its name fell to this map makes it no smaller
@@ -64,6 +52,25 @@ def claims_of(
     ):
         claims.append(Claim(Part(last.candidates[0]), "something_missing", None, ()))
     return claims
+
+
+def _beside_map(
+    claims: list[Claim], left: Map, balance: Balance, gates: Gates, may_name: bool
+) -> list[Claim]:
+    """Return the claims with a map of what they leave, where it is worth a claim."""
+    share = _share_left(claims, balance)
+    worth = left.gain * share
+    if worth < gates.map_floor:  # also what a named effect's form leaves of its own cause
+        return claims
+    if left.agree > gates.agree:
+        return claims or [Claim(Part(map=left), "something_missing", None, ())]
+    if not _told_already(left, claims):
+        return [*claims, _map_claim(left, may_name)]
+    if worth <= 1.0 - share:
+        return claims
+    # a name that removes less than a map of its own variables would, beside it, is not it
+    others = [c for c in claims if not within(c.depends_on, left.variables)]
+    return [*others, _map_claim(left, may_name)]
 
 
 def _told_already(found: Map, claims: Sequence[Claim]) -> bool:
