@@ -65,7 +65,7 @@ def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
         assert part in page
     for part in ("What else it could be", "What this cannot tell", "Next experiment"):
         assert f"<h2>{part}</h2>" in page
-    for note in ("simulated twins", "has not been calibrated"):
+    for note in ("simulated twins", "was too sure"):
         assert note in page
 
 
