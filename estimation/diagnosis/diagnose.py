@@ -109,7 +109,8 @@ def diagnose(
         causes = causes_of(stories)
     findings = findings_of(causes, list(stories))
     notes = (*audit(discovering), *limits(sealed, twins, stories, gates))
-    if not findings and (only := missing_in_some_runs(stories, gates)) is not None:
+    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    if not findings and (only := missing_in_some_runs(stories, gates, measured)) is not None:
         findings = [only]
         notes = (*notes, f"{only.balance}: {IN_NO_MODEL}")
     found: dict[str, Error] = {

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.balance import Balance
-from estimation.diagnosis.candidate import UNKNOWN, Candidate
-from estimation.diagnosis.design import targets
+from estimation.diagnosis.candidate import UNKNOWN, Candidate, pool
+from estimation.diagnosis.design import covered, targets
 from estimation.diagnosis.frozen import Frozen, samples_of, squares
 from estimation.diagnosis.gates import Gates
 from estimation.diagnosis.result import Finding, Value
+from estimation.diagnosis.search import Search
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.variables import variables_of
 from estimation.recording import FloatArray
@@ -30,7 +31,7 @@ IN_NO_MODEL = (
 )
 
 TRIED = 8
-"""Families, the best of the first step, that are tried."""
+"""Families that are tried, the best over all runs, then the best in the runs that have it."""
 
 FAR = 0.5
 """A name leaves at most this share of what any other family leaves in the runs that have it."""
@@ -68,14 +69,17 @@ class Partial:
         return self.discover | self.confirm
 
 
-def missing_in_some_runs(stories: Mapping[str, Story], gates: Gates) -> Finding | None:
+def missing_in_some_runs(
+    stories: Mapping[str, Story], gates: Gates, measured: Sequence[str]
+) -> Finding | None:
     """Return what is missing in some runs only, under the balance that shows it most, or None.
 
     Args:
         stories: Balance to its story, the confirm runs opened.
         gates: What an effect must pass: `some` is what it removes of both halves of a run.
+        measured: Channels that all runs have.
     """
-    found = [best for story in stories.values() if (best := _best(story, gates)) is not None]
+    found = [p for s in stories.values() if (p := _best(s, gates, measured)) is not None]
     if not found:
         return None
     most = max(found, key=lambda partial: (partial.confidence is not None, partial.fall))
@@ -84,7 +88,7 @@ def missing_in_some_runs(stories: Mapping[str, Story], gates: Gates) -> Finding 
     return replace(_told(most, gates.sure), also_in=also)
 
 
-def _best(story: Story, gates: Gates) -> Partial | None:
+def _best(story: Story, gates: Gates, measured: Sequence[str]) -> Partial | None:
     """Return the effect that removes most in the runs that have it, where the confirm runs agree.
 
     Asked only where the first step stood out of what chance and the twins show.
@@ -92,13 +96,34 @@ def _best(story: Story, gates: Gates) -> Partial | None:
     steps = story.discovery.steps
     if story.balance.one_path or not steps or not steps[0].stands_out(gates):
         return None
-    effects = [trial.candidates[0] for trial in story.discovery.ranking[:TRIED]]
-    found = [p for effect in effects if (p := _partial(story, effect, gates)) is not None]
-    best = max(found, key=lambda partial: partial.fall, default=None)
-    if best is None or not best.confirm:
+    first = _most(story, [t.candidates[0] for t in story.discovery.ranking[:TRIED]], gates)
+    if first is None:
+        return None
+    # over all runs the right family may have shown nothing: ask all of them in these runs
+    effects = _ranked_in(story, first.discover, gates, measured)
+    best = _most(story, effects[:TRIED], gates) or first
+    if not best.confirm:
         return None
     rivals = [effect for effect in effects if effect.family != best.effect.family]
     return replace(best, confidence=_confidence(best, rivals))
+
+
+def _most(story: Story, effects: Sequence[Candidate], gates: Gates) -> Partial | None:
+    """Return the effect that removes most in the runs that have it."""
+    found = [p for effect in effects if (p := _partial(story, effect, gates)) is not None]
+    return max(found, key=lambda partial: partial.fall, default=None)
+
+
+def _ranked_in(
+    story: Story, there: frozenset[str], gates: Gates, measured: Sequence[str]
+) -> list[Candidate]:
+    """Return the best of each family of the catalogue in some of the runs, best first."""
+    balance = story.balance
+    which = [k for k, run in enumerate(balance.runs) if run.name in there]
+    runs, target = [balance.runs[k] for k in which], [balance.target[k] for k in which]
+    part = replace(balance, runs=runs, target=target, tables_of={})
+    offered = covered(pool(balance.model, measured), runs)
+    return [trial.candidates[0] for trial in Search(part, offered, gates).ranked([], 0)]
 
 
 def _confidence(best: Partial, rivals: Sequence[Candidate]) -> float | None:
