@@ -68,7 +68,7 @@ class Gates:
     surrogates: int = 199
     rival: float = 0.5
     clearly: float = 0.97
-    clearly_alike: float = 0.85
+    clearly_alike: float = 0.9
     veto: float = 0.9
     form: float = 0.9
     fair_form: float = 0.8
