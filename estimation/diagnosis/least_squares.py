@@ -28,3 +28,9 @@ def beyond(base: FloatArray, columns: FloatArray) -> FloatArray:
     if not base.shape[1]:
         return columns
     return np.asarray(columns - base @ np.linalg.lstsq(base, columns, rcond=1e-10)[0])
+
+
+def told_beyond(base: FloatArray, columns: FloatArray, aim: FloatArray) -> FloatArray:
+    """Return what columns tell of an aim that others do not, shape (n,)."""
+    own = beyond(base, columns)
+    return np.asarray(own @ np.linalg.lstsq(own, aim, rcond=1e-10)[0])

@@ -12,7 +12,7 @@ import numpy as np
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, related
 from estimation.diagnosis.evidence import Losses, losses_of, runs_agree
-from estimation.diagnosis.least_squares import beyond
+from estimation.diagnosis.least_squares import told_beyond
 from estimation.diagnosis.search import Search
 from estimation.recording import FloatArray
 
@@ -86,8 +86,8 @@ def tried(search: Search, beside: Beside, candidate: Candidate, shown: bool = Tr
     block = search.balance.columns([candidate])
     plain = losses_of(beside.base, block, beside.left)
     bent = bent_losses(search.balance, beside.base, candidate, beside.left)
-    own = beyond(np.vstack(beside.base), np.vstack(block))
-    added = own @ np.linalg.lstsq(own, np.concatenate(beside.left), rcond=1e-10)[0]
+    left = np.concatenate(beside.left)
+    added = told_beyond(np.vstack(beside.base), np.vstack(block), left)
     return Tried(candidate, plain, bent.joint[:, 0, 0], added, shown)
 
 

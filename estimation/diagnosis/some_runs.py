@@ -46,6 +46,7 @@ class Partial:
 
     Attributes:
         story: The story of the balance.
+        held: The balance laid out on the confirm runs.
         effect: The effect.
         weights: Amplitudes of the declared effects, then its own.
         discover: Runs that have it, of those that discover.
@@ -56,6 +57,7 @@ class Partial:
     """
 
     story: Story
+    held: Balance
     effect: Candidate
     weights: FloatArray
     discover: frozenset[str]
@@ -96,21 +98,25 @@ def _best(story: Story, gates: Gates, measured: Sequence[str]) -> Partial | None
     steps = story.discovery.steps
     if story.balance.one_path or not steps or not steps[0].stands_out(gates):
         return None
-    first = _most(story, [t.candidates[0] for t in story.discovery.ranking[:TRIED]], gates)
+    held = _confirming(story)
+    ranked = [trial.candidates[0] for trial in story.discovery.ranking[:TRIED]]
+    first = _most(story, held, ranked, gates)
     if first is None:
         return None
     # over all runs the right family may have shown nothing: ask all of them in these runs
     effects = _ranked_in(story, first.discover, gates, measured)
-    best = _most(story, effects[:TRIED], gates) or first
+    best = _most(story, held, effects[:TRIED], gates) or first
     if not best.confirm:
         return None
     rivals = [effect for effect in effects if effect.family != best.effect.family]
     return replace(best, confidence=_confidence(best, rivals))
 
 
-def _most(story: Story, effects: Sequence[Candidate], gates: Gates) -> Partial | None:
+def _most(
+    story: Story, held: Balance, effects: Sequence[Candidate], gates: Gates
+) -> Partial | None:
     """Return the effect that removes most in the runs that have it."""
-    found = [p for effect in effects if (p := _partial(story, effect, gates)) is not None]
+    found = [p for effect in effects if (p := _partial(story, held, effect, gates)) is not None]
     return max(found, key=lambda partial: partial.fall, default=None)
 
 
@@ -138,9 +144,8 @@ def _confidence(best: Partial, rivals: Sequence[Candidate]) -> float | None:
 
 def _left(partial: Partial, effect: Candidate, weights: FloatArray) -> FloatArray:
     """Return the squared error that an effect leaves of each run that has another one."""
-    balance = partial.story.balance
     left = []
-    for part in (balance, _confirming(partial.story)):
+    for part in (partial.story.balance, partial.held):
         _, after = _errors(part, effect, weights)
         runs = zip(part.runs, after, strict=True)
         left += [float(e @ e) for run, e in runs if run.name in partial.runs]
@@ -154,7 +159,7 @@ def _confirming(story: Story) -> Balance:
     return replace(story.balance, runs=story.confirm, target=target, tables_of={})
 
 
-def _partial(story: Story, effect: Candidate, gates: Gates) -> Partial | None:
+def _partial(story: Story, held: Balance, effect: Candidate, gates: Gates) -> Partial | None:
     """Choose the runs that have an effect and its size in them by turns, until they are the same.
 
     None where too few of the runs that discover have it, or all.
@@ -178,8 +183,8 @@ def _partial(story: Story, effect: Candidate, gates: Gates) -> Partial | None:
         if name in there
     ]
     share = sum(falls) / sum(float(b @ b) for b in before)
-    confirm = _helped(_confirming(story), effect, weights, gates.some)
-    return Partial(story, effect, weights, there, confirm, share)
+    confirm = _helped(held, effect, weights, gates.some)
+    return Partial(story, held, effect, weights, there, confirm, share)
 
 
 def _fitted(balance: Balance, effect: Candidate, there: frozenset[str]) -> FloatArray:

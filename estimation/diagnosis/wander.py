@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.least_squares import beyond, least_squares
+from estimation.diagnosis.least_squares import told_beyond
 from estimation.recording import FloatArray
 
 CLOCKS = {"time_s", "campaign_time_s"}
@@ -41,9 +41,8 @@ def steadiness(
 
 def _steadiness(balance: Balance, terms: Sequence[Candidate], one: Candidate) -> float:
     left = balance.left(terms)
-    own = beyond(np.vstack(balance.base(terms)), np.vstack(balance.columns([one])))
-    course = own @ least_squares(own, np.concatenate(left))
-    sizes = _sizes(course, left)
+    base, own = np.vstack(balance.base(terms)), np.vstack(balance.columns([one]))
+    sizes = _sizes(told_beyond(base, own, np.concatenate(left)), left)
     spread = float(np.std(sizes, ddof=1))
     return float(np.mean(sizes)) / max(spread, np.finfo(float).tiny)
 
