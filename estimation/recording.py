@@ -5,7 +5,7 @@ read-only arrays, and every change makes a new recording that shares the columns
 """
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import IntFlag
 from types import MappingProxyType
@@ -261,3 +261,8 @@ class Recording:
     def exclude(self, reason: str) -> "Recording":
         """Return the recording marked as left out of evidence, with the reason."""
         return replace(self, excluded=reason)
+
+
+def shared_columns(recordings: Iterable[Recording]) -> list[str]:
+    """Return the names of the columns that all of some recordings have, sorted."""
+    return sorted(set.intersection(*({*recording.columns} for recording in recordings)))

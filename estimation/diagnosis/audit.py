@@ -9,7 +9,7 @@ import numpy as np
 from scipy import signal
 
 from estimation.diagnosis.clock import skips
-from estimation.recording import Recording
+from estimation.recording import Recording, shared_columns
 
 PAIRS = (
     ("motor_angle_rad", "spindle_angle_rad"),
@@ -76,7 +76,7 @@ def _delays(recordings: Sequence[Recording]) -> list[str]:
 
 def _excitation(recordings: Sequence[Recording]) -> list[str]:
     said = []
-    shared = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    shared = shared_columns(recordings)
     for name in shared:
         spans = [float(np.ptp(r[name])) for r in recordings]
         if not np.isfinite(spans).all():

@@ -35,7 +35,7 @@ from estimation.diagnosis.variables import needed_channels, projection
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Model
-from estimation.recording import Recording
+from estimation.recording import Recording, shared_columns
 
 Maker = Callable[[Model, Sequence[Recording]], Twin]
 """Fitted model and discovery runs to their simulated twin."""
@@ -109,7 +109,7 @@ def diagnose(
         causes = causes_of(stories)
     findings = findings_of(causes, list(stories))
     notes = (*audit(discovering), *limits(sealed, twins, stories, gates))
-    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    measured = shared_columns(recordings)
     if not findings and (only := missing_in_some_runs(stories, gates, measured)) is not None:
         findings = [only]
         notes = (*notes, f"{only.balance}: {IN_NO_MODEL}")
@@ -154,7 +154,7 @@ def _balance(
     """
     discover = [r for r in recordings if r.name in sealed.discover]
     confirm = [r for r in recordings if r.name in sealed.confirm]
-    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    measured = shared_columns(recordings)
     fitted = fit(model, Campaign.of(discover), bootstrap=0)
     tried = pool(model, measured)
     wanted = [model.target, *model.channels, *needed_channels(model.balance, measured)]

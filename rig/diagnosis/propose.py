@@ -14,7 +14,7 @@ from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import coarse
 from estimation.diagnosis.variables import PROJECTED, projection
 from estimation.files import write_text_atomic
-from estimation.recording import Recording
+from estimation.recording import Recording, shared_columns
 from rig.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
 from rig.protocol import Protocol, protocol_toml
@@ -43,7 +43,7 @@ def propose(
         recordings: The runs.
         twin: Simulates the declared models, or None.
     """
-    measured = sorted(set.intersection(*({*r.columns} for r in recordings)))
+    measured = shared_columns(recordings)
     for finding in diagnosis.findings:
         story = stories[finding.balance]
         rivals = rivals_of(story, finding, measured)
