@@ -147,7 +147,13 @@ TEST_CASE("an enabled controller that is not ready tells no current") {
     CHECK(teensy.sample().current == rig::kMissing);
     board.levels[rig::wiring::kDriveReadyPin] = HIGH;
     CHECK(teensy.sample().current != rig::kMissing);
+}
+
+TEST_CASE("each encoder of a Teensy 4.1 has inputs of the crossbar for itself") {
+    rig::ReferenceHardware teensy;
+    teensy.begin();
     CHECK(teensy.sample().motor == 1000);
+    CHECK(teensy.sample().spindle == 2000);
     CHECK(teensy.sample().jaw == 3000);
 }
 
