@@ -57,14 +57,24 @@ $(TEENSY)/$(1)/core.a: $$($(1)_O)
 endef
 $(foreach core,teensy3 teensy4,$(eval $(call core_rules,$(core))))
 
-# $(1) image, $(2) core, $(3) further flags, $(4) further objects
+# $(1) image, $(2) core, $(3) further flags of the compiler and the linker, $(4) further objects
 define image_rule
 $(TEENSY)/$(1).elf: $(SOURCES) $(4) $(TEENSY)/$(2)/core.a teensy.mk
 	$(ARM_PREFIX)g++ $$($(2)_FLAGS) $(CPP) $(OWN) $(3) -c boards/teensy/main.cpp -o $(TEENSY)/$(1).o
-	$(ARM_PREFIX)g++ -O2 -Wl,--gc-sections,--relax -mthumb $$($(2)_CPU) -Wl,--defsym=__rtc_localtime=0 \
+	$(ARM_PREFIX)g++ -O2 -Wl,--gc-sections,--relax -mthumb $$($(2)_CPU) $(3) -Wl,--defsym=__rtc_localtime=0 \
 	    -T$(FROM)/cores/$(2)/$$($(2)_LD) -o $$@ $(TEENSY)/$(1).o $(4) $(TEENSY)/$(2)/core.a -lm -lstdc++
 	@$(ARM_PREFIX)size $$@
 endef
+
+# the emulator has no floating-point unit for doubles: the same images with them in software
+EMULATED := $(IMAGES:%=$(TEENSY)/%.emulated.elf)
+SOFT     := -mfpu=fpv4-sp-d16
+.PHONY: emulated
+emulated: $(EMULATED)
+
+$(eval $(call image_rule,teensy35.emulated,teensy3,,))
+$(eval $(call image_rule,teensy41.emulated,teensy4,$(SOFT),$(TEENSY)/teensy4/QuadEncoder.o))
+$(eval $(call image_rule,teensy41-grasper.emulated,teensy4,-DRIG_GRASPER $(SOFT),$(TEENSY)/teensy4/QuadEncoder.o))
 $(eval $(call image_rule,teensy35,teensy3,,))
 $(eval $(call image_rule,teensy41,teensy4,,$(TEENSY)/teensy4/QuadEncoder.o))
 $(eval $(call image_rule,teensy41-grasper,teensy4,-DRIG_GRASPER,$(TEENSY)/teensy4/QuadEncoder.o))

@@ -28,6 +28,7 @@ constexpr int kDriveSetPin = 22, kLoadSetPin = 23;
 // Not pins 24 and 25: they are LPUART1, which the processor's boot ROM may drive.
 constexpr int kDriveEnablePin = 28, kLoadEnablePin = 29;
 constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
+constexpr int kAlivePin = 31;  // toggles while the chip is alive
 constexpr float kPwmHz = 5000.0F;
 constexpr int kSetBits = 12;
 constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens

@@ -32,6 +32,7 @@ constexpr int kSetPin[kMotors] = {22, 23, 33};
 // Not pins 24 and 25: they are LPUART1, which the processor's boot ROM may drive.
 constexpr int kEnablePin[kMotors] = {28, 29, 30};
 constexpr int kReadyPin[kMotors] = {26, 27, 32};
+constexpr int kAlivePin = 31;  // toggles while the chip is alive
 constexpr float kPwmHz = 5000.0F;
 constexpr int kSetBits = 12;
 constexpr double kFullScaleA = 2.0;  // current of a full command; a positive command closes
