@@ -1,6 +1,6 @@
 """Open the simulated logger: plant, board and a transport in virtual time."""
 
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.grasper_guard import GRASPER_LOGIC
@@ -48,7 +48,7 @@ def _reference_board(simulation: SimulationSection) -> tuple[Board, float]:
     plant, sensors, effects = plant_and_sensors(simulation)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     firmware = uses_firmware(simulation)
-    return FirmwareBoard(bench) if firmware else TeensyFake(bench), REFERENCE.tick_us * 1e-6
+    return FirmwareBoard(bench) if firmware else PythonBoard(bench), REFERENCE.tick_us * 1e-6
 
 
 def _grasper_board(simulation: SimulationSection) -> tuple[Board, float]:
@@ -67,7 +67,7 @@ def _grasper_board(simulation: SimulationSection) -> tuple[Board, float]:
     tick_s = GRASPER.tick_us * 1e-6
     if uses_firmware(simulation):
         return FirmwareBoard(bench, profile=GRASPER), tick_s
-    return TeensyFake(bench, logic=GRASPER_LOGIC), tick_s
+    return PythonBoard(bench, logic=GRASPER_LOGIC), tick_s
 
 
 _BOARDS = {"reference": _reference_board, "grasper": _grasper_board}

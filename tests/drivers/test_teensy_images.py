@@ -20,7 +20,7 @@ from drivers.teensy.reference import REFERENCE, Limits
 
 pytest.importorskip("unicorn", reason="no emulator: pip install unicorn pyelftools")
 
-from tests.drivers.teensy_image import K64, RT1062, TeensyImage  # noqa: E402
+from tests.drivers.teensy_image import K64, RT1062, TeensyImage
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 CHIPS = {"teensy35": K64, "teensy41": RT1062, "teensy41-grasper": RT1062}
