@@ -18,7 +18,7 @@ from drivers.teensy import protocol
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, TRIP_SHIFT, Kind, Trip
 from drivers.teensy.reference import REFERENCE
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
 
 TICK_FUNCTION = ctypes.CFUNCTYPE(
