@@ -37,6 +37,14 @@ _REASONS: dict[int, tuple[str, str]] = {
         f"Its queue holds {protocol.QUEUE_CAPACITY} setpoints and is full.",
         "Read samples, then queue on.",
     ),
+    Result.NOT_REFERENCED: (
+        "Its counts have no zeros: it was started since, or an encoder failed.",
+        "Run: rig reference",
+    ),
+    Result.NOT_AT_REST: (
+        "It is armed, or a shaft is turning.",
+        "Disarm it, let go of the shafts and try again.",
+    ),
     Result.NOT_ARMED: (
         "It is not armed: it never was, was disarmed, or its watchdog or a limit tripped.",
         "Look at the status of its samples, then arm it.",
@@ -166,6 +174,19 @@ class TeensyLogger:
                 "Look at the status of its samples, then arm it again.",
                 Result.NOT_ARMED,
             )
+
+    def reference(self, counts: Sequence[int]) -> None:
+        """Say which counts the encoders have where they stand now; the board must be at rest.
+
+        Args:
+            counts: Of each encoder, in the order of a sample.
+
+        Raises:
+            CommandRefusedError: It is armed, or a shaft is turning.
+        """
+        self._require_identity()
+        payload = protocol.encode_reference(self._number(), counts)
+        self._command(Kind.REFERENCE, payload)
 
     def start(self) -> None:
         """Start the stream of samples; their sequence numbers begin at 0."""

@@ -7,7 +7,7 @@ test holds the two against each other byte for byte.
 
 For simulation only, where there is no compiler. The guards that hold encoders and current against
 one another (trips 15 to 19) are in the compiled core alone: this board takes their limits and does
-not hold them.
+not hold them. Its counts have their zeros from the start, and it knows no REFERENCE.
 
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
@@ -29,6 +29,7 @@ from drivers.teensy.protocol import (
     STATUS_ARMED,
     STATUS_LIMIT_TRIPPED,
     STATUS_QUEUE_DRY,
+    STATUS_REFERENCED,
     STATUS_SATURATED,
     STATUS_WATCHDOG_TRIPPED,
     TRIP_SHIFT,
@@ -180,8 +181,10 @@ class PythonBoard:
             return
         if kind is Kind.HELLO:
             self._last_command = None
-            reply = (self._serial, self._protocol_hash, self._build_hash)
-            self._send(protocol.encode_hello_reply(sequence, *reply))
+            reply = protocol.encode_hello_reply(
+                sequence, self._serial, self._protocol_hash, self._build_hash, status=self._status
+            )
+            self._send(reply)
         elif kind is Kind.PING:
             self._send(protocol.encode_pong(sequence, int(fields["token"]), self._now_us))
         elif kind is Kind.TRIP:
@@ -257,7 +260,7 @@ class PythonBoard:
         return protocol.QUEUE_CAPACITY - len(self._queued)
 
     def _acknowledge(self, command: int, sequence: int, result: Result) -> None:
-        ack = Ack(sequence, command, result, self._state, self._queue_free())
+        ack = Ack(sequence, command, result, self._status, self._queue_free())
         self._send(protocol.encode_ack(ack))
 
     def _send(self, payload: bytes) -> None:
@@ -272,6 +275,11 @@ class PythonBoard:
     @property
     def _state(self) -> int:
         return int(self._drive.guard[STATE])
+
+    @property
+    def _status(self) -> int:
+        """The state as the host gets it: a simulated rig's encoders know where they are."""
+        return self._state | STATUS_REFERENCED
 
     @property
     def _armed(self) -> bool:
@@ -343,7 +351,7 @@ class PythonBoard:
         saturated = self._logic.saturated(counts[:fitting])
         samples["version"] = protocol.VERSION
         samples["kind"] = Kind.SAMPLE
-        samples["status"] = status[:fitting]
+        samples["status"] = status[:fitting] | np.uint16(STATUS_REFERENCED)
         samples["status"][saturated] |= np.uint16(STATUS_SATURATED)
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]

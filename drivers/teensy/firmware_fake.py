@@ -54,6 +54,8 @@ class FirmwareBoard:
         start_tick_us: Device clock at the first tick.
         library: The shared library; the built one when None.
         profile: What the board samples and moves.
+        boot: Number of this start of the board.
+        referenced: Whether its counts have their zeros, as those of a simulated rig do.
 
     Raises:
         FirmwareMissingError: There is no library.
@@ -66,6 +68,8 @@ class FirmwareBoard:
         start_tick_us: int = 0,
         library: Path | None = None,
         profile: Profile = REFERENCE,
+        boot: int = 1,
+        referenced: bool = True,
     ) -> None:
         path = library or firmware_library()
         if path is None or not path.is_file():
@@ -81,6 +85,7 @@ class FirmwareBoard:
         self._handle = self._functions.rig_board_create(profile.name.encode(), serial.encode())
         if not self._handle:
             raise MemoryError("no memory for a firmware board")
+        self._functions.rig_board_booted(self._handle, boot, referenced)
         self._release = weakref.finalize(self, self._functions.rig_board_destroy, self._handle)
         self._tick_address = ctypes.cast(self._functions.rig_board_tick, ctypes.c_void_p).value or 0
         self._out = ctypes.create_string_buffer(_TRANSMIT_SIZE)
@@ -110,6 +115,8 @@ def _load(path: Path) -> ctypes.CDLL:
     functions = ctypes.CDLL(str(path))
     functions.rig_board_create.argtypes = [ctypes.c_char_p, ctypes.c_char_p]
     functions.rig_board_create.restype = ctypes.c_void_p
+    functions.rig_board_booted.argtypes = [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_int32]
+    functions.rig_board_booted.restype = None
     functions.rig_board_destroy.argtypes = [ctypes.c_void_p]
     functions.rig_board_destroy.restype = None
     functions.rig_board_receive.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t]

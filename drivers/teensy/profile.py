@@ -22,10 +22,12 @@ from drivers.teensy.protocol import (
     MIN_WATCHDOG_US,
     PING_DTYPE,
     PONG_DTYPE,
+    REFERENCE_DTYPE,
     STATUS_ARMED,
     STATUS_HOLDING,
     STATUS_LIMIT_TRIPPED,
     STATUS_QUEUE_DRY,
+    STATUS_REFERENCED,
     STATUS_SATURATED,
     STATUS_WATCHDOG_TRIPPED,
     TRIP_REPORT_DTYPE,
@@ -128,6 +130,7 @@ class Profile:
             Kind.DISARM: HEADER_DTYPE,
             Kind.PING: PING_DTYPE,
             Kind.TRIP: HEADER_DTYPE,
+            Kind.REFERENCE: REFERENCE_DTYPE,
         }
 
     @cached_property
@@ -142,7 +145,7 @@ class Profile:
             f"status: {STATUS_ARMED} ARMED, {STATUS_SATURATED} SATURATED,"
             f" {STATUS_QUEUE_DRY} QUEUE_DRY, {STATUS_WATCHDOG_TRIPPED} WATCHDOG_TRIPPED,"
             f" {STATUS_LIMIT_TRIPPED} LIMIT_TRIPPED, {STATUS_HOLDING} HOLDING,"
-            f" trip << {TRIP_SHIFT}"
+            f" {STATUS_REFERENCED} REFERENCED, trip << {TRIP_SHIFT}"
         )
         lines.append("trip: " + ", ".join(f"{trip.value} {trip.name}" for trip in Trip))
         lines.append("result: " + ", ".join(f"{result.value} {result.name}" for result in Result))

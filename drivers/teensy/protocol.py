@@ -6,6 +6,7 @@ frames is said by a board's profile (`drivers.teensy.profile`): the reference ri
 grasper's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -38,6 +39,7 @@ class Kind(IntEnum):
     DISARM = 21
     PING = 22
     TRIP = 23
+    REFERENCE = 24
 
 
 STATUS_ARMED = 1
@@ -46,6 +48,7 @@ STATUS_QUEUE_DRY = 4
 STATUS_WATCHDOG_TRIPPED = 8
 STATUS_LIMIT_TRIPPED = 16
 STATUS_HOLDING = 32
+STATUS_REFERENCED = 64
 """Bits of the board's state, in every sample and every acknowledgement. A trip stays until arm."""
 TRIP_SHIFT = 8
 """The high byte of the state is the `Trip` that came first, until arm."""
@@ -95,6 +98,8 @@ class Result(IntEnum):
     QUEUE_FULL = 4
     NOT_ARMED = 5
     WRONG_VERSION = 6
+    NOT_REFERENCED = 7
+    NOT_AT_REST = 8
 
 
 def layout(*fields: str) -> np.dtype[np.void]:
@@ -110,7 +115,13 @@ SAMPLE_FIELDS = ("version u1", "kind u1", "status u2", "sequence u4", "tick_us u
 """How every sample begins; it ends with `dropped`, the frames the board could not queue."""
 HEADER_DTYPE = layout(*HEADER_FIELDS)
 HELLO_REPLY_DTYPE = layout(
-    *HEADER_FIELDS, "protocol_hash u4", "firmware_version u4", "build_hash u4", "serial S24"
+    *HEADER_FIELDS,
+    "protocol_hash u4",
+    "firmware_version u4",
+    "build_hash u4",
+    "serial S24",
+    "boot u4",
+    "status u2",
 )
 ACK_DTYPE = layout(*HEADER_FIELDS, "command u1", "result u1", "status u2", "queue_free u2")
 PONG_DTYPE = layout(*HEADER_FIELDS, "token u8", "tick_us u4")
@@ -146,6 +157,8 @@ CHOICE_NAMES = (
 )
 """How the limits of every profile end: how long each watch lasts, and what a tripped board does."""
 PING_DTYPE = layout(*HEADER_FIELDS, "token u8")
+REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4")
+"""Counts that the present place of each encoder is given, in the order of a sample."""
 TRIP_REPORT_DTYPE = layout(
     *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
@@ -188,6 +201,10 @@ class Identity:
     protocol_hash: int
     build_hash: int = 0
     """CRC-32 of the sources the firmware was built from; 0 where it was not built."""
+    boot: int = 0
+    """Number of this start of the board; another after every reset."""
+    referenced: bool = False
+    """Whether its counts have their zeros."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +241,18 @@ def encode_ping(sequence: int, token: int) -> bytes:
     return np.array((VERSION, Kind.PING, sequence, token), PING_DTYPE).tobytes()
 
 
+def encode_reference(sequence: int, counts: Sequence[int]) -> bytes:
+    """Return the payload of the command that says which counts the present place has."""
+    return np.array((VERSION, Kind.REFERENCE, sequence, *counts), REFERENCE_DTYPE).tobytes()
+
+
 def encode_hello_reply(
-    sequence: int, serial: str, protocol_hash: int, build_hash: int = 0
+    sequence: int,
+    serial: str,
+    protocol_hash: int,
+    build_hash: int = 0,
+    boot: int = 1,
+    status: int = STATUS_REFERENCED,
 ) -> bytes:
     """Return the payload of the answer to a hello."""
     fields = (
@@ -236,6 +263,8 @@ def encode_hello_reply(
         FIRMWARE_VERSION,
         build_hash,
         serial.encode()[:24],
+        boot,
+        status,
     )
     return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
 
@@ -276,6 +305,8 @@ def decode_identity(fields: np.void) -> Identity:
         firmware_version=version_text(int(fields["firmware_version"])),
         protocol_hash=int(fields["protocol_hash"]),
         build_hash=int(fields["build_hash"]),
+        boot=int(fields["boot"]),
+        referenced=bool(fields["status"] & STATUS_REFERENCED),
     )
 
 

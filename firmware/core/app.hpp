@@ -23,6 +23,9 @@ class App {
   public:
     App(Hardware& hardware, const char* serial) : hardware_(hardware), board_(serial) {}
 
+    // Before the first tick; see Board::booted.
+    void begin(std::uint32_t boot, bool referenced = false) { board_.booted(boot, referenced); }
+
     // Once every Profile::kTickUs, from the sampling timer.
     void tick(std::uint32_t tick_us) {
         hardware_.drive(board_.tick(tick_us, hardware_.sample()));

@@ -13,6 +13,7 @@
 #include "crossing.hpp"
 #include "framing.hpp"
 #include "protocol.hpp"
+#include "reference_point.hpp"
 #include "safety_choice.hpp"
 #include "setpoint_queue.hpp"
 #include "watchdog.hpp"
@@ -32,6 +33,13 @@ class Board {
         }
     }
 
+    // Which start of the board this is, so that a host notices another; and whether the encoders know
+    // where they are without being told, as those of a simulated rig do.
+    void booted(std::uint32_t boot, bool referenced) {
+        boot_ = boot;
+        status_ = referenced ? kReferenced : 0;
+    }
+
     void receive(const std::uint8_t* data, std::size_t size) {
         for (std::size_t i = 0; i < size; ++i) {
             if (receiver_.take(data[i]) && receiver_.size() >= kHeaderSize) {
@@ -45,8 +53,9 @@ class Board {
         return transmitter_.take(out, room);
     }
 
-    Outputs tick(std::uint32_t tick_us, const Inputs& inputs) {
+    Outputs tick(std::uint32_t tick_us, Inputs inputs) {
         now_us_ = tick_us;
+        reference_.apply(inputs);
         const std::uint32_t silent_us = watchdog_.silent_us(tick_us);
         const std::int64_t patience_us = profile_.choice().watchdog_us;
         if (armed() && silent_us > patience_us) {
@@ -84,6 +93,9 @@ class Board {
             status |= static_cast<unsigned>(crossing.code) << kTripShift;
             status |= crossing.code == kHostSilent ? kWatchdogTripped : kLimitTripped;
         }
+        const bool doubtful = crossing.code == kEncodersDisagree || crossing.code == kEncoderJump ||
+                              crossing.code == kEncoderFrozen;
+        if (doubtful) status &= ~static_cast<unsigned>(kReferenced);
         if (hold) {
             status |= kHolding;
             held_ = profile_.begin_to_hold(inputs);
@@ -93,7 +105,7 @@ class Board {
 
     // Takes the motors out of force and forgets what was to be done; the latches stay.
     void release() {
-        status_ = status_ & (kWatchdogTripped | kLimitTripped | 0xFF << kTripShift);
+        status_ = status_ & (kReferenced | kWatchdogTripped | kLimitTripped | 0xFF << kTripShift);
         queue_.clear();
         engaged_ = false;
     }
@@ -111,6 +123,7 @@ class Board {
             Writer reply = begin(kHelloReply, sequence);
             reply.u32(Profile::kProtocolHash).u32(kFirmwareVersion).u32(kBuildHash);
             for (std::uint8_t character : serial_) reply.u8(character);
+            reply.u32(boot_).u16(status_);
             send(reply);
         } else if (kind == kPing) {
             Reader body(payload + kHeaderSize);
@@ -143,6 +156,8 @@ class Board {
                 return body == 0 ? kOk : kWrongSize;
             case kArm:
                 return body == Profile::kArmSize ? kOk : kWrongSize;
+            case kReference:
+                return body == kReferenceSize ? kOk : kWrongSize;
             case kPing:
                 return size == kPingSize ? kOk : kWrongSize;
             case kSetpoints:
@@ -161,6 +176,8 @@ class Board {
                 return arm(body);
             case kSetpoints:
                 return take_setpoints(body, size / Profile::kSetpointSize);
+            case kReference:
+                return reference(body);
             case kStart:
                 sequence_ = 0;
                 streaming_ = true;
@@ -174,13 +191,24 @@ class Board {
         }
     }
 
+    Result reference(const std::uint8_t* body) {
+        if (armed() || holding() || !reference_.at_rest()) return kNotAtRest;
+        Reader reader(body);
+        std::int32_t counts[kEncoders];
+        for (std::int32_t& count : counts) count = reader.i32();
+        reference_.set(counts);
+        status_ |= kReferenced;
+        return kOk;
+    }
+
     Result arm(const std::uint8_t* body) {
+        if ((status_ & kReferenced) == 0) return kNotReferenced;
         Reader reader(body);
         if (!profile_.arm(reader)) return kBadValue;
         release();
         first_ = Crossing();
         first_us_ = 0;
-        status_ = kArmed;
+        status_ = kArmed | kReferenced;
         return kOk;
     }
 
@@ -242,12 +270,14 @@ class Board {
     FrameTransmitter<TransmitCapacity> transmitter_;
     SetpointQueue<Setpoint, kQueueCapacity> queue_;
     Profile profile_;
+    ReferencePoint<Profile> reference_;
     Crossing first_;  // since the board was armed
     std::uint32_t first_us_ = 0;
     Watchdog watchdog_;
     Setpoint held_;
     std::uint32_t now_us_ = 0;
     std::uint32_t sequence_ = 0;
+    std::uint32_t boot_ = 0;
     std::uint16_t status_ = 0;
     bool engaged_ = false;  // armed, and a setpoint has come
     bool streaming_ = false;

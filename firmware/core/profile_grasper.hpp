@@ -54,6 +54,8 @@ class GrasperProfile {
         std::int32_t force[kMotors] = {};
     };
 
+    static std::int32_t& encoder(Inputs& inputs, std::size_t k) { return inputs.motor[k]; }
+
     struct Setpoint {
         std::int32_t target[kMotors] = {};
 

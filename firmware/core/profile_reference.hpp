@@ -2,6 +2,7 @@
 // given its current, three encoders, two torque channels; 1 kHz. Its Python twin: drivers/teensy/guard.py.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 
@@ -47,6 +48,10 @@ class ReferenceProfile {
         std::int32_t current = 0;
         std::int32_t fsr = 0;
     };
+
+    static std::int32_t& encoder(Inputs& inputs, std::size_t k) {
+        return k == 0 ? inputs.motor : k == 1 ? inputs.spindle : inputs.jaw;
+    }
 
     struct Setpoint {
         std::int32_t target = 0;

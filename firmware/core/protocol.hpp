@@ -26,7 +26,7 @@ constexpr std::uint32_t kBuildHash = RIG_BUILD_HASH;
 constexpr char kFramingLines[] = "COBS(payload, CRC-16/CCITT-FALSE u2) 00\n";
 constexpr char kAnswerLines[] =
     "2 HELLO_REPLY: version u1, kind u1, sequence u2, protocol_hash u4, firmware_version u4, "
-    "build_hash u4, serial S24\n"
+    "build_hash u4, serial S24, boot u4, status u2\n"
     "3 ACK: version u1, kind u1, sequence u2, command u1, result u1, status u2, queue_free u2\n"
     "4 PONG: version u1, kind u1, sequence u2, token u8, tick_us u4\n"
     "5 TRIP_REPORT: version u1, kind u1, sequence u2, code u1, channel u1, value i4, limit i4, "
@@ -38,14 +38,15 @@ constexpr char kOtherLines[] =
     "21 DISARM: version u1, kind u1, sequence u2\n"
     "22 PING: version u1, kind u1, sequence u2, token u8\n"
     "23 TRIP: version u1, kind u1, sequence u2\n"
+    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4\n"
     "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED, 32 "
-    "HOLDING, trip << 8\n"
+    "HOLDING, 64 REFERENCED, trip << 8\n"
     "trip: 0 NONE, 1 HOST_SILENT, 2 OVER_CURRENT, 3 PROXIMAL_TORQUE, 4 DISTAL_TORQUE, 5 "
     "SPINDLE_TRAVEL, 6 JAW_TRAVEL, 7 OVER_SPEED, 8 OVERHEATED, 9 STALLED, 10 SENSOR_SATURATED, "
     "11 SENSOR_STALE, 12 SENSOR_MISSING, 13 MOTOR_TRAVEL, 14 OVER_FORCE, 15 ENCODERS_DISAGREE, "
     "16 FOLLOWING_ERROR, 17 CURRENT_MISMATCH, 18 ENCODER_JUMP, 19 ENCODER_FROZEN\n"
     "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, 6 "
-    "WRONG_VERSION\n";
+    "WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST\n";
 
 enum Kind : std::uint8_t {
     kSample = 1,
@@ -61,6 +62,7 @@ enum Kind : std::uint8_t {
     kDisarm = 21,
     kPing = 22,
     kTrip = 23,
+    kReference = 24,
 };
 
 enum Status : std::uint16_t {
@@ -70,6 +72,7 @@ enum Status : std::uint16_t {
     kWatchdogTripped = 8,
     kLimitTripped = 16,
     kHolding = 32,
+    kReferenced = 64,
 };
 constexpr unsigned kTripShift = 8;
 
@@ -104,10 +107,13 @@ enum Result : std::uint8_t {
     kQueueFull = 4,
     kNotArmed = 5,
     kWrongVersion = 6,
+    kNotReferenced = 7,
+    kNotAtRest = 8,
 };
 
 constexpr std::size_t kHeaderSize = 4;
 constexpr std::size_t kSerialSize = 24;
+constexpr std::size_t kReferenceSize = 4 * 3;
 constexpr std::size_t kPingSize = kHeaderSize + 8;
 
 constexpr std::uint32_t crc32_next(std::uint32_t crc, const char* text) {

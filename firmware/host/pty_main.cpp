@@ -83,6 +83,7 @@ void run(int master, const char* serial) {
     Hardware hardware(master);
     static rig::App<Profile, Hardware, kTransmitCapacity> app(hardware, serial);
     const std::uint64_t began_ns = now_ns();
+    app.begin(static_cast<std::uint32_t>(began_ns / 1000U), true);  // the plant's counters are absolute
     for (std::uint64_t tick = 1; !ended; ++tick) {
         // the clock says when a tick is due, so a process that slept too long catches up
         const std::uint64_t due_ns = began_ns + tick * kTickNs;

@@ -17,6 +17,7 @@ constexpr std::size_t kTransmitCapacity = 65536;
 class HostBoard {
   public:
     virtual ~HostBoard() = default;
+    virtual void booted(std::uint32_t boot, bool referenced) = 0;
     virtual void receive(const std::uint8_t* data, std::size_t size) = 0;
     virtual void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) = 0;
     virtual std::size_t transmit(std::uint8_t* out, std::size_t room) = 0;
@@ -50,6 +51,7 @@ class ProfileBoard final : public HostBoard {
   public:
     explicit ProfileBoard(const char* serial) : board_(serial) {}
 
+    void booted(std::uint32_t boot, bool referenced) override { board_.booted(boot, referenced); }
     void receive(const std::uint8_t* data, std::size_t size) override { board_.receive(data, size); }
     void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) override {
         put(board_.tick(tick_us, inputs_of(inputs, Profile())), outputs);
@@ -83,6 +85,11 @@ void* rig_board_create(const char* profile, const char* serial) {
 }
 
 void rig_board_destroy(void* board) { delete board_of(board); }
+
+// Which start of the board this is, and whether its encoders know where they are (1) or not (0).
+void rig_board_booted(void* board, std::uint32_t boot, std::int32_t referenced) {
+    board_of(board)->booted(boot, referenced != 0);
+}
 
 void rig_board_receive(void* board, const std::uint8_t* data, std::size_t size) {
     board_of(board)->receive(data, size);

@@ -54,6 +54,10 @@ class LoggerStalledError(RigError):
     """The logger sends nothing although it should stream."""
 
 
+class BoardResetError(LoggerStalledError):
+    """The board was started anew while the session ran."""
+
+
 class Session:
     """A connected rig.
 
@@ -116,6 +120,7 @@ class Session:
             "logger_serial": self.identity.serial,
             "firmware_version": self.identity.firmware_version,
             "firmware_build": f"{self.identity.build_hash:08x}",
+            "board_start": str(self.identity.boot),
         }
 
     @property
@@ -247,9 +252,10 @@ class Session:
             if len(batch.samples):
                 break
             if self._transport.now_s > give_up_s:
+                self._require_same_boot()
                 raise LoggerStalledError(
                     f"The logger has sent nothing for {STALL_S:g} s.",
-                    "Its cable was pulled, it was reset, or its program stopped.",
+                    "Its cable was pulled, or its program stopped.",
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
@@ -281,9 +287,29 @@ class Session:
         except CommandRefusedError as error:
             report = self._logger.trip()
             if report.code is Trip.NONE:
+                self._require_same_boot()
                 raise
             state = "It is in its safe state, until armed again."
             raise self._tripped(report, state) from error
+
+    def _require_same_boot(self) -> None:
+        """Ask which start of the board this is.
+
+        Raises:
+            BoardResetError: It is another than the session's.
+        """
+        try:
+            boot = self._logger.identify().boot
+        except DriverError:
+            return  # nobody answers: what called this says so
+        if boot != self.identity.boot:
+            raise BoardResetError(
+                "The board was started anew while it was in use.",
+                f"This is its start number {boot}, the session began in number"
+                f" {self.identity.boot}: a reset, its watchdog, or its supply.",
+                "It is disarmed and its counts have lost their zeros. Find out why it was reset,"
+                " then run: rig reference",
+            )
 
     def _require_no_trip(self, reading: Reading) -> None:
         """Look for what the board itself tripped over.

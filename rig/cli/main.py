@@ -25,6 +25,7 @@ from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
 from rig.cli.record import record
+from rig.cli.reference import reference
 from rig.cli.replay import replay
 from rig.cli.stop import stop
 from rig.cli.study import study_app
@@ -63,6 +64,7 @@ app.add_typer(config_app, name="config")
 app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
+app.command()(reference)
 app.command()(stop)
 app.command()(udev)
 app.add_typer(firmware_app, name="firmware")

@@ -71,6 +71,7 @@ class GrasperMachine:
             ("force", "force_n"),
         )
     }
+    here_channels = tuple(f"{axis}_angle_rad" for axis in AXES)
     shown = ("grasp_force_n", "pitch_force_n", "yaw_force_n")
     guard = grasper_guard.GrasperDrive
     first_crossing = staticmethod(grasper_guard.first_crossing)
@@ -124,6 +125,16 @@ class GrasperMachine:
             watchdog_us=round(safety.watchdog_s * 1e6),
             safe_state=SafeState[safety.safe_state.upper()],
             hold_command_e4=round(safety.hold_command_ratio * 1e4),
+        )
+
+    def reference_counts(
+        self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
+    ) -> tuple[int, ...]:
+        """Return the counts of the three motors."""
+        lines = [calibrations.channels[f"{axis}_angle_rad"] for axis in AXES]
+        return tuple(
+            round(angle / line.slope + line.zero_counts)
+            for angle, line in zip(here, lines, strict=True)
         )
 
     def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:

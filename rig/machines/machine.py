@@ -60,6 +60,7 @@ class Machine(Protocol):
         counts: Stream of its raw counts in a log.
         setpoint_channels: Channel whose calibration makes counts of each field of a setpoint.
         channels_of_inputs: Channel of each input of the board.
+        here_channels: Channels whose values say where it stands, in the order of its setpoints.
         shown: Channels the live display shows, the main one first.
     """
 
@@ -71,6 +72,8 @@ class Machine(Protocol):
     def setpoint_channels(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def channels_of_inputs(self) -> Mapping[str, str]: ...  # noqa: D102
+    @property
+    def here_channels(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def shown(self) -> tuple[str, ...]: ...  # noqa: D102
 
@@ -84,6 +87,12 @@ class Machine(Protocol):
 
     def board_limits(self, config: Config, calibrations: CalibrationSet) -> ArmLimits:
         """Return the limits the board holds against every sample itself, in its own counts."""
+        ...
+
+    def reference_counts(
+        self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
+    ) -> tuple[int, ...]:
+        """Return the counts of the three encoders where the rig stands at `here`, rad."""
         ...
 
     def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.linear import CalibrationSet
 from drivers.teensy.guard import Drive, first_crossing
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, Trip
@@ -33,6 +34,7 @@ class ReferenceMachine:
         "distal": "distal_torque_n_m",
         "current": "motor_current_a",
     }
+    here_channels = ("spindle_angle_rad",)
     shown = ("distal_torque_n_m",)
     board_limits = staticmethod(board_limits)
     guard = Drive
@@ -45,6 +47,22 @@ class ReferenceMachine:
     def gains(self, config: Config) -> Sequence[float]:
         """Return the gains of the position controller."""
         return config.controller.gains()
+
+    def reference_counts(
+        self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
+    ) -> tuple[int, ...]:
+        """Return the counts of motor, spindle and jaw, of a train without slack."""
+        believed, (spindle_rad,) = config.plausibility, here
+        angles = {
+            "motor_angle_rad": believed.gear_ratio * spindle_rad,
+            "spindle_angle_rad": spindle_rad,
+            "jaw_angle_rad": believed.jaw_zero_rad + believed.jaw_ratio * spindle_rad,
+        }
+        lines = calibrations.channels
+        return tuple(
+            round(angle / lines[name].slope + lines[name].zero_counts) if name in lines else 0
+            for name, angle in angles.items()
+        )
 
     def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:
         """Hold the limits of travel and load against a trajectory."""

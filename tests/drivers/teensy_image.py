@@ -194,6 +194,8 @@ class TeensyImage:
             "usb_serial_write": usb_write,
             "usb_serial_flush_output": lambda: 0,
             "micros": lambda: self.now_us,
+            "eeprom_read_dword": lambda: 41,
+            "eeprom_write_dword": lambda: 0,
             "delay": lambda: 0,
             "wait_for_cal": lambda: 0,
             "analogRead": analog_read,

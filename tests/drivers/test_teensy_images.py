@@ -85,7 +85,10 @@ def set_in_motion(name: str, image: TeensyImage) -> None:
     else:
         arm = REFERENCE.encode_arm(2, np.array([[1.0, 0, 0, 1, 100]]), Limits.widest())
         moves = REFERENCE.encode_setpoints(3, [np.zeros(9, np.int32)] * 2)
-    say(image, protocol.encode_command(Kind.HELLO, 1), arm, moves)
+    for _ in range(110):  # it stands still, and is referenced where it stands
+        image.tick()
+    say(image, protocol.encode_command(Kind.HELLO, 1), protocol.encode_reference(1, [0, 0, 0]))
+    say(image, arm, moves)
     for _ in range(3):
         image.tick()
         image.call("loop")

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Arduino.h>
+#include <avr/eeprom.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -18,6 +19,14 @@ class TeensyLink {
         Lock(const Lock&) = delete;
         Lock& operator=(const Lock&) = delete;
     };
+
+    // Counts the starts of this board, over its resets and its power.
+    static std::uint32_t boot() {
+        auto* at = reinterpret_cast<std::uint32_t*>(std::uintptr_t{kBootAddress});
+        const std::uint32_t boot = eeprom_read_dword(at) + 1;
+        eeprom_write_dword(at, boot);
+        return boot;
+    }
 
     std::uint32_t now_us() { return micros(); }
 
@@ -38,6 +47,9 @@ class TeensyLink {
         Serial.send_now();
         return count <= asked ? count : 0;  // the core gives -1, as a size, where USB is not there
     }
+
+  private:
+    static constexpr std::uintptr_t kBootAddress = 4;
 };
 
 }  // namespace rig

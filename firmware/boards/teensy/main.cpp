@@ -22,6 +22,7 @@ void sample() { app.tick(); }
 
 void setup() {
     hardware.begin();
+    app.begin(Hardware::boot());
     timer.priority(rig::wiring::kSamplePriority);
     hardware.begin_watch();
     // without a timer no tick feeds the watchdog, and the chip starts anew

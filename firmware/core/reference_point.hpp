@@ -1,0 +1,59 @@
+// Where the encoders' zeros are. Incremental counters begin at 0 wherever the shafts stand when the board is
+// started; travel limits mean nothing until the host has said which counts the present place has.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "crossing.hpp"
+
+namespace rig {
+
+constexpr std::size_t kEncoders = 3;  // of every profile
+
+template <class Profile>
+class ReferencePoint {
+  public:
+    // Turns what the counters give into the rig's counts. Once every tick.
+    void apply(typename Profile::Inputs& inputs) {
+        ++still_ticks_;
+        for (std::size_t k = 0; k < kEncoders; ++k) {
+            std::int32_t& count = Profile::encoder(inputs, k);
+            if (count == kMissing) {
+                still_ticks_ = 0;
+                continue;
+            }
+            if (magnitude(std::int64_t{count} - anchor_[k]) > kRestCounts) {
+                anchor_[k] = count;
+                still_ticks_ = 0;
+            }
+            raw_[k] = count;
+            count = wrapped(count, offset_[k]);
+        }
+    }
+
+    bool at_rest() const { return still_ticks_ >= kRestTicks; }
+
+    // From now on the counts of the present place are these.
+    void set(const std::int32_t (&counts)[kEncoders]) {
+        for (std::size_t k = 0; k < kEncoders; ++k) {
+            offset_[k] = wrapped(counts[k], wrapped(0, -std::int64_t{raw_[k]}));
+        }
+    }
+
+  private:
+    static constexpr std::int64_t kRestCounts = 4;
+    static constexpr std::uint32_t kRestTicks = 100;
+
+    static std::int32_t wrapped(std::int32_t count, std::int64_t more) {
+        return static_cast<std::int32_t>(static_cast<std::uint32_t>(count) +
+                                         static_cast<std::uint32_t>(more));
+    }
+
+    std::int32_t raw_[kEncoders] = {};
+    std::int32_t anchor_[kEncoders] = {};
+    std::int32_t offset_[kEncoders] = {};
+    std::uint32_t still_ticks_ = 0;
+};
+
+}  // namespace rig
