@@ -35,7 +35,7 @@ class Generator:
 def main() -> int:
     """Measure what the command line asks for."""
     options = _parser().parse_args()
-    rig = Rig(options.rig)
+    rig = Rig(options.rig, options.version)
     for generator in _generators(options):
         rows = measure(
             [c for c in generator.cases if c.name.startswith(tuple(options.only.split(",")))],
@@ -61,6 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         default=Path(sys.executable).parent / "rig",
         help="executable in .venv/bin of the checkout that is measured",
     )
+    parser.add_argument("--version", default="", help="its name on the page; its commit if none")
     parser.add_argument("--seed", type=int, help="of --own; the next judging seed if none")
     parser.add_argument(
         "--counts", type=_counts, default=own.COUNTS, help="of --own: class=N,class=N"
@@ -103,6 +104,8 @@ def _generators(options: argparse.Namespace) -> Iterator[Generator]:
 def _tell(row: Row) -> None:
     verdict = {True: "right", False: "WRONG", None: "-"}[row.right]
     stated = "; ".join(row.named) or row.note
+    if row.solved is not None:
+        stated += f"; after the proposed runs {'solved' if row.solved else 'not solved'}"
     _say(f"{row.case:24s} {verdict:6s} {row.cpu_s:6.1f} s  {stated}")
 
 

@@ -57,14 +57,16 @@ class Rig:
 
     Attributes:
         path: The executable; its own checkout is the version that is measured.
+        name: What the version is called; its commit when empty.
     """
 
     path: Path
+    name: str = ""
 
     @cached_property
     def version(self) -> str:
-        """Commit of the checkout in whose `.venv/bin` the executable lies."""
-        return commit(self.path.absolute().parents[2])
+        """Name, or the commit of the checkout in whose `.venv/bin` the executable lies."""
+        return self.name or commit(self.path.absolute().parents[2])
 
     @cached_property
     def _help(self) -> str:
@@ -120,7 +122,8 @@ def _run(words: Sequence[str], more: dict[str, str]) -> str:
         )
     except subprocess.TimeoutExpired:
         return f"no answer within {TIME_LIMIT_S:g} s"
-    return f"exit code {done.returncode}: {(done.stderr or done.stdout).strip()[-500:]}"
+    said = (done.stderr or done.stdout).strip()
+    return f"exit code {done.returncode}: {said[max(said.rfind('error:'), 0) :][:500]}"
 
 
 def _environment(more: dict[str, str]) -> dict[str, str]:

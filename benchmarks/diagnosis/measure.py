@@ -26,7 +26,7 @@ class Row:
         right: Whether the answer was right; None where nobody knows.
         sure_and_wrong: Whether a wrong statement was made surely.
         extra: Names that are not true, beside those that are.
-        named: What was stated: verdict, equation, family and confidence of each finding.
+        named: What was stated, finding by finding.
         ratio: Error on the test runs over the error of the declared model on the same campaign
             without the effects, the worst of the rightly named equations; None where not known.
         solved: Whether the answer was right after the proposed runs; None where none were played.
@@ -110,25 +110,31 @@ class _Asking:
 
 
 def _row(case: Case, first: Answer, asking: _Asking) -> Row:
-    judged, failed = Judgement(False, note=first.message), True
-    findings = []
-    if first.report is not None:
-        judged, failed = case.judge(first.report), False
-        findings = first.report["findings"]
+    report = first.report
+    judged = Judgement(False, note=first.message) if report is None else case.judge(report)
     return Row(
         case.name,
         case.kind,
         judged.right,
         judged.sure_and_wrong,
         judged.extra,
-        [f"{f['verdict']} {f['balance']}:{f['family']} {f['confidence']}" for f in findings],
-        None if first.report is None else _ratio(first.report, judged, asking),
+        [] if report is None else [_stated(finding) for finding in report["findings"]],
+        None if report is None else _ratio(report, judged, asking),
         _solved(first, asking),
         first.cpu_s,
         first.wall_s,
-        failed,
+        report is None,
         judged.note,
     )
+
+
+def _stated(finding: Report) -> str:
+    """Return a finding in a few words: verdict, equation, families or variables, confidence."""
+    names = [finding["family"], *finding["alternatives"]]
+    if finding["verdict"] == "depends_on":
+        names = finding["depends_on"]
+    sure = "" if finding["confidence"] is None else f" ({finding['confidence']:.2f})"
+    return f"{finding['verdict']} {finding['balance']}: {', '.join(names)}{sure}"
 
 
 def _ratio(report: Report, judged: Judgement, asking: _Asking) -> float | None:

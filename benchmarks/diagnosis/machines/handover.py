@@ -63,13 +63,15 @@ class Errors:
     after: float
 
     def percent(self) -> str:
-        """Return both in percent."""
+        """Return both in percent, in words."""
+        if math.isnan(self.before + self.after):
+            return "no error stated"
         return f"{100 * self.before:.2f} -> {100 * self.after:.2f} %"
 
 
 def errors(runs: Sequence[Run], target: str, report: Report, equation: str = "motor") -> Errors:
-    """Return the errors an answer states, relative to the target."""
+    """Return the errors an answer states, relative to the target; not a number where none is."""
     test = [run.columns[target] for run in runs if run.name in report["runs"]["confirm"]]
     size = math.sqrt(float(np.mean(np.concatenate(test) ** 2)))
-    before, after = (report[f"rmse_with_means_{when}"][equation] for when in ("before", "after"))
-    return Errors(before / size, after / size)
+    stated = [report[f"rmse_with_means_{when}"].get(equation) for when in ("before", "after")]
+    return Errors(*(math.nan if error is None else error / size for error in stated))
