@@ -55,8 +55,8 @@ class Case:
         write: Writes the recordings into an empty folder.
         judge: Judges an answer; it may raise KeyError for an answer that breaks the contract.
         write_without: Writes the same campaign without the hidden effects (same rig, same noise),
-            or None where nothing simulates it. What the declared model leaves there is the least
-            that any diagnosis could reach, and the denominator of the error ratio.
+            or None where nothing simulates it. The residual of the declared model there is the
+            denominator of the error ratio.
         write_next: Plays a proposed protocol (first path, a file) on the same rig and writes the
             new runs into the folder of the old ones (second path); None where nothing can.
         judge_next: Judges the answer about old and new runs together.
