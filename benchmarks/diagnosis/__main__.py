@@ -20,7 +20,7 @@ from benchmarks.diagnosis.seeds import next_to_judge, use_of
 
 @dataclass(frozen=True)
 class Generator:
-    """Cases, and what they are called on the page."""
+    """Cases, and what they are called on the page: a folder goes by its last name."""
 
     name: str
     cases: list[Case]
@@ -91,14 +91,11 @@ def _generators(options: argparse.Namespace) -> Iterator[Generator]:
             seed = next_to_judge(judged_seeds(options.page))
         _say(f"own simulator, seed {seed} ({use_of(seed)})")
         yield Generator("own", list(own.cases(seed, options.counts)), seed)
-    for name, path, cases in (
-        ("another simulator", options.otherlab, otherlab.cases),
-        ("machines", options.machines, machines.cases),
-    ):
+    for path, cases in ((options.otherlab, otherlab.cases), (options.machines, machines.cases)):
         if path is not None and not path.is_dir():
-            _say(f"{name} skipped: there is no folder {path}")
+            _say(f"skipped: there is no folder {path}")
         elif path is not None:
-            yield Generator(name, list(cases(path)))
+            yield Generator(path.name, list(cases(path)))
 
 
 def _tell(row: Row) -> None:
