@@ -165,6 +165,6 @@ def _machine(measured: Measured, row: Row) -> list[str]:
         "no answer" if row.failed else "; ".join(row.named) or "nothing missing",
         "-" if row.right is None else "yes" if row.right else "no",
         "yes" if row.sure_and_wrong else "no",
-        row.note.replace("|", "/").replace("\n", " "),
+        " ".join(row.note.replace("|", "/").split()),
         f"{row.cpu_s:.0f}",
     ]

@@ -16,7 +16,7 @@ from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case, Judgement
 from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record, write_next
 from benchmarks.diagnosis.excitation import EXCITATIONS, plans_of
-from benchmarks.diagnosis.machines import emps
+from benchmarks.diagnosis.machines import emps, smart_grasper, sts3215, ur10e
 from benchmarks.diagnosis.measure import measure
 from benchmarks.diagnosis.page import Measured, append, judged_seeds
 from benchmarks.diagnosis.scoring import judge, judge_next, outcome
@@ -412,3 +412,45 @@ def test_a_drive_axis_is_cut_in_laps_and_its_asymmetry_is_the_answer(tmp_path: P
         judged = case.judge(report | said(found))
         assert (judged.right, judged.sure_and_wrong) == (right, sure)
         assert judged.note.startswith("10.00 -> 10.00 %")
+
+
+def test_a_servo_s_run_is_its_drive_while_it_is_on(tmp_path: Path) -> None:
+    entries = [
+        {
+            "timestamp": 0.01 * k,
+            "position": -3.14 if k == 20 else 0.1,
+            "goal_position": 0.4,
+            "input_volts": 12.0,
+            "temp": 30.0,
+            "torque_enable": k >= 10,
+        }
+        for k in range(50)
+    ]
+    run = sts3215.read(
+        {"mass": 1.0, "length": 0.1, "kp": 8, "trajectory": "sin", "entries": entries}
+    )
+    assert run.time_s[-1] == pytest.approx(0.39, abs=0.011)
+    assert run.columns["drive_ratio"] == pytest.approx(np.full(len(run.time_s), 0.4))
+    assert run.columns["motor_temperature_k"][0] == pytest.approx(303.15)
+
+
+def test_a_grasper_s_file_is_cut_where_the_sweep_begins_again(tmp_path: Path) -> None:
+    rows = [f"0,20.4,{pwm},10,3000,-500" for pwm in (30, 30, 35, 40, 30, 35, 40)]
+    path = tmp_path / "Force_Calibration_05_05_2021_0.csv"
+    path.write_text("\n".join(["Trial,Jaw,PWM,Inner,Outer,Encoder", *rows]))
+    first, second = smart_grasper.read(path)
+    assert (len(first.time_s), len(second.time_s)) == (4, 3)
+    assert second.columns["motor_current_a"][-1] == pytest.approx(0.4 * 40 / 255)
+    assert first.conditions == {"jaw_distance_m": pytest.approx(0.0204), "date": "05_05_2021"}
+
+
+def test_a_joint_s_runs_hold_both_directions(tmp_path: Path) -> None:
+    time_s = np.arange(0.0, 60.0, 0.01)
+    rows = np.zeros((time_s.size, 31))
+    rows[:, 0], rows[:, 6] = 300.0 + time_s, np.cos(2 * np.pi * (time_s - 2.7) / 10.0)
+    np.savetxt(tmp_path / "ur-joint_6.csv", rows, delimiter=",")
+    runs = ur10e.read(tmp_path, "drive_current_a")
+    assert len(runs) >= 7
+    for run in runs:
+        steps = np.diff(run.columns["spindle_angle_rad"])
+        assert min(np.mean(steps > 0), np.mean(steps < 0)) > 0.4
