@@ -125,7 +125,7 @@ def _names(kind: str, number: int, seed: int, random: np.random.Generator) -> li
     while kind == "pair":
         first, second = (str(name) for name in random.choice(lasting, 2, replace=False))
         one, other = CATALOGUED[first], CATALOGUED[second]
-        if not one.names(other.family) and "usual" in (one.needs, other.needs):
+        if other.family not in (one.family, *one.accepted) and "usual" in (one.needs, other.needs):
             return [first, second]
     return []
 

@@ -7,8 +7,9 @@ from functools import partial
 
 from benchmarks.diagnosis import scoring
 from benchmarks.diagnosis.case import KINDS, Case
-from benchmarks.diagnosis.draw import draw, write, write_next
+from benchmarks.diagnosis.draw import Answer, draw, write, write_next
 from benchmarks.diagnosis.excitation import plans_of
+from benchmarks.diagnosis.truths import TRUTHS
 
 COUNTS = {
     "strong": 10,
@@ -35,12 +36,12 @@ def cases(seed: int, counts: Mapping[str, int] = COUNTS) -> Iterator[Case]:
 
 def _case(kind: str, number: int, seed: int) -> Case:
     answer = draw(kind, number, seed)
-    runs = [plan.name for plan in plans_of(answer.excitation)]
+    truth = truth_of(answer)
     case = Case(
         f"{kind}-{number}",
         kind,
         partial(write, answer),
-        partial(scoring.judge, answer, runs),
+        partial(scoring.judge, truth),
     )
     if kind == "clean":
         return case
@@ -50,5 +51,16 @@ def _case(kind: str, number: int, seed: int) -> Case:
     return replace(
         case,
         write_next=partial(write_next, answer),
-        judge_next=partial(scoring.judge_next, answer),
+        judge_next=partial(scoring.judge_next, truth),
     )
+
+
+def truth_of(answer: Answer) -> scoring.Truth:
+    """Return what is hidden, as an answer is held against it."""
+    plans = plans_of(answer.excitation)
+    hidden = [
+        scoring.Hidden({t.family, *t.accepted}, t.equations, t.depends_on)
+        for t in (TRUTHS[effect.name] for effect in answer.effects)
+    ]
+    runs = [plans[index].name for index in answer.runs]
+    return scoring.Truth(answer.kind, hidden, runs, answer.either)

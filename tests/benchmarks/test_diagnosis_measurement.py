@@ -2,7 +2,6 @@
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,9 @@ from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record, write
 from benchmarks.diagnosis.excitation import EXCITATIONS, plans_of
 from benchmarks.diagnosis.machines import emps, smart_grasper, sts3215, ur10e
 from benchmarks.diagnosis.measure import measure
+from benchmarks.diagnosis.own import truth_of
 from benchmarks.diagnosis.page import Measured, append, judged_seeds
-from benchmarks.diagnosis.scoring import judge, judge_next, outcome
+from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge, use_of
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
@@ -28,7 +28,7 @@ from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
 
-RUNS = [f"{k:03d}" for k in range(14)]
+RUNS = [plan.name for plan in plans_of("usual")]
 
 
 def finding(verdict: str, family: str, balance: str = "motor", **more: Any) -> dict[str, Any]:
@@ -40,8 +40,11 @@ def said(*findings: dict[str, Any], following: object = None) -> dict[str, Any]:
     return {"findings": list(findings), "next_experiment": following}
 
 
-def hidden(kind: str, *names: str, either: tuple[str, ...] = ()) -> Answer:
-    return Answer("case-x", kind, tuple(HiddenEffect(n) for n in names), (0,), either=either)
+def hidden(
+    kind: str, *names: str, either: tuple[str, ...] = (), runs: tuple[int, ...] = (0,)
+) -> Truth:
+    effects = tuple(HiddenEffect(name) for name in names)
+    return truth_of(Answer("case-x", kind, effects, runs, either=either))
 
 
 def test_every_hidden_effect_has_an_answer() -> None:
@@ -121,7 +124,7 @@ def test_a_proposed_protocol_is_played_on_the_same_rig_with_the_effect(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("answer", "report", "result"),
+    ("truth", "report", "result"),
     [
         (hidden("clean"), said(), "nothing found"),
         (hidden("clean"), said(finding("something_missing", "unknown")), "false finding"),
@@ -197,10 +200,10 @@ def test_a_proposed_protocol_is_played_on_the_same_rig_with_the_effect(tmp_path:
         ),
     ],
 )
-def test_an_answer_is_scored(answer: Answer, report: dict[str, Any], result: str) -> None:
-    assert outcome(answer, report) == result
+def test_an_answer_is_scored(truth: Truth, report: dict[str, Any], result: str) -> None:
+    assert outcome(truth, report) == result
     best = {"clean": "nothing found", "outside": "depends on", "confounded": "one of"}
-    assert judge(answer, RUNS, report).right == (result == best.get(answer.kind, "right name"))
+    assert judge(truth, report).right == (result == best.get(truth.kind, "right name"))
 
 
 def test_a_wrong_name_is_sure_from_nine_tenths_on() -> None:
@@ -208,20 +211,20 @@ def test_a_wrong_name_is_sure_from_nine_tenths_on() -> None:
     true = finding("identified", "ripple.motor", confidence=0.99)
     for confidence in (0.89, 0.9):
         wrong = finding("identified", "friction.drag", confidence=confidence)
-        judged = judge(answer, RUNS, said(true, wrong))
+        judged = judge(answer, said(true, wrong))
         assert (judged.right, judged.extra) == (False, 1)
         assert judged.sure_and_wrong == (confidence >= 0.9)
 
 
 def test_an_effect_of_some_runs_needs_the_runs_but_for_one() -> None:
-    answer = replace(hidden("some_runs", "motor_ripple"), runs=(1, 2, 3, 4, 5))
+    answer = hidden("some_runs", "motor_ripple", runs=(1, 2, 3, 4, 5))
     for affected, right in (
         ([1, 2, 3, 4, 5], True),
         ([1, 2, 3, 4], True),
         ([1, 2, 3, 8, 9], False),
     ):
         found = finding("identified", "ripple.motor", runs_affected=[RUNS[k] for k in affected])
-        assert judge(answer, RUNS, said(found)).right == right
+        assert judge(answer, said(found)).right == right
 
 
 def test_a_confounded_case_is_solved_by_the_single_true_name() -> None:
@@ -312,9 +315,9 @@ def test_a_line_stands_beside_those_of_other_versions(tmp_path: Path) -> None:
         rows = measure(cases, rig, tmp_path / f"{version}{right}", tell=lambda row: None)
         append(page, Measured(version, "own", seed), rows)
 
-    line("old", 3000, right=False)
-    line("new", 3000, right=True)
-    line("old", 3000, right=True)
+    line("old", 2_000_000, right=False)
+    line("new", 2_000_000, right=True)
+    line("old", 2_000_000, right=True)
     line("old", None, right=None, kind="machine")
     table = [
         r.split(" | ") for r in page.read_text().splitlines() if r.startswith(("| old", "| new"))
@@ -325,18 +328,17 @@ def test_a_line_stands_beside_those_of_other_versions(tmp_path: Path) -> None:
         ("old", "seen", "1/1"),
     ]
     assert cells[2][2:5] == ["a", "nothing missing", "-"]
-    assert judged_seeds(page) == {3000}
+    assert judged_seeds(page) == {2_000_000}
 
 
 def test_a_judging_seed_is_used_once() -> None:
-    assert [use_of(seed) for seed in (181, 1000, 2000, 3000)] == [
-        "spent",
-        "calibrate",
-        "develop",
-        "judge",
-    ]
-    assert use_of(next_to_judge({3000, 3001, 5})) == "judge"
-    assert next_to_judge({3000, 3001, 5}) not in {3000, 3001}
+    seeds = (181, 1_000_000, 2_000_000)
+    assert [use_of(seed) for seed in seeds] == ["calibrate", "develop", "judge"]
+    with pytest.raises(ValueError, match="for nothing"):
+        use_of(3_000_000)
+    spent = {2_000_000, 2_001_500, 5}
+    assert use_of(next_to_judge(spent)) == "judge"
+    assert next_to_judge(spent) // 1000 not in {2000, 2001}
 
 
 OTHER = {
