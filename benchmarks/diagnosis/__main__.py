@@ -42,7 +42,7 @@ def main() -> int:
             rig,
             options.out / rig.version / generator.folder,
             ask=not options.no_asking,
-            tell=_tell,
+            on_row=_print_row,
         )
         if rows and not options.no_page:
             append(options.page, Measured(rig.version, generator.name, generator.seed), rows)
@@ -98,7 +98,7 @@ def _generators(options: argparse.Namespace) -> Iterator[Generator]:
             yield Generator(path.name, list(cases(path)))
 
 
-def _tell(row: Row) -> None:
+def _print_row(row: Row) -> None:
     verdict = {True: "right", False: "WRONG", None: "-"}[row.right]
     stated = "; ".join(row.named) or row.note
     if row.solved is not None:

@@ -40,8 +40,9 @@ EITHER = {
     "one spring": ("friction.load", "motor.saturation"),
     "constant speed": ("friction.load", "motor.saturation", "friction.load_viscous"),
 }
-"""What cannot be told from friction by load on such runs: loads of one sign tell it from a falling
-torque constant by the rotor's own friction only, and one speed says nothing of others."""
+"""Families that such runs cannot distinguish from friction by load: with loads of one sign only the
+rotor's own friction separates it from a falling torque constant, and at one speed nothing separates
+it from what depends on speed."""
 
 SPREAD = 0.1
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -63,7 +64,7 @@ class Answer:
         runs: Places of the runs that have them.
         excitation: One of `EXCITATIONS`.
         chain: One of `CHAINS`.
-        either: For a confounded case: families that cannot be told apart on its runs.
+        either: For a confounded case: families that its runs cannot distinguish.
     """
 
     case: str

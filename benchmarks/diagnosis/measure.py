@@ -51,7 +51,12 @@ class Row:
 
 
 def measure(
-    cases: Iterable[Case], rig: Rig, folder: Path, *, ask: bool = True, tell: Callable[[Row], None]
+    cases: Iterable[Case],
+    rig: Rig,
+    folder: Path,
+    *,
+    ask: bool = True,
+    on_row: Callable[[Row], None],
 ) -> list[Row]:
     """Return the rows of all cases, answered now or before, and write them to `rows.jsonl`.
 
@@ -60,7 +65,7 @@ def measure(
         rig: The version to ask.
         folder: Where the answers of this version and generator are kept.
         ask: Whether to ask where there is no answer yet; else such cases are left out.
-        tell: Called with each row as it is made.
+        on_row: Called with each row as it is made.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = []
@@ -68,7 +73,7 @@ def measure(
         rows.append(row)
         lines = [json.dumps(asdict(one)) for one in rows]
         write_text_atomic(folder / "rows.jsonl", "\n".join(lines) + "\n")
-        tell(row)
+        on_row(row)
     return rows
 
 

@@ -1,7 +1,7 @@
 """What each hidden effect is called, what may be said instead, and in which equation it shows.
 
-A name is right when it is the family or an accepted equivalent: one that the rig's sensors cannot
-tell from it in that equation, whatever is played.
+A name is right when it is the family or an accepted equivalent: one that the rig's sensors
+cannot distinguish from it in that equation, whatever is played.
 """
 
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ class Truth:
 
     Attributes:
         family: Catalogue id, or `unknown` for what no catalogue holds.
-        equations: Balances in which it shows.
-        accepted: Families that cannot be told from it.
+        equations: Equations in which it shows.
+        accepted: Families that cannot be distinguished from it.
         depends_on: For `unknown`: one word of each group, and none beside them, is right.
         scale: Strength of a strong case; 1 unless the effect is faint or loud on this rig.
         needs: Excitation that shows it, one of `EXCITATIONS`.
-        course: How it goes from run to run: empty for alike in all, `comes` with one run and
+        course: How it changes from run to run: empty for alike in all, `comes` with one run and
             stays, or `fades`.
     """
 

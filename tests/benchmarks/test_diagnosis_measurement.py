@@ -278,7 +278,7 @@ def test_any_version_of_rig_is_asked_once_for_each_answer(tmp_path: Path, option
     rig = fake_rig(tmp_path / "checkout", option)
     cases = [case_of("a", "strong", right=True), case_of("b", "weak", right=False)]
     for _ in range(2):
-        rows = measure(cases, rig, tmp_path / "answers", tell=lambda row: None)
+        rows = measure(cases, rig, tmp_path / "answers", on_row=lambda row: None)
     assert [(row.right, row.ratio, row.solved) for row in rows] == [
         (True, 1.1, True),
         (False, None, True),
@@ -300,7 +300,7 @@ def test_a_version_that_gives_no_answer_is_wrong_and_named_so(tmp_path: Path) ->
     rig.path.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('no such model')\n")
     rig.__dict__["_help"] = "--json"
     (row,) = measure(
-        [case_of("a", "clean", right=True)], rig, tmp_path / "out", tell=lambda r: None
+        [case_of("a", "clean", right=True)], rig, tmp_path / "out", on_row=lambda r: None
     )
     assert (row.failed, row.right) == (True, False)
     assert "no such model" in row.note
@@ -312,7 +312,7 @@ def test_a_line_stands_beside_those_of_other_versions(tmp_path: Path) -> None:
 
     def line(version: str, seed: int | None, *, right: bool | None, kind: str = "strong") -> None:
         cases = [case_of("a", kind, right=right)]
-        rows = measure(cases, rig, tmp_path / f"{version}{right}", tell=lambda row: None)
+        rows = measure(cases, rig, tmp_path / f"{version}{right}", on_row=lambda row: None)
         append(page, Measured(version, "own", seed), rows)
 
     line("old", 2_000_000, right=False)

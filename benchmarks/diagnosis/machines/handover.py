@@ -39,9 +39,9 @@ def write(runs: Sequence[Run], folder: Path) -> None:
         savemat(folder / f"{run.name}.mat", content, oned_as="column")
 
 
-def options(model: str, equation: str = "motor") -> list[str]:
+def options(model: str) -> list[str]:
     """Return the words that name a declared model of this folder."""
-    return ["--model", str(MODELS / f"{model}.model.toml"), "--balance", equation]
+    return ["--model", str(MODELS / f"{model}.model.toml")]
 
 
 def cut(run: Run, at: Sequence[int]) -> list[Run]:
