@@ -1,9 +1,12 @@
 """One case: recordings whose hidden effect is known, and how an answer about them is judged."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from estimation.recording import Recording
+from rig.log.convert import write_recording
 
 Report = Mapping[str, Any]
 """The JSON answer of `rig diagnose`."""
@@ -24,6 +27,12 @@ MACHINE = "machine"
 
 SURE = 0.9
 """Confidence from which a wrong statement counts as sure and wrong."""
+
+
+def write_recordings(folder: Path, recordings: Iterable[Recording]) -> None:
+    """Write recordings into a folder, one log a run."""
+    for recording in recordings:
+        write_recording(folder / f"{recording.name}.mcap", recording)
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,17 @@ A case's folder holds logs and nothing else, under a name that gives nothing awa
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.case import KINDS
+from benchmarks.diagnosis.case import KINDS, write_recordings
 from benchmarks.diagnosis.excitation import RUNS, plans_of, wrist_motion
 from benchmarks.diagnosis.truths import CATALOGUED, OUTSIDE, TRUTHS
 from estimation.recording import FloatArray, Instrument, Recording
 from rig import trajectory
-from rig.log.convert import write_recording
 from rig.motion import motion_of
 from rig.protocol import RunPlan, load_protocol
 from rig.simulation.bench import SimulatedBench
@@ -150,7 +149,7 @@ def _shaped(name: str, random: np.random.Generator, share: float) -> HiddenEffec
 
 def write(answer: Answer, folder: Path) -> None:
     """Write a case's recordings into an empty folder."""
-    _write(folder, record(answer, plans_of(answer.excitation)))
+    write_recordings(folder, record(answer, plans_of(answer.excitation)))
 
 
 def write_next(answer: Answer, protocol: Path, folder: Path) -> None:
@@ -158,12 +157,7 @@ def write_next(answer: Answer, protocol: Path, folder: Path) -> None:
     plans = [replace(p, name=f"next-{p.name}") for p in load_protocol(str(protocol)).plans()]
     later = range(RUNS, RUNS + len(plans))
     lasting = replace(answer, runs=(*answer.runs, *later))
-    _write(folder, record(lasting, plans, later))
-
-
-def _write(folder: Path, recordings: Iterable[Recording]) -> None:
-    for recording in recordings:
-        write_recording(folder / f"{recording.name}.mcap", recording)
+    write_recordings(folder, record(lasting, plans, later))
 
 
 def record(

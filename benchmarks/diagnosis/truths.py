@@ -15,6 +15,12 @@ WRIST = frozenset({"wrist_pitch"})
 """Words of a diagnosis that mean the same on one rig: its angles move together, and so on."""
 
 
+def same_on_one_rig(variable: str) -> frozenset[str]:
+    """Return the words that name a variable as well as its own does."""
+    groups = (ANGLE, DIRECTION, SPEED, MEMORY, LOAD, WRIST)
+    return next((g for g in groups if variable in g), frozenset({variable}))
+
+
 @dataclass(frozen=True)
 class Truth:
     """The answer to one hidden effect.
