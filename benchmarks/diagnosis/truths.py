@@ -17,7 +17,7 @@ WRIST = frozenset({"wrist_pitch"})
 
 def same_on_one_rig(variable: str) -> frozenset[str]:
     """Return the words that name a variable as well as its own does."""
-    groups = (ANGLE, DIRECTION, SPEED, MEMORY, LOAD, WRIST)
+    groups = (ANGLE, SPEED, DIRECTION, MEMORY, LOAD, WRIST)
     return next((g for g in groups if variable in g), frozenset({variable}))
 
 
