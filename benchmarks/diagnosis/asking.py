@@ -84,20 +84,18 @@ class Rig:
         """Return whether `rig diagnose` has an option."""
         return option in self._help.split()
 
-    def diagnose(self, folder: Path, options: Sequence[str] = (), quick: bool = False) -> Answer:
+    def diagnose(self, folder: Path, options: Sequence[str] = ()) -> Answer:
         """Ask for a diagnosis of a folder of recordings.
 
         Args:
             folder: The recordings.
             options: Further words of the command line.
-            quick: Without the slow proofs, where the version has such an option.
         """
         to_file = "--json-out" if self.has("--json-out") else "--json"
         with tempfile.TemporaryDirectory(prefix="rig-measure-") as own:
             out, protocol = Path(own, "answer.json"), Path(own, "next.toml")
             words = [str(self.path), "diagnose", str(folder), *options, to_file, str(out)]
             words += ["--protocol-out", str(protocol)] if self.has("--protocol-out") else []
-            words += ["--quick"] if quick and self.has("--quick") else []
             began, used = time.perf_counter(), _children_s()
             message = _run(words, {"RIG_STATE_DIR": own})  # no diagnosis has seen these runs before
             return Answer(

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from benchmarks.diagnosis.asking import Answer, Rig
 from benchmarks.diagnosis.case import Case, Judgement, Report
+from benchmarks.diagnosis.ratio import raised
 from estimation.files import write_text_atomic
 
 
@@ -94,9 +95,7 @@ class _Asking:
     folder: Path
     ask: bool
 
-    def answer(
-        self, which: str, write: Callable[[Path], None], quick: bool = False
-    ) -> Answer | None:
+    def answer(self, which: str, write: Callable[[Path], None]) -> Answer | None:
         """Return the kept answer, or a new one; None where there is none and none is asked for."""
         kept = self.folder / f"{self.case.name}{which}.json"
         if kept.exists():
@@ -107,7 +106,7 @@ class _Asking:
         try:
             write(runs)
             options = [word.replace("{case}", str(runs)) for word in self.case.options]
-            answer = self.rig.diagnose(runs, options, quick)
+            answer = self.rig.diagnose(runs, options)
         finally:
             shutil.rmtree(runs)
         answer.save(kept)
@@ -144,19 +143,19 @@ def _stated(finding: Report) -> str:
 
 def _ratio(report: Report, judged: Judgement, asking: _Asking) -> float | None:
     """Return the error over that of the same campaign without the effects, or None."""
-    without = asking.case.write_without
+    case, without = asking.case, asking.case.write_without
     if not judged.right or not judged.equations or without is None:
         return None
-    answer = asking.answer("+without", without, quick=True)
-    if answer is None or answer.report is None:
-        return None
-    if answer.report["runs"] != report["runs"]:
-        return None  # other test runs: their errors cannot be compared
-    ratios = [
-        report["rmse_after"][equation] / answer.report["rmse_before"][equation]
-        for equation in judged.equations
-    ]
-    return float(max(ratios))
+    kept = asking.folder / f"{case.name}+without.json"
+    if not kept.exists():
+        if not asking.ask:
+            return None
+        factors = raised(case.write, without, report, judged.equations)
+        write_text_atomic(kept, json.dumps(factors))
+    return max(
+        factor * report["rmse_after"][equation] / report["rmse_before"][equation]
+        for equation, factor in zip(judged.equations, json.loads(kept.read_text()), strict=True)
+    )
 
 
 def _solved(first: Answer, asking: _Asking) -> bool | None:

@@ -2,6 +2,8 @@
 
 import json
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +14,14 @@ from scipy.io import savemat
 from benchmarks.diagnosis import __main__ as command
 from benchmarks.diagnosis import otherlab
 from benchmarks.diagnosis.asking import Rig
-from benchmarks.diagnosis.case import KINDS, Case, Judgement
+from benchmarks.diagnosis.case import KINDS, Case, Judgement, write_recordings
 from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record, write_next
 from benchmarks.diagnosis.excitation import EXCITATIONS, plans_of
 from benchmarks.diagnosis.machines import emps, smart_grasper, sts3215, ur10e
 from benchmarks.diagnosis.measure import measure
 from benchmarks.diagnosis.own import truth_of
 from benchmarks.diagnosis.page import Measured, append, judged_seeds
+from benchmarks.diagnosis.ratio import raised
 from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge, use_of
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
@@ -104,6 +107,23 @@ def test_a_hidden_effect_is_in_the_runs_that_have_it_only() -> None:
         torque.append([recording["proximal_torque_n_m"] for recording in made])
     assert np.std(torque[1][0] - torque[0][0]) > 1e-3
     assert np.array_equal(torque[1][1], torque[0][1])
+
+
+def test_the_effect_is_weighed_against_the_same_campaign_without_it() -> None:
+    answer = Answer("case-00000000ab", "strong", (HiddenEffect("motor_ripple"),), tuple(range(14)))
+    plans = plans_of("usual")[::5]
+
+    def write(one: Answer, folder: Path) -> None:
+        write_recordings(folder, record(one, plans))
+
+    def factor(one: Answer) -> float:
+        plain = partial(write, replace(answer, effects=()))
+        runs = {"discover": [p.name for p in plans[:2]], "confirm": [plans[2].name]}
+        (found,) = raised(partial(write, one), plain, {"runs": runs}, ["motor"])
+        return found
+
+    assert factor(answer) > 1.3
+    assert factor(replace(answer, effects=())) == 1.0
 
 
 def test_a_proposed_protocol_is_played_on_the_same_rig_with_the_effect(tmp_path: Path) -> None:
@@ -247,7 +267,6 @@ with (here / "asked.txt").open("a") as log:
     print(sorted(path.name for path in case.iterdir()), sys.argv[3:], file=log)
 runs = {{"discover": [], "confirm": []}}
 answer = {{"findings": [], "runs": runs}}
-answer |= {{"rmse_before": {{"motor": 2.0}}, "rmse_after": {{"motor": 2.2}}}}
 pathlib.Path(sys.argv[sys.argv.index("{option}") + 1]).write_text(json.dumps(answer))
 pathlib.Path(sys.argv[sys.argv.index("--protocol-out") + 1]).write_text("a protocol")
 """
@@ -267,7 +286,6 @@ def case_of(name: str, kind: str, *, right: bool | None) -> Case:
         kind,
         lambda folder: (folder / "run.log").touch(),
         lambda report: Judgement(right, equations=("motor",) if right else ()),
-        write_without=lambda folder: (folder / "plain.log").touch(),
         write_next=lambda protocol, folder: (folder / "next.log").write_text(protocol.read_text()),
         judge_next=lambda report: Judgement(True),
     )
@@ -280,13 +298,12 @@ def test_any_version_of_rig_is_asked_once_for_each_answer(tmp_path: Path, option
     for _ in range(2):
         rows = measure(cases, rig, tmp_path / "answers", on_row=lambda row: None)
     assert [(row.right, row.ratio, row.solved) for row in rows] == [
-        (True, 1.1, True),
+        (True, None, True),
         (False, None, True),
     ]
     asked = (rig.path.parent / "asked.txt").read_text().splitlines()
     assert [line.split("]")[0] for line in asked] == [
         "['run.log'",
-        "['plain.log'",
         "['next.log', 'run.log'",
         "['run.log'",
         "['next.log', 'run.log'",
