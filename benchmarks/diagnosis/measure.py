@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.diagnosis.asking import Answer, Rig
 from benchmarks.diagnosis.case import Case, Judgement, Report
-from benchmarks.diagnosis.ratio import raised
+from benchmarks.diagnosis.ratio import errors_without
 from estimation.files import write_text_atomic
 
 
@@ -150,12 +150,10 @@ def _ratio(report: Report, judged: Judgement, asking: _Asking) -> float | None:
     if not kept.exists():
         if not asking.ask:
             return None
-        factors = raised(case.write, without, report, judged.equations)
-        write_text_atomic(kept, json.dumps(factors))
-    return max(
-        factor * report["rmse_after"][equation] / report["rmse_before"][equation]
-        for equation, factor in zip(judged.equations, json.loads(kept.read_text()), strict=True)
-    )
+        errors = errors_without(without, report, judged.equations)
+        write_text_atomic(kept, json.dumps(errors))
+    least = json.loads(kept.read_text())
+    return float(max(report["rmse_after"][e] / least[e] for e in judged.equations))
 
 
 def _solved(first: Answer, asking: _Asking) -> bool | None:
