@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rig.reports.provenance import commit
+from rig.output.provenance import commit
 
 TIME_LIMIT_S = 3600.0
 ONE_CORE = dict.fromkeys(

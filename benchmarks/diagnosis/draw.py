@@ -14,9 +14,9 @@ from benchmarks.diagnosis.case import KINDS, write_recordings
 from benchmarks.diagnosis.excitation import RUNS, plans_of, wrist_motion
 from benchmarks.diagnosis.truths import CATALOGUED, OUTSIDE, TRUTHS
 from estimation.recording import FloatArray, Instrument, Recording
-from rig import trajectory
-from rig.motion import motion_of
-from rig.protocol import RunPlan, load_protocol
+from rig.protocols import trajectory
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan, load_protocol
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import KINDS as HIDDEN
