@@ -1,7 +1,7 @@
-"""What each hidden effect is called, what may be said instead, and in which balance it shows.
+"""What each hidden effect is called, what may be said instead, and in which equation it shows.
 
-A name is right when it is the family or an accepted equivalent: one that the rig's sensors cannot
-tell from it in that balance, whatever is played.
+A name is right when it is the family or an accepted equivalent: one that the rig's sensors
+cannot distinguish from it in that equation, whatever is played.
 """
 
 from dataclasses import dataclass
@@ -15,54 +15,50 @@ WRIST = frozenset({"wrist_pitch"})
 """Words of a diagnosis that mean the same on one rig: its angles move together, and so on."""
 
 
+def same_on_one_rig(variable: str) -> frozenset[str]:
+    """Return the words that name a variable as well as its own does."""
+    groups = (ANGLE, SPEED, DIRECTION, MEMORY, LOAD, WRIST)
+    return next((g for g in groups if variable in g), frozenset({variable}))
+
+
 @dataclass(frozen=True)
 class Truth:
     """The answer to one hidden effect.
 
     Attributes:
         family: Catalogue id, or `unknown` for what no catalogue holds.
-        balances: Balances in which it shows.
-        accepted: Families that cannot be told from it.
+        equations: Equations in which it shows.
+        accepted: Families that cannot be distinguished from it.
         depends_on: For `unknown`: one word of each group, and none beside them, is right.
         scale: Strength of a strong case; 1 unless the effect is faint or loud on this rig.
         needs: Excitation that shows it, one of `EXCITATIONS`.
-        course: How it goes from run to run: empty for alike in all, `comes` with one run and
+        course: How it changes from run to run: empty for alike in all, `comes` with one run and
             stays, or `fades`.
     """
 
     family: str
-    balances: frozenset[str]
+    equations: frozenset[str]
     accepted: frozenset[str] = frozenset()
     depends_on: tuple[frozenset[str], ...] = ()
     scale: float = 1.0
     needs: str = "usual"
     course: str = ""
 
-    def names(self, family: str) -> bool:
-        """Say whether a family is a right name."""
-        return family == self.family or family in self.accepted
-
-    def variables_right(self, words: list[str]) -> bool:
-        """Say whether the variables named are the right ones."""
-        said = set(words)
-        known = frozenset().union(*self.depends_on)
-        return said <= known and all(said & group for group in self.depends_on)
-
 
 def _of(
     family: str,
-    balances: str,
+    equations: str,
     accepted: str = "",
     scale: float = 1.0,
     needs: str = "usual",
     course: str = "",
 ) -> Truth:
-    where, equal = frozenset(balances.split()), frozenset(accepted.split())
+    where, equal = frozenset(equations.split()), frozenset(accepted.split())
     return Truth(family, where, equal, (), scale, needs, course)
 
 
-def _outside(balances: str, *groups: frozenset[str], needs: str = "usual") -> Truth:
-    return Truth("unknown", frozenset(balances.split()), frozenset(), groups, needs=needs)
+def _outside(equations: str, *groups: frozenset[str], needs: str = "usual") -> Truth:
+    return Truth("unknown", frozenset(equations.split()), frozenset(), groups, needs=needs)
 
 
 CATALOGUED: dict[str, Truth] = {
@@ -79,14 +75,14 @@ CATALOGUED: dict[str, Truth] = {
     # springs act between jaw and ground, where no torque sensor is
     "jaw_spring": _of("spring.position", "cable stretch", "gravity.payload"),
     "end_stop_spring": _of("spring.end_stop", "cable stretch"),
-    # waves; in the gearbox's balance a bent gear and a bent encoder are the same
+    # waves; in the gearbox's equation a bent gear and a bent encoder are the same
     "motor_ripple": _of("ripple.motor", "motor"),
     "current_ripple": _of("ripple.current", "motor", "", 0.6),
     "spindle_ripple": _of("ripple.output", "cable"),
     "gear_eccentricity": _of("ripple.output", "gearbox", "sensor.encoder_inl"),
     "eccentric_pulley": _of("eccentric.load", "cable stretch", "coupling.kinematic ripple.output"),
     "jaw_encoder_wave": _of("sensor.encoder_inl", "stretch", "ripple.output coupling.kinematic"),
-    # torque and current: in the motor's balance a falling constant is a rising gain
+    # torque and current: in the motor's equation a falling constant is a rising gain
     "torque_constant_sag": _of("motor.saturation", "motor", "sensor.gain_nonlinear", 2.0),
     "current_sensor_bend": _of("sensor.gain_nonlinear", "motor", "motor.saturation", 2.5),
     "winding_heat": _of("motor.thermal", "motor"),

@@ -1,49 +1,47 @@
-"""The blind generator: recordings with an effect no model declares, and the answer elsewhere.
+"""The simulated rig with an effect that no model declares, drawn by class, number and seed.
 
-A case is drawn by its class, number and seed. Its folder holds logs and nothing else; the answer is
-written to another folder, under a name that says nothing.
+A case's folder holds logs and nothing else, under a name that gives nothing away.
 """
 
 import hashlib
-import json
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from estimation.files import write_text_atomic
+from benchmarks.diagnosis.case import KINDS, write_recordings
+from benchmarks.diagnosis.excitation import RUNS, plans_of, wrist_motion
+from benchmarks.diagnosis.truths import CATALOGUED, OUTSIDE, TRUTHS
 from estimation.recording import FloatArray, Instrument, Recording
-from rig.log.convert import write_recording
 from rig.protocols import trajectory
 from rig.protocols.motion import motion_of
-from rig.protocols.protocol import RunPlan
+from rig.protocols.protocol import RunPlan, load_protocol
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
-from rig.simulation.hidden import KINDS, NAMES, HiddenEffect
+from rig.simulation.hidden import KINDS as HIDDEN
+from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.plant import TICK_S
 from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
-from tests.blind.excitation import RUNS, plans_of, wrist_motion
-from tests.blind.truths import CATALOGUED, OUTSIDE, TRUTHS
 
-CLASSES = ("strong", "weak", "pair", "outside", "partial", "confounded", "control")
 WEAK = 0.3
 """Strength of a weak case for one of a strong one."""
 
 CHAINS = ("plain", "coloured", "drifting", "skewed")
 """What a logger may do to a case beside white noise and counts."""
 
-CONTROLS = (*((chain, "usual") for chain in CHAINS), ("coloured", "rests"), ("coloured", "wrist"))
-"""Chain and excitation of controls, in turn."""
+CLEAN = (*((chain, "usual") for chain in CHAINS), ("coloured", "rests"), ("coloured", "wrist"))
+"""Chain and excitation of clean cases, in turn."""
 
 EITHER = {
     "one spring": ("friction.load", "motor.saturation"),
     "constant speed": ("friction.load", "motor.saturation", "friction.load_viscous"),
 }
-"""What cannot be told from friction by load on such runs: loads of one sign tell it from a falling
-torque constant by the rotor's own friction only, and one speed says nothing of others."""
+"""Families that such runs cannot distinguish from friction by load: with loads of one sign only the
+rotor's own friction separates it from a falling torque constant, and at one speed nothing separates
+it from what depends on speed."""
 
 SPREAD = 0.1
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -60,12 +58,12 @@ class Answer:
 
     Attributes:
         case: Name of its folder.
-        kind: One of `CLASSES`.
-        effects: The hidden effects; none in a control.
+        kind: One of `KINDS`.
+        effects: The hidden effects; none in a clean case.
         runs: Places of the runs that have them.
         excitation: One of `EXCITATIONS`.
         chain: One of `CHAINS`.
-        either: For a confounded case: families that cannot be told apart on its runs.
+        either: For a confounded case: families that its runs cannot distinguish.
     """
 
     case: str
@@ -90,13 +88,13 @@ class Answer:
 
 def draw(kind: str, number: int, seed: int) -> Answer:
     """Draw a case's answer; the same class, number and seed give the same case."""
-    if kind not in CLASSES:
-        raise ValueError(f"There is no class {kind!r}; there are {', '.join(CLASSES)}.")
+    if kind not in KINDS:
+        raise ValueError(f"There is no class {kind!r}; there are {', '.join(KINDS)}.")
     word = hashlib.sha256(f"{kind}/{number}/{seed}".encode()).hexdigest()
     random = np.random.default_rng(int(word[:15], 16))
     chain, excitation = CHAINS[int(random.integers(len(CHAINS)))], "usual"
-    if kind == "control":
-        chain, excitation = CONTROLS[number % len(CONTROLS)]
+    if kind == "clean":
+        chain, excitation = CLEAN[number % len(CLEAN)]
     either: tuple[str, ...] = ()
     if kind == "confounded":
         excitation = ("one spring", "constant speed")[number % 2]
@@ -106,7 +104,7 @@ def draw(kind: str, number: int, seed: int) -> Answer:
     excitation = needed.pop() if needed else excitation
     effects = tuple(_shaped(name, random, WEAK if kind == "weak" else 1.0) for name in names)
     runs = tuple(range(RUNS))
-    if kind == "partial":
+    if kind == "some_runs":
         count = int(random.integers(5, 9))
         runs = tuple(sorted(int(k) for k in random.choice(RUNS, count, replace=False)))
     elif any(TRUTHS[name].course == "comes" for name in names):
@@ -118,7 +116,7 @@ def _names(kind: str, number: int, seed: int, random: np.random.Generator) -> li
     if kind in ("strong", "weak"):
         return [_cycled(sorted(CATALOGUED), number, seed)]
     lasting = sorted(name for name, truth in CATALOGUED.items() if not truth.course)
-    if kind == "partial":
+    if kind == "some_runs":
         return [_cycled(lasting, number, seed)]
     if kind == "outside":
         return [_cycled(sorted(OUTSIDE), number, seed)]
@@ -127,7 +125,7 @@ def _names(kind: str, number: int, seed: int, random: np.random.Generator) -> li
     while kind == "pair":
         first, second = (str(name) for name in random.choice(lasting, 2, replace=False))
         one, other = CATALOGUED[first], CATALOGUED[second]
-        if not one.names(other.family) and "usual" in (one.needs, other.needs):
+        if other.family not in (one.family, *one.accepted) and "usual" in (one.needs, other.needs):
             return [first, second]
     return []
 
@@ -139,7 +137,7 @@ def _cycled(names: list[str], number: int, seed: int) -> str:
 
 
 def _shaped(name: str, random: np.random.Generator, share: float) -> HiddenEffect:
-    kind = KINDS[NAMES.index(name)]
+    kind = HIDDEN[NAMES.index(name)]
     shape = [float(random.uniform(part.low, part.high)) for part in kind.shapes]
     shape = [
         float(round(value)) if part.whole else value
@@ -149,31 +147,33 @@ def _shaped(name: str, random: np.random.Generator, share: float) -> HiddenEffec
     return HiddenEffect(name, float(strength), tuple(shape))
 
 
-def write(answer: Answer, cases: Path, answers: Path, runs: int | None = None) -> Path:
-    """Write a case's recordings, and its answer elsewhere; returns the folder of recordings.
+def write(answer: Answer, folder: Path) -> None:
+    """Write a case's recordings into an empty folder."""
+    write_recordings(folder, record(answer, plans_of(answer.excitation)))
+
+
+def write_next(answer: Answer, protocol: Path, folder: Path) -> None:
+    """Play a protocol on the case's rig and write its runs beside those that are there."""
+    plans = [replace(p, name=f"next-{p.name}") for p in load_protocol(str(protocol)).plans()]
+    later = range(RUNS, RUNS + len(plans))
+    lasting = replace(answer, runs=(*answer.runs, *later))
+    write_recordings(folder, record(lasting, plans, later))
+
+
+def record(
+    answer: Answer, plans: Sequence[RunPlan], places: Sequence[int] | None = None
+) -> Iterator[Recording]:
+    """Yield a case's recordings; nothing in them names what is hidden.
 
     Args:
         answer: From `draw`.
-        cases: Folder of cases.
-        answers: Folder of answers, not inside `cases`.
-        runs: Only the first so many runs, for a quick look.
+        plans: The runs.
+        places: Place of each run in the campaign; from 0 on when None.
     """
-    folder = cases / answer.case
-    folder.mkdir(parents=True)
-    write_text_atomic(answers / f"{answer.case}.json", json.dumps(asdict(answer), indent=1) + "\n")
-    for recording in record(answer, range(RUNS if runs is None else runs)):
-        write_recording(folder / f"{recording.name}.mcap", recording)
-    return folder
-
-
-def record(answer: Answer, places: Iterable[int] = range(RUNS)) -> Iterator[Recording]:
-    """Yield a case's recordings at some places; they do not say what is hidden."""
     rig_seed = int(answer.case[-8:], 16)
     plant = vary(DECLARED_PLANT, rig_seed, SPREAD)
     sensors = _sensors(answer.chain, rig_seed)
-    plans = plans_of(answer.excitation)
-    for index in places:
-        plan = plans[index]
+    for index, plan in zip(range(len(plans)) if places is None else places, plans, strict=True):
         moved = replace(plant, **wrist_motion(answer.excitation, index))
         made = _record(plan, moved, sensors, answer.in_run(index), rig_seed * 1009 + index, index)
         if answer.excitation == "wrist":
