@@ -99,5 +99,5 @@ def explain(code: int) -> tuple[str, str, str]:
 def fault(code: int) -> DriveFaultError:
     """Return the error of an error code."""
     what, why, fix = explain(code)
-    then = "Then clear the fault and arm again."
+    then = "Then clear the fault (rig clear) and arm again."
     return DriveFaultError(f"{what} (error {code:#06x})", why, f"{fix} {then}".strip(), code)
