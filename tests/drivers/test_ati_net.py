@@ -150,6 +150,84 @@ def test_an_overtaken_packet_is_dropped_and_counted() -> None:
     assert device.counters["lost"] == 1
 
 
+@pytest.mark.parametrize("command", ["set_bias", "reset_latch"])
+@pytest.mark.parametrize("numbers_begin_at", [1, 2**32 - 10])
+def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(
+    command: str, numbers_begin_at: int
+) -> None:
+    device = device_of(RdtFake(numbers_begin_at))
+    device.start()
+    before = device.read(0.1)
+    getattr(device, command)()
+    after = [device.read(0.1) for _ in range(4)]
+    assert sum(map(len, after)) == 200
+    sequence = np.concatenate([before.sequence, *[batch.sequence for batch in after]])
+    assert sequence.tolist() == list(range(250))
+    assert after[-1].lost == 0
+    assert {k for k, count in device.counters.items() if count} == {"frames"}
+
+
+def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
+    sequence = RecordSequence(counters := DeviceCounters())
+    sequence.follow(np.arange(5, 10, dtype=np.uint32))
+    sequence.expect_restart()
+    _, numbers = sequence.follow(np.arange(10, 2010, dtype=np.uint32))
+    assert numbers.tolist() == list(range(5, 2005))
+    kept, _ = sequence.follow(np.array([2008, 2010], np.uint32))  # it is late, and nothing else
+    assert kept.tolist() == [False, True]
+    assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
+
+
+def test_a_request_that_is_lost_is_sent_again() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.identify()
+    fake.deaf = 2  # stop and start
+    device.start()
+    batches = [device.read(0.1) for _ in range(20)]
+    assert sum(map(len, batches)) > 500
+    assert device.counters["retries"] == 1
+    assert batches[-1].lost == 0
+
+
+def test_a_device_that_is_gone_is_said_at_every_reading_until_it_is_back() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    device.read(0.1)
+    fake.receive(protocol.encode_command(protocol.STOP))
+    fake.deaf = 6
+    said = back = 0
+    for _ in range(100):
+        try:
+            back += len(device.read(0.05))
+        except LinkTimeoutError as error:
+            said += "fallen silent" in str(error)
+    assert said > 20
+    assert back > 500
+    assert device.counters["stalls"] == 1
+    assert device.counters["retries"] == 7
+
+
+def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    device.read(0.1)
+    fake.frozen_at = 50
+    said = 0
+    for _ in range(10):
+        try:
+            device.read(0.05)
+        except DriverError as error:
+            said += "frozen" in str(error)
+    assert said >= 7
+    assert device.counters["device_errors"] == 1
+    fake.frozen_at = None
+    assert len(device.read(0.05)) > 0
+    device.close()
+
+
 def test_the_bias_is_set_in_the_device() -> None:
     fake = RdtFake()
     device = device_of(fake)
