@@ -513,6 +513,24 @@ def test_every_error_says_what_and_what_to_do() -> None:
     assert "does not know" in faults.fault(0x1234).what
 
 
+@pytest.mark.parametrize(
+    ("codes", "words"),
+    [
+        ((0x1080, 0x1088), "did not start"),
+        ((0x6180, 0x61F0), "firmware"),
+        ((0xFF11, 0xFF24), "tuning"),
+        ((0x738A,), "Hall"),
+        ((0x738C,), "SSI sensor could not be read"),
+        ((0x738D,), "SSI sensor's frames"),
+        ((0x5282,), "STO card"),
+    ],
+)
+def test_an_error_is_named_as_in_the_specification(codes: tuple[int, ...], words: str) -> None:
+    for code in codes:
+        assert words in faults.explain(code)[0]
+    assert words not in faults.explain(codes[-1] + 1)[0]
+
+
 class Served:
     """A fake on a python-can virtual bus, in real time, in a thread of the test."""
 
