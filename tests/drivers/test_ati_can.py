@@ -165,6 +165,53 @@ def test_another_calibration_is_used_or_its_absence_said() -> None:
         missing.identify()
 
 
+def restarted(silent_s: float) -> tuple[AtiCan, AtiCanFake]:
+    """A device on calibration 1 whose sensor restarts, silent meanwhile for as long."""
+    node = AtiCanFake()
+    bus = SimulatedCanBus([node])
+    device = AtiCan(bus, calibration=1)
+    device.start()
+    for _ in range(300):  # one and a half seconds: it looks more than once
+        assert len(device.read(0.1)) == 1
+    node.restart()
+    if silent_s:
+        answer, node.receive = node.receive, lambda _: None  # type: ignore[method-assign]
+        give_up_s = bus.now_s + silent_s
+        while bus.now_s < give_up_s:
+            assert len(device.read(0.1)) == 0
+        node.receive = answer  # type: ignore[method-assign]
+    return device, node
+
+
+@pytest.mark.parametrize(("silent_s", "samples"), [(0.5, 0), (0.0, 200)])
+def test_a_sensor_that_restarts_and_forgets_its_calibration_is_noticed(
+    silent_s: float, samples: int
+) -> None:
+    device, _ = restarted(silent_s)
+    wrong = 0
+    with pytest.raises(DriverError, match=r"calibration 1 any more.*restarted"):  # noqa: PT012
+        for _ in range(1000):
+            wrong += len(device.read(0.1))
+    assert wrong <= samples
+    with pytest.raises(DriverError, match="restarted"):
+        device.read(0.1)
+    assert device.counters["restarts"] == 1
+    device.start()
+    assert len(device.read(0.1)) == 1
+    for _ in range(300):
+        device.read(0.1)
+    assert device.counters["restarts"] == 1
+
+
+def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it() -> None:
+    node = AtiCanFake()
+    device = AtiCan(SimulatedCanBus([node]))
+    device.start()
+    node.restart()
+    for _ in range(500):
+        assert len(device.read(0.1)) == 1
+
+
 def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
     device = AtiCan(SimulatedCanBus([AtiCanFake(base=0x68)]))
     with pytest.raises(LinkTimeoutError, match=r"base 0x20.*250 kbit/s"):
