@@ -24,6 +24,7 @@ from drivers.transport.transport import Transport
 from rig.companions import Companion, open_companions
 from rig.config import Config
 from rig.errors import RigError, SafetyTripError, UsageError
+from rig.holding import holding
 from rig.interrupts import leaving_safely
 from rig.logger import is_real_time
 from rig.machines.choose import machine_of
@@ -84,6 +85,7 @@ class Session:
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
             ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
+            ways_out.enter_context(holding(self.config.logger.url))
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
             self.companions = open_companions(self.config)

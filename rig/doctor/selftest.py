@@ -18,6 +18,7 @@ from rig.config import Config
 from rig.devices import openers
 from rig.doctor.finding import Level
 from rig.doctor.stream import device_findings
+from rig.holding import holding
 from rig.logger import open_logger
 from rig.machines.choose import machine_of
 
@@ -60,7 +61,10 @@ def _on_the_board(
     name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
 ) -> Check:
     try:
-        with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
+        with (
+            holding(config.logger.url),
+            TeensyLogger(open_logger(config), machine_of(config).profile) as logger,
+        ):
             logger.identify()
             logger.start()
             passed, detail = check(logger, config)
