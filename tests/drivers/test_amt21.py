@@ -24,6 +24,13 @@ def test_the_check_bits_are_those_of_known_answers(value: int, word: int) -> Non
     assert protocol.decode_reply(reply) == value
 
 
+def test_the_questions_are_those_of_the_makers_sample_code() -> None:
+    """Source: same-sky/AMT21_RS485_Sample_Code_Mega: address, and address + 1 for the turns."""
+    assert protocol.request(0x54) == b"\x54"
+    assert protocol.request(0x54, turns=True) == b"\x55"
+    assert protocol.request(0x4C, turns=True) == b"\x4d"
+
+
 @given(value=st.integers(0, 2**14 - 1), bit=st.integers(0, 15))
 def test_one_changed_bit_is_refused(value: int, bit: int) -> None:
     word = int.from_bytes(protocol.encode_reply(value), "little") ^ 1 << bit

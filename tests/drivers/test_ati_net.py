@@ -13,6 +13,7 @@ from drivers.ati_net.fake import CalibrationFake, RdtFake, fake_calibration
 from drivers.ati_net.protocol import Calibration
 from drivers.ati_net.sequence import RESTART_STEP, RecordSequence
 from drivers.counters import DeviceCounters
+from drivers.device import SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.transport import open_transport
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
@@ -28,6 +29,9 @@ def test_requests_are_the_bytes_of_the_manual() -> None:
     assert protocol.encode_command(protocol.STREAM) == bytes.fromhex("12 34 00 02 00 00 00 00")
     assert protocol.encode_command(protocol.SET_BIAS) == bytes.fromhex("12 34 00 42 00 00 00 00")
     assert protocol.encode_command(protocol.STREAM, 258) == bytes.fromhex("1234 0002 0000 0102")
+    assert protocol.encode_command(protocol.STOP) == bytes.fromhex("12 34 00 00 00 00 00 00")
+    assert protocol.encode_command(protocol.RESET_LATCH) == bytes.fromhex("1234 0041 0000 0000")
+    assert (protocol.RDT_PORT, protocol.CALIBRATION_PORT) == (49152, 49151)
     assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
 
 
@@ -36,11 +40,20 @@ def test_a_record_is_big_endian_and_36_bytes() -> None:
     (record,) = protocol.decode_records(datagram)
     assert record["rdt_sequence"] == 7
     assert record["ft_sequence"] == 49
+    assert record["status"] == 0x80010000
     assert record["counts"].tolist() == [-1, 2, -3, 4, -5, 6]
     assert len(protocol.decode_records(datagram * 5)) == 5
     for size in (0, 35, 37, 8):
         with pytest.raises(FrameError):
             protocol.decode_records((datagram * 2)[:size])
+
+
+def test_a_calibration_is_the_bytes_of_the_manual() -> None:
+    """Source: ATI 9620-05-Net FT, TCP interface: u16 header, two unit codes, two u32, six u16."""
+    answer = bytes.fromhex("1234 02 03 000f4240 0007a120 0001 0002 0003 0004 0005 0106")
+    calibration = Calibration(2, 3, 1_000_000, 500_000, (1, 2, 3, 4, 5, 262))
+    assert protocol.decode_calibration(answer) == calibration
+    assert protocol.encode_calibration(calibration) == answer
 
 
 @given(answer=st.binary(max_size=30))
@@ -73,6 +86,55 @@ def test_counts_become_si_by_what_the_device_says() -> None:
     assert batch.columns["force_x_n"][-1] == pytest.approx(newest[0] / 1000 * 4.4482216152605)
     assert batch.columns["torque_z_n_m"][-1] == pytest.approx(newest[5] / 500 * 0.112984829)
     assert len(batch) == 50
+
+
+@pytest.mark.parametrize(
+    ("bit", "words"),
+    [
+        (30, "processor"),
+        (29, "digital board"),
+        (28, "analog board"),
+        (27, "serial link"),
+        (26, "program memory"),
+        (25, "halted"),
+        (24, "settings"),
+        (23, "calibration"),
+        (22, "network"),
+        (21, "CAN"),
+        (20, "raw data"),
+        (19, "EtherNet/IP"),
+        (18, "DeviceNet"),
+        (17, "saturated"),
+        (16, "threshold"),
+        (14, "watchdog"),
+        (13, "stack"),
+        (12, "settings memory"),
+        (11, "flash"),
+        (10, "analog watchdog"),
+        (9, "excitation too high"),
+        (8, "excitation too low"),
+        (7, "ground"),
+        (6, "supply too high"),
+        (5, "supply too low"),
+        (4, "no data"),
+        (3, "reference"),
+        (2, "temperature"),
+        (1, "web server"),
+    ],
+)
+def test_a_status_bit_is_that_of_the_manual(bit: int, words: str) -> None:
+    """Source: ATI 9620-05-Net FT, status code; only the threshold of bit 16 is no data fault."""
+    (said,) = protocol.status_words(1 << 31 | 1 << bit)
+    assert words in said
+    assert protocol.is_data_fault(np.array([1 << 31 | 1 << bit], np.uint32))[0] == (bit != 16)
+
+
+def test_a_saturated_sensor_flags_its_samples() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    fake.status = 0x80020000
+    assert set(device.read(0.1).flags) == {SampleFlag.SATURATED | SampleFlag.SUSPECT}
 
 
 def test_a_status_is_said_in_words_and_flags_its_samples() -> None:
