@@ -202,8 +202,8 @@ class AtiCan:
         raise DriverError(
             f"The sensor at {self._bus.url}, base {self._base:#x}, does not use its calibration"
             f" {self._calibration} any more.",
-            f"It has restarted, after which it uses calibration {AFTER_RESTART}. Up to {CHECK_S:g} s of"
-            " readings before this one are wrong.",
+            f"It has restarted, after which it uses calibration {AFTER_RESTART}."
+            f" Up to {CHECK_S:g} s of readings before this one are wrong.",
             "Check its supply, then start again: the calibration is chosen anew.",
         )
 

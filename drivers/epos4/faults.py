@@ -1,8 +1,8 @@
 """An EPOS4's error codes in plain words: what happened, why, what to do.
 
-Source: the error list of maxon's EPOS4 firmware, as found in two public drivers that agree and in the
-transcription of the 2026 firmware specification in the public library `Imcab/EposLib`; where they
-differ (0x738A to 0x738D), the specification.
+Source: the error list of maxon's EPOS4 firmware, as found in two public drivers that agree and in
+the transcription of the 2026 firmware specification in the public library `Imcab/EposLib`; where
+they differ (0x738A to 0x738D), the specification.
 """
 
 from drivers.errors import DriverError
