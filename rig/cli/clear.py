@@ -1,7 +1,7 @@
 """`rig clear`: clear a latched fault or trip, with the rig out of force."""
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 
 def clear(config: ConfigOption = None, json: JsonFlag = False) -> int:
@@ -11,8 +11,8 @@ def clear(config: ConfigOption = None, json: JsonFlag = False) -> int:
     up again, and its fault is cleared. A logger board is disarmed and its trip is reported; such a
     board clears it when it is armed next.
     """
-    from rig.clearing import clear_latch
-    from rig.config import load_config
+    from rig.bench.clearing import clear_latch
+    from rig.configuration.config import load_config
 
     settings = load_config(config)
     latch = clear_latch(settings)

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
@@ -25,8 +25,8 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     Exit code 1 when they do not go together.
     """
-    from rig.config import load_config
-    from rig.firmware import compare
+    from rig.bench.firmware import compare
+    from rig.configuration.config import load_config
 
     settings = load_config(config)
     versions = compare(settings)
@@ -44,8 +44,8 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 @firmware_app.command()
 def build(board: BoardOption = "", json: JsonFlag = False) -> None:
     """Build the firmware: for the simulated rig, or with --board for a Teensy."""
-    from rig.firmware import build as make
-    from rig.firmware import build_for
+    from rig.bench.firmware import build as make
+    from rig.bench.firmware import build_for
 
     where = build_for(board) if board else make()
     results(json).print(f"Built {where}.", markup=False)
@@ -64,7 +64,7 @@ def flash(
     A second Teensy on this computer is refused, for the loader takes the first it finds, and so is
     an armed board or one that another program has.
     """
-    from rig.firmware import flash as write
+    from rig.bench.firmware import flash as write
 
     found = write(board, serial)
     text = f"Flashed {board} to the board {found.serial}. Next: rig firmware version"

@@ -1,8 +1,8 @@
 """`rig stop`: take the motors out of force, and say so only once the board has said so."""
 
+from rig.bench.holding import Ending
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, emit_json, plain, remarks, results
-from rig.holding import Ending
+from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
@@ -15,9 +15,9 @@ def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
     """
     from drivers.errors import DriverError
     from drivers.teensy.driver import TeensyLogger
-    from rig.config import load_config
+    from rig.bench.logger import open_logger
+    from rig.configuration.config import load_config
     from rig.errors import ExitCode
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
 
     settings = load_config(config)
@@ -49,7 +49,7 @@ def _released(url: str) -> Ending | None:
         PortBusyError: It is another user's.
     """
     from drivers.errors import PortBusyError
-    from rig.holding import holder, let_go
+    from rig.bench.holding import holder, let_go
 
     try:
         return let_go(url)

@@ -12,19 +12,19 @@ from drivers.epos4.protocol import State
 from drivers.errors import DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.transport.simulated_can import SimulatedCanBus
-from rig.canopen_logger import CanopenLogger
+from rig.bench.companions import topic
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.canopen.logger import CanopenLogger
+from rig.canopen.simulated import open_simulated_canopen
 from rig.cli.main import main
-from rig.companions import topic
-from rig.config import Config, load_config
+from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
 from rig.log.reader import read_log
-from rig.logger import open_logger
 from rig.machines.choose import machine_of
-from rig.protocol import Protocol
-from rig.record import open_campaign_folder, record_campaign
-from rig.session import Session
-from rig.simulation.canopen import open_simulated_canopen
+from rig.protocols.protocol import Protocol
+from rig.recording.campaign import open_campaign_folder, record_campaign
 
 ANGLE = np.linspace(-1.0, -0.8, 600)
 NO_LOAD = np.zeros(600)
@@ -149,7 +149,7 @@ def test_rig_clear_clears_the_fault_of_the_configured_drive(
 ) -> None:
     drive = Epos4Fake()
     drive.fail(0x8130, 0x10)
-    monkeypatch.setattr("rig.clearing.open_can", lambda url: SimulatedCanBus([drive], url))
+    monkeypatch.setattr("rig.bench.clearing.open_can", lambda url: SimulatedCanBus([drive], url))
     assert main(["clear", "-c", "canopen", "--json"]) == 0
     told = capsys.readouterr()
     assert '"code": 33072' in told.out
@@ -170,7 +170,7 @@ def test_rig_clear_reports_the_trip_of_a_board_that_clears_it_by_arming(
     logger.arm(machine.gains(settings), limits)
     for _ in range(100):
         logger.read(0.05)  # nobody beats: the watchdog trips
-    monkeypatch.setattr("rig.clearing.open_logger", lambda _: link)
+    monkeypatch.setattr("rig.bench.clearing.open_logger", lambda _: link)
     assert main(["clear", "-c", "simulated"]) == 0
     told = capsys.readouterr().out
     assert "heard nothing from this computer" in told

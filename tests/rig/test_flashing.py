@@ -12,10 +12,10 @@ from drivers.errors import PortBusyError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.reference import REFERENCE
 from drivers.transport import open_transport
-from rig import firmware
-from rig.config import load_config
+from rig.bench import firmware
+from rig.bench.flashing import board_to_flash
+from rig.configuration.config import load_config
 from rig.errors import SafetyTripError, UsageError
-from rig.flashing import board_to_flash
 from rig.machines.choose import machine_of
 from rig.simulation.firmware_process import PROGRAM
 

@@ -13,10 +13,10 @@ import pytest
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED
 from drivers.transport import open_transport
+from rig.bench.holding import holder, holding
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.errors import ExitCode
-from rig.holding import holder, holding
 from rig.simulation.firmware_process import PROGRAM
 
 SESSION = """
@@ -24,8 +24,8 @@ import sys
 import numpy as np
 from pathlib import Path
 from drivers.transport import open_transport
-from rig.config import load_config
-from rig.session import Session
+from rig.configuration.config import load_config
+from rig.bench.session import Session
 
 config = load_config(Path(sys.argv[1]))
 with Session(config, open_transport(config.logger.url)) as session:
@@ -37,7 +37,7 @@ FOREIGN = """
 import sys
 from pathlib import Path
 from drivers.transport import open_transport
-from rig.config import load_config
+from rig.configuration.config import load_config
 
 link = open_transport(load_config(Path(sys.argv[1])).logger.url)
 print("open", flush=True)
@@ -54,7 +54,9 @@ def board(library: Path, tmp_path: Path) -> Iterator[Path]:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
         path = tmp_path / "held.toml"
-        named = (Path(__file__).parents[2] / "rig" / "configs" / "pty.toml").read_text()
+        named = (
+            Path(__file__).parents[2] / "rig" / "configuration" / "shipped" / "pty.toml"
+        ).read_text()
         path.write_text(named.replace("sim://pty", port))
         yield path
         process.kill()
@@ -100,7 +102,7 @@ def test_a_session_that_has_the_rig_is_asked_to_end(
 def test_a_session_that_hangs_is_killed(
     board: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.holding.ENDS_S", 0.2)
+    monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
     with started(SESSION, board) as session:
         os.kill(session.pid, signal.SIGSTOP)
         code, told = stopped(board, capsys)
