@@ -55,6 +55,13 @@ SAID = {
         Fault.STALL: _SILENT,
     },
     "ati-serial": _UNNUMBERED_STREAM,
+    "dynamixel": {
+        Fault.DROP: _ASKED_AGAIN | _DAMAGED,
+        Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
+        Fault.DUPLICATE: _ASKED_AGAIN | _DAMAGED,
+        Fault.DELAY: _ASKED_AGAIN,
+        Fault.STALL: _ASKED_AGAIN,
+    },
     "epos4": {
         Fault.DROP: _UNANSWERED,
         Fault.CORRUPT: _UNANSWERED,
