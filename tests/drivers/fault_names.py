@@ -69,6 +69,13 @@ SAID = {
         Fault.DELAY: _UNANSWERED | {"late"},
         Fault.STALL: _UNANSWERED | {"late"},
     },
+    "moteus": {
+        Fault.DROP: _ASKED_AGAIN | _DAMAGED,
+        Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
+        Fault.DUPLICATE: _ASKED_AGAIN | _DAMAGED,
+        Fault.DELAY: _ASKED_AGAIN,
+        Fault.STALL: _ASKED_AGAIN,
+    },
     "qia128": _UNNUMBERED_STREAM,
     "teensy": _NUMBERED_STREAM,
     "teensy-master": _NUMBERED_STREAM,

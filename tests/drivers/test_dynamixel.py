@@ -84,6 +84,36 @@ def test_the_registers_are_those_of_the_manual() -> None:
     assert protocol.write_question(protocol.GOAL_CURRENT, -2).hex() == "6600feff"
 
 
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (1, "failed"),
+        (2, "does not know"),
+        (3, "checksum"),
+        (4, "out of range"),
+        (5, "length"),
+        (6, "limit"),
+        (7, "accessed"),
+    ],
+)
+def test_an_errors_number_is_that_of_the_manual(number: int, words: str) -> None:
+    assert words in protocol.ERRORS[number]
+
+
+@pytest.mark.parametrize(
+    ("number", "name", "unit_a"),
+    [
+        (1020, "XM430-W350", 2.69e-3),
+        (1030, "XM430-W210", 2.69e-3),
+        (1120, "XM540-W270", 2.69e-3),
+        (1190, "XL330-M077", 1e-3),
+        (1200, "XL330-M288", 1e-3),
+    ],
+)
+def test_a_model_is_that_of_the_manual(number: int, name: str, unit_a: float) -> None:
+    assert protocol.model_of(number) == (name, unit_a)
+
+
 @given(parameters=st.binary(max_size=40), bit=st.integers(0, 7), place=st.integers(4, 60))
 def test_packets_come_back_and_one_changed_bit_is_refused(
     parameters: bytes, bit: int, place: int
