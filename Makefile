@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint site bench measure soak fuzz figures firmware firmware-arm clean
+.PHONY: setup demo test lint site bench measure mutants soak fuzz figures firmware firmware-arm clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -57,6 +57,12 @@ FUZZ ?=
 fuzz: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.reliability.fuzz $(FUZZ)
 	$(BIN)/python -m benchmarks.reliability fuzz
+
+# damages the drivers' wire formats in 200 places and runs their tests on each; a quarter of an hour.
+# MUTANTS="ati_net amt21" for some drivers
+MUTANTS ?=
+mutants: $(VENV)/.developing
+	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
 figures: $(VENV)/.installed
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done

@@ -12,6 +12,7 @@ from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
+from rig.cli.clear import clear
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -64,6 +65,7 @@ app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
 app.command()(stop)
+app.command()(clear)
 app.command()(udev)
 app.add_typer(firmware_app, name="firmware")
 
