@@ -14,6 +14,7 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
+from estimation.estimators.origin import Origin
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.oneill import is_closing, processed
@@ -53,6 +54,7 @@ class BankEstimator:
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
+        origin: Where it comes from; None where nobody stated it.
     """
 
     SCHEMA: ClassVar[str] = "rig.bank/3"
@@ -65,6 +67,7 @@ class BankEstimator:
     scale: FloatArray
     instrument: str = ""
     low_pass: LowPass = PAPER
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         for name, shape in {
@@ -128,6 +131,7 @@ class BankEstimator:
     def save(self, path: Path) -> None:
         """Write the estimator as NPZ."""
         interval = {} if self.interval is None else self.interval.arrays()
+        origin = {} if self.origin is None else self.origin.arrays()
         write_arrays(
             path,
             self.SCHEMA,
@@ -142,6 +146,7 @@ class BankEstimator:
                 "scale": self.scale,
                 "low_pass": np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)]),
                 **interval,
+                **origin,
             },
         )
 
@@ -169,6 +174,7 @@ class BankEstimator:
                 arrays["scale"],
                 str(arrays["instrument"]),
                 LowPass(cutoff_hz, int(order)),
+                Origin.from_arrays(arrays),
             )
         except (KeyError, ValueError) as error:
             raise NetworkError(f"The file {path} holds no state estimator.", str(error)) from error

@@ -29,6 +29,7 @@ def adapt(
     from estimation.files import write_text_atomic
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
+    from rig.origins import with_origin
     from rig.reports import adapt as shown
     from rig.reports.table import to_rich
     from rig.studies.adapt import open_source, run_adaptation
@@ -51,7 +52,8 @@ def adapt(
     for line in sentence(steps):
         screen.print(line)
     if out is not None:
-        new.save(out)
+        figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
+        with_origin(new, campaign.select(result.used), figures, source).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json is not None and str(json) != "-":
         write_text_atomic(json, to_json(result))

@@ -33,6 +33,7 @@ def fit_states(
     from estimation.estimators.bank import BankRecipe, held_out_score
     from rig.errors import UsageError
     from rig.importers.jaw_steps import sentence, with_one_zero
+    from rig.origins import with_origin
 
     if surrogate not in LOAD_SCALES:
         raise UsageError(
@@ -53,7 +54,8 @@ def fit_states(
             f" rmse {error.rmse:.4g} {unit_of(target)}."
         )
     if out is not None:
-        estimator.save(out)
+        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
+        with_origin(estimator, campaign, figures).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_:
         told = {"target": target, "surrogate": surrogate, "held_out": error, "jaw_steps": steps}
@@ -75,6 +77,7 @@ def fit_network(
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
     from rig.importers.jaw_steps import sentence, with_one_zero
+    from rig.origins import with_origin
 
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
@@ -98,7 +101,8 @@ def fit_network(
             f" rmse {error.rmse:.4g} {unit_of(target)}."
         )
     if out is not None:
-        estimator.save(out)
+        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
+        with_origin(estimator, campaign, figures).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_:
         told = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
