@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, show_result
+from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 estimator_app = typer.Typer(help="Compare estimators.", no_args_is_help=True)
 
@@ -30,9 +30,9 @@ def compare(
     from estimation.estimator import load
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
-    from rig.reports import estimators_compared as shown
-    from rig.reports.table import to_markdown
-    from rig.studies.estimators_compared import compare as compared
+    from rig.models.compared import compare as compared
+    from rig.output.table import to_markdown
+    from rig.reports import compared as shown
 
     files, estimators = (first, second), (load(first), load(second))
     campaign, steps = with_one_zero(open_campaign(on, format_), estimators[0].target)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results
+from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -33,7 +33,7 @@ def fit_states(
     from estimation.estimators.bank import BankRecipe, held_out_score
     from rig.errors import UsageError
     from rig.importers.jaw_steps import sentence, with_one_zero
-    from rig.origins import with_origin
+    from rig.models.origins import with_origin
 
     if surrogate not in LOAD_SCALES:
         raise UsageError(
@@ -77,7 +77,7 @@ def fit_network(
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
     from rig.importers.jaw_steps import sentence, with_one_zero
-    from rig.origins import with_origin
+    from rig.models.origins import with_origin
 
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
@@ -148,8 +148,8 @@ def fit(
     from estimation.fitting import fit as fit_model
     from rig.importers.registry import open_campaign
     from rig.live.estimator import models_in_use
+    from rig.output.table import to_rich
     from rig.reports.first_look import parameter_table
-    from rig.reports.table import to_rich
 
     screen = results(json_)
     campaign = open_campaign(path, format_)

@@ -7,11 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from rig.cli.study import study_app
-from rig.reports.delsol import lead
-from rig.reports.provenance import Provenance
-from rig.studies import delsol
-from rig.studies.delsol import DelSolStudy
-from rig.studies.delsol_diagnosis import PULLS, Named
+from rig.output.provenance import Provenance
+from rig.studies.delsol import study as delsol
+from rig.studies.delsol.diagnosis import PULLS, Named
+from rig.studies.delsol.page import lead
+from rig.studies.delsol.study import DelSolStudy
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 
