@@ -23,8 +23,9 @@ from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import rescaled
 from estimation.bank.states import LAGS, Bank
 from estimation.closing import is_closing, processed
-from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
+from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.network import NetworkEstimator
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.networks import training
 from estimation.networks.network import NetworkError, to_unit
 from estimation.recording import FloatArray, Recording
