@@ -27,13 +27,15 @@ def adapt(
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
     from estimation.files import write_text_atomic
+    from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.adapt import open_source, run_adaptation
+    from rig.models.origins import with_origin
     from rig.output.table import to_rich
     from rig.reports import adapt as shown
 
     estimator = open_source(load(source))
-    campaign = open_campaign(path, format_)
+    campaign, steps = with_one_zero(open_campaign(path, format_), estimator.target)
     with progress() as bar:
         task = bar.add_task("runs", total=len(campaign))
         result, new = run_adaptation(
@@ -47,8 +49,11 @@ def adapt(
         )
     screen = results(str(json) == "-")
     screen.print(to_rich(shown.table(result)))
+    for line in sentence(steps):
+        screen.print(line)
     if out is not None:
-        new.save(out)
+        figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
+        with_origin(new, campaign.select(result.used), figures, source).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json is not None and str(json) != "-":
         write_text_atomic(json, to_json(result))

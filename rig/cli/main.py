@@ -17,6 +17,7 @@ from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.estimator import estimator_app
 from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
@@ -53,6 +54,7 @@ app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
 app.command()(export)
+app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
