@@ -9,7 +9,7 @@ from rig.errors import DataError
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
 from rig.log.reader import LogFile, damaged, read_log
-from rig.log.repair import repaired_path
+from rig.log.repair import repaired_from
 from rig.log.streams import SAMPLE
 from rig.log.writer import PART_SUFFIX
 
@@ -22,10 +22,11 @@ class LogImporter:
     named after both, `round-2/003-sine`.
 
     In a folder the runs stand in the order they were started, those without a recorded start by
-    file name before them. A repaired log stands in for its original. A log whose recorder did not
-    close it is opened too, excluded from evidence with the reason. Where a run was tried again, its
-    earlier attempts are left out: a log that ended as planned stands for all of that run's logs
-    that did not, and where none did, the last one stands.
+    file name before them. A repaired log stands in for the file it was made from, and for no other:
+    the repair record names it. A log whose recorder did not close it is opened too, excluded from
+    evidence with the reason. Where a run was tried again, its earlier attempts are left out: a log
+    that ended as planned stands for all of that run's logs that did not, and where none did, the
+    last one stands.
     """
 
     name: str = "log"
@@ -41,13 +42,15 @@ class LogImporter:
         Raises:
             DataError: There is no log, or one of them is damaged beyond its unfinished end.
         """
-        paths = [item for item in _logs(path) if not repaired_path(item).exists()]
+        paths = _logs(path)
         if not paths:
             raise DataError(
                 f"There is no log in {path}.",
                 "Looked for files named NAME.mcap and NAME.mcap.part.",
             )
-        heads = [_head(item) for item in paths]
+        read = [read_log(item, topics=(), tolerant=True, checksums=False) for item in paths]
+        repaired = {original for log in read if (original := repaired_from(log)) is not None}
+        heads = [_sound(log) for log in read if log.path not in repaired]
         heads.sort(key=lambda log: (log.run.started_at_ns or 0) if log.run else 0)
         several = len({log.path.parent for log in heads}) > 1
         return Campaign(tuple(_run(log, several) for log in _last_attempts(heads)))
@@ -63,14 +66,13 @@ def _logs(path: Path) -> list[Path]:
     ]
 
 
-def _head(path: Path) -> LogFile:
-    """Read what is known about a log without its samples."""
-    log = read_log(path, topics=(), tolerant=True, checksums=False)
+def _sound(log: LogFile) -> LogFile:
+    """Return the head of a log, or refuse one that is damaged beyond its unfinished end."""
     if log.run is None:
         raise DataError(
-            f"{path} does not say which run it holds.",
+            f"{log.path} does not say which run it holds.",
             "The record of the run is missing: the file is damaged, or not written by rig.",
-            f"Run `rig log check {path}`.",
+            f"Run `rig log check {log.path}`.",
         )
     if log.damage and not _unfinished(log):
         raise damaged(log)
