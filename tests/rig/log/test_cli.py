@@ -8,7 +8,9 @@ import typer
 
 from rig.cli.log import log_app
 from rig.errors import ExitCode, UsageError
-from rig.log.writer import LogExistsError
+from rig.log.run import RunEnd, RunInfo
+from rig.log.streams import COUNTS_STREAM
+from rig.log.writer import LogExistsError, LogWriter
 
 
 @pytest.fixture
@@ -31,6 +33,20 @@ def test_info_for_people(rig, log):
     for words in ("run of bench 1", "load_command_a = 0.3", "/rig/sample", "1000.00", "rig.toml"):
         assert words in out
     assert "2026-09-21T" in out
+
+
+def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
+    name, notes = "br[ack]et :x:", "jaw [/] cleaned [red]twice[/red] :warning:"
+    run, end = RunInfo(name, rig="bench [1]", notes=notes), RunEnd(clean=False, reason="[limits] a")
+    folder = tmp_path / name
+    folder.mkdir()
+    with LogWriter(folder / "a.mcap", run, [COUNTS_STREAM]) as writer:
+        writer.close(end)
+    code, out, err = rig("info", folder)
+    assert (code, err) == (0, "")
+    for words in (str(folder / "a.mcap"), name, notes, "bench [1]", "[limits] a"):
+        assert words in out
+    assert str(folder / "a.mcap") in rig("check", folder)[1]
 
 
 def test_info_for_machines(rig, log):
