@@ -41,11 +41,13 @@ def live(
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
     A simulated rig plays a first look unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
-    terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
+    without --protocol. Ctrl-C leaves, with the rig safe and exit code 130. With --json, one object
+    a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
+    q leaves.
     """
     from rig.config import load_config
     from rig.config_check import refuse_problems
+    from rig.errors import ExitCode
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
@@ -95,5 +97,5 @@ def live(
             half_widths=half_widths_of(estimators),
             footer=HELP if keys else "Ctrl-C leaves",
         )
-        show(until(blocks, duration), options, results(json_))
-    return 0
+        summary = show(until(blocks, duration), options, results(json_))
+    return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
