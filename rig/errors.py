@@ -9,6 +9,7 @@ from enum import IntEnum
 from calibration.errors import CalibrationError
 from drivers.errors import DriverError
 from estimation.errors import EstimationError
+from estimation.files import OutputError
 
 
 class ExitCode(IntEnum):
@@ -62,11 +63,12 @@ class SafetyTripError(RigError):
 
 
 ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
+    OutputError: ExitCode.USAGE,
     EstimationError: ExitCode.DATA,
     CalibrationError: ExitCode.DATA,
     DriverError: ExitCode.DEVICE,
 }
-"""Exit code of each other room's error base."""
+"""Exit code of each other room's errors; the first class that fits counts."""
 
 KNOWN_ERRORS: tuple[type[Exception], ...] = (RigError, *ROOM_EXIT_CODES)
 

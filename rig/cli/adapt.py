@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import emit_json, progress, results, to_json
+from rig.cli.output import JsonFlag, emit_json, progress, results, to_json
 
 
 def adapt(
@@ -22,7 +22,10 @@ def adapt(
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="File for the result; - for stdout.")] = None,
+    json: JsonFlag = False,
+    json_out: Annotated[
+        Path | None, typer.Option("--json-out", help="File for the result as JSON.")
+    ] = None,
 ) -> None:
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
@@ -45,12 +48,13 @@ def adapt(
             seed=seed,
             on_run=lambda run: bar.advance(task),
         )
-    screen = results(str(json) == "-")
+    screen = results(json)
     screen.print(to_rich(shown.table(result)))
     if out is not None:
         new.save(out)
         screen.print(f"Estimator: {out}", markup=False)
-    if json is not None and str(json) != "-":
-        write_text_atomic(json, to_json(result))
-    elif json is not None:
+    if json_out is not None:
+        write_text_atomic(json_out, to_json(result))
+        screen.print(f"Result: {json_out}", markup=False)
+    if json:
         emit_json(result)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import emit_json, plain, remarks, results
+from rig.cli.output import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
@@ -15,8 +15,9 @@ def diagnose(
         typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name."),
     ] = None,
     balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
-    json_: Annotated[
-        Path | None, typer.Option("--json", help="Where the diagnosis goes; - is stdout.")
+    json_: JsonFlag = False,
+    json_out: Annotated[
+        Path | None, typer.Option("--json-out", help="File for the diagnosis as JSON.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Folder for the page that a person reads.")
@@ -73,7 +74,7 @@ def diagnose(
         )
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
-    screen = results(json_ == Path("-"))
+    screen = results(json_)
     for line in sentences(done.diagnosis):
         screen.print(line, markup=False)
     for note in done.diagnosis.notes:
@@ -86,9 +87,9 @@ def diagnose(
         screen.print(f"Report: {where}", markup=False)
     if protocol_out is not None:
         screen.print(write_protocol(done.diagnosis, protocol_out), markup=False)
-    if json_ == Path("-"):
-        emit_json(done.diagnosis.to_json())
-    elif json_ is not None:
+    if json_out is not None:
         text = json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False)
-        write_text_atomic(json_, text + "\n")
-        screen.print(f"Diagnosis: {json_}", markup=False)
+        write_text_atomic(json_out, text + "\n")
+        screen.print(f"Diagnosis: {json_out}", markup=False)
+    if json_:
+        emit_json(done.diagnosis.to_json())

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from estimation.diagnosis.split import Sealed, samples_hash
-from estimation.files import write_text_atomic
+from estimation.files import OutputError, write_text_atomic
 from estimation.recording import Recording
 from rig.errors import DataError
 
@@ -76,7 +76,7 @@ class Ledger:
         try:
             before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
             write_text_atomic(self.path, before + json.dumps(look) + "\n")
-        except OSError as error:
+        except (OSError, OutputError) as error:
             raise LedgerError(
                 f"The ledger of diagnoses {self.path} cannot be written.",
                 f"{error}. Without it a second look at the same runs would pass as a first.",

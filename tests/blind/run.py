@@ -31,7 +31,7 @@ from tests.blind.summary import counted, tables
 from tests.blind.truths import TRUTHS
 
 COUNTS = "strong=40,weak=40,pair=30,outside=30,partial=10,confounded=20,control=100"
-COMMAND = f"{sys.executable} -m rig diagnose {{case}} --json {{out}}"
+COMMAND = f"{sys.executable} -m rig diagnose {{case}} --json-out {{out}}"
 TIME_LIMIT_S = 900.0
 Result = Mapping[str, Any]
 

@@ -81,7 +81,7 @@ CASES: dict[str, tuple[Spoil, str]] = {
 def diagnosed(monkeypatch, folder: Path, recordings: list[Recording]) -> dict[str, Any]:
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
-    words += ["--ledger", str(folder / "looks.jsonl"), "--json", str(folder / "diagnosis.json")]
+    words += ["--ledger", str(folder / "looks.jsonl"), "--json-out", str(folder / "diagnosis.json")]
     assert main(words) == 0
     found: dict[str, Any] = json.loads((folder / "diagnosis.json").read_text())
     return found
@@ -110,7 +110,7 @@ def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     ledger, out = tmp_path / "looks.jsonl", tmp_path / "diagnosis.json"
     words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick"]
-    assert main([*words, "--ledger", str(ledger), "--json", str(out)]) == 5
+    assert main([*words, "--ledger", str(ledger), "--json-out", str(out)]) == 5
     said = capsys.readouterr().err
     assert reason in " ".join(said.split())
     assert "spring" not in said
