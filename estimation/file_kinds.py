@@ -12,6 +12,8 @@ PROTOCOL = "a protocol"
 TOML = "a TOML file"
 JSON = "a JSON file"
 CAMPAIGN = "the record of a campaign"
+LEDGER = "the ledger of diagnoses"
+DIAGNOSIS = f"{JSON} of rig.diagnosis/1"
 HTML = "a page (HTML)"
 SVG = "a figure (SVG)"
 MARKDOWN = "a Markdown file"
@@ -92,12 +94,17 @@ def _kind_of_json(text: str) -> str:
     try:
         whole = json.loads(text)
     except ValueError:
-        return "lines of JSON"
+        first, _, _ = text.partition("\n")
+        if first == text:
+            return "a text file"
+        return _kind_of_json(first)  # one object a line
     if not isinstance(whole, dict):
         return JSON
+    if "schema" in whole:
+        return f"{JSON} of {whole['schema']}"
     if "config_sha256" in whole:
         return CAMPAIGN
-    return f"{JSON} of {whole['schema']}" if "schema" in whole else JSON
+    return LEDGER if "seal" in whole else JSON
 
 
 def _kind_of_toml(table: dict[str, Any]) -> str:

@@ -224,7 +224,7 @@ def diagnose(
     """Ask the diagnosis what a calibration lacks, on the raw logs it was made from."""
     from rig.calibrate.diagnose import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
-    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
@@ -238,6 +238,7 @@ def diagnose(
         seed=seed,
         on_stage=lambda what: screen.print(f"{what} ..."),
     )
+    remember(done, looks)
     screen = results(json)
     for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
         screen.print(line, markup=False)

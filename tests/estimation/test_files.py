@@ -14,10 +14,10 @@ TEXTS = {
     "model": MODEL_TEXT,
     "config": 'name = "bench"\n[logger]\nurl = "sim://"\n',
     "protocol": 'name = "short"\n[[runs]]\nkind = "sine"\n',
-    "diagnosis": json.dumps({"schema": "rig.diagnosis/1"}),
+    "diagnosis": json.dumps({"schema": "rig.diagnosis/1", "seal": "0"}),
     "campaign": json.dumps({"protocol": {}, "config": {}, "config_sha256": "0"}),
     "result": json.dumps({"runs": 3}),
-    "ledger": '{"date": 1}\n{"date": 2}\n',
+    "ledger": '{"date": 1, "seal": "0"}\n{"date": 2, "seal": "1"}\n',
     "page": "<!doctype html><title>t</title>",
     "figure": '<?xml version="1.0"?><svg/>',
     "markdown": "## T\n\n| a | b |\n",
@@ -61,6 +61,13 @@ def test_arrays_of_data_are_not_replaced_by_an_estimator(tmp_path: Path) -> None
     with pytest.raises(OutputError):
         write_bytes_atomic(data, estimator.read_bytes())
     write_bytes_atomic(estimator, estimator.read_bytes())
+
+
+def test_a_ledger_grows_from_its_first_line(tmp_path: Path) -> None:
+    path, line = tmp_path / "looks.jsonl", '{"date": 1, "seal": "0"}\n'
+    for lines in (1, 2, 3):
+        write_text_atomic(path, lines * line)
+    assert path.read_text() == 3 * line
 
 
 def test_an_empty_file_is_filled(tmp_path: Path) -> None:
