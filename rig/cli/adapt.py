@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results, to_json
+from rig.cli.output import JsonFlag, emit_json, progress, results, say_left_out, to_json
 
 
 def adapt(
@@ -37,6 +37,7 @@ def adapt(
 
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
     with progress() as bar:
         task = bar.add_task("runs", total=len(campaign))
         result, new = run_adaptation(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, plain, remarks, results
+from rig.cli.output import JsonFlag, emit_json, plain, remarks, results, say_left_out
 
 
 def diagnose(
@@ -69,6 +69,7 @@ def diagnose(
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_)
+        say_left_out(path, asked.campaign)
         done = run_diagnosis(
             asked.campaign,
             asked.models,

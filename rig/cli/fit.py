@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results
+from rig.cli.output import JsonFlag, emit_json, progress, results, say_left_out
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -140,6 +140,7 @@ def fit(
 
     screen = results(json_)
     campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
         return

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
+    from estimation.campaign import Campaign
     from rig.reports.table import TextTable
 
 PIPE_WIDTH = 240
@@ -48,6 +49,15 @@ def _console(stderr: bool) -> "Console":
     from rich.console import Console
 
     return Console(stderr=stderr, highlight=False, soft_wrap=True, markup=False, emoji=False)
+
+
+def say_left_out(path: Path, campaign: "Campaign") -> None:
+    """Name on stderr the files and runs at a path that a campaign leaves out, and why."""
+    from rig.importers.left_out import left_out
+
+    screen = remarks()
+    for line in left_out(path, campaign):
+        screen.print(line)
 
 
 def progress() -> "Progress":

@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 
 from estimation.campaign import Campaign
 from rig.errors import DataError, UsageError
+from rig.importers.one_rig import of_one_rig
 
 
 @runtime_checkable
@@ -65,6 +66,8 @@ def _loaded(entry: EntryPoint) -> Importer:
 def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
     """Open recordings of any known format.
 
+    The runs are of one rig and one instrument: reading one that is not raises MixedRunsError.
+
     Args:
         path: File, folder or archive.
         format_name: Importer to use; guessed from the path when None.
@@ -81,10 +84,10 @@ def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
             raise UsageError(
                 f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
             )
-        return known[format_name].open(path)
+        return of_one_rig(known[format_name].open(path))
     for importer in known.values():
         if importer.recognises(path):
-            return importer.open(path)
+            return of_one_rig(importer.open(path))
     raise DataError(
         f"No importer recognises {path}.",
         f"Tried: {', '.join(known)}.",
