@@ -7,8 +7,10 @@ link, 4 safety trip, 5 data damaged or unreadable, 70 a bug in rig, 130 interrup
 from enum import IntEnum
 
 from calibration.errors import CalibrationError
+from calibration.errors import UnknownNameError as NoSuchRecord
 from drivers.errors import DriverError
 from estimation.errors import EstimationError
+from estimation.errors import UnknownNameError as NoSuchModel
 from estimation.files import OutputError
 
 
@@ -64,6 +66,8 @@ class SafetyTripError(RigError):
 
 ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
     OutputError: ExitCode.USAGE,
+    NoSuchModel: ExitCode.USAGE,
+    NoSuchRecord: ExitCode.USAGE,
     EstimationError: ExitCode.DATA,
     CalibrationError: ExitCode.DATA,
     DriverError: ExitCode.DEVICE,

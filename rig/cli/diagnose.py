@@ -6,13 +6,16 @@ from typing import Annotated
 import typer
 
 from rig.cli.output import JsonFlag, emit_json, plain, remarks, results, say_left_out
+from rig.cli.shipped import model_names
 
 
 def diagnose(
     path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
     model: Annotated[
         Path | None,
-        typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name."),
+        typer.Option(
+            "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
+        ),
     ] = None,
     balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
     json_: JsonFlag = False,

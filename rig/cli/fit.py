@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.output import JsonFlag, emit_json, progress, results, say_left_out
+from rig.cli.shipped import complete_model, model_names
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -103,8 +104,9 @@ def fit(
         typer.Option(
             "--model",
             "-m",
-            help="Declared model: a file, a shipped one by name, `states` for products of"
-            " physical states, or `network` for a network with some of them as inputs.",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
+            " products of physical states, `network` for a network with some of them as inputs.",
+            autocompletion=complete_model,
         ),
     ] = "grip",
     out: Annotated[

@@ -6,12 +6,12 @@ from typing import Annotated
 import typer
 
 from rig.cli.output import JsonFlag, results
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 
 
 def live(
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     model: Annotated[
         Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
     ] = None,
@@ -45,7 +45,6 @@ def live(
     a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
     q leaves.
     """
-    from rig.config import load_config
     from rig.config_check import refuse_problems
     from rig.errors import ExitCode
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
@@ -61,7 +60,7 @@ def live(
     from rig.machines.choose import machine_of
     from rig.protocol import load_protocol
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     refuse_problems(settings)
     machine = machine_of(settings)
     if protocol is None and settings.is_simulated:

@@ -6,12 +6,11 @@ from pathlib import Path
 from estimation.campaign import Campaign, Run
 from estimation.recording import Recording
 from rig.errors import DataError
+from rig.log.attempts import heads_of, is_unfinished, run_name, standing, started_ns
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
 from rig.log.reader import LogFile, damaged, read_log
-from rig.log.repair import repaired_from
 from rig.log.streams import SAMPLE
-from rig.log.writer import PART_SUFFIX
 
 
 @dataclass(frozen=True)
@@ -48,12 +47,10 @@ class LogImporter:
                 f"There is no log in {path}.",
                 "Looked for files named NAME.mcap and NAME.mcap.part.",
             )
-        read = [read_log(item, topics=(), tolerant=True, checksums=False) for item in paths]
-        repaired = {original for log in read if (original := repaired_from(log)) is not None}
-        heads = [_sound(log) for log in read if log.path not in repaired]
-        heads.sort(key=lambda log: (log.run.started_at_ns or 0) if log.run else 0)
+        read = heads_of(paths)
+        heads = [_sound(log) for log in sorted(standing(read), key=started_ns)]
         several = len({log.path.parent for log in heads}) > 1
-        return Campaign(tuple(_run(log, several) for log in _last_attempts(heads)))
+        return Campaign(tuple(_run(log, several) for log in heads))
 
 
 def _logs(path: Path) -> list[Path]:
@@ -74,36 +71,15 @@ def _sound(log: LogFile) -> LogFile:
             "The record of the run is missing: the file is damaged, or not written by rig.",
             f"Run `rig log check {log.path}`.",
         )
-    if log.damage and not _unfinished(log):
+    if log.damage and not is_unfinished(log):
         raise damaged(log)
     return log
 
 
-def _last_attempts(heads: list[LogFile]) -> list[LogFile]:
-    """Leave out the logs of runs that were tried again."""
-    attempts: dict[tuple[Path, str], list[LogFile]] = {}
-    for log in heads:
-        attempts.setdefault((log.path.parent, _name(log)), []).append(log)
-    kept = []
-    for same in attempts.values():
-        planned = [log for log in same if not _unfinished(log) and log.end and log.end.clean]
-        kept += planned or same[-1:]
-    return [log for log in heads if log in kept]
-
-
-def _name(log: LogFile) -> str:
-    return log.run.name if log.run else log.path.stem
-
-
-def _unfinished(log: LogFile) -> bool:
-    """Whether its recorder did not finish the log."""
-    return log.end is None or log.path.suffix == PART_SUFFIX
-
-
 def _run(head: LogFile, several: bool) -> Run:
     path = head.path
-    unfinished = _unfinished(head)
-    name = f"{path.parent.name}/{_name(head)}" if several else _name(head)
+    unfinished = is_unfinished(head)
+    name = f"{path.parent.name}/{run_name(head)}" if several else run_name(head)
 
     def load() -> Recording:
         topics = None if unfinished else (SAMPLE,)

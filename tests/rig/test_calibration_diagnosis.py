@@ -26,6 +26,7 @@ def rig(tmp_path, monkeypatch, capsys):
         text = text.replace("seed = 0", f'seed = 0\nplant = "declared"\nhidden = {hidden}')
         (tmp_path / "rig.toml").write_text(text)
         how = ["--operator", "Ada", "--yes", "--json", "--config", "rig.toml", "--out", "raw"]
+        how += ["--store", "store"]
         return run("calibrate", kind, *words, *how)["records"]
 
     calibrated.run = run
