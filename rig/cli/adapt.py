@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results, say_left_out, to_json
+from rig.cli.left_out import say_left_out
+from rig.output.console import JsonFlag, emit_json, progress, results, to_json
 
 
 def adapt(
@@ -31,9 +32,9 @@ def adapt(
     from estimation.estimator import load
     from estimation.files import write_text_atomic
     from rig.importers.registry import open_campaign
+    from rig.models.adapt import open_source, run_adaptation
+    from rig.output.table import to_rich
     from rig.reports import adapt as shown
-    from rig.reports.table import to_rich
-    from rig.studies.adapt import open_source, run_adaptation
 
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.help import GroupedHelp
-from rig.cli.output import JsonFlag, emit_json, remarks, results
 from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
     from calibration.store import CalibrationStore
-    from rig.config import Config
+    from rig.configuration.config import Config
 
 cal_app = typer.Typer(
     name="cal",
@@ -190,7 +190,7 @@ def check(
     from datetime import UTC, datetime
 
     from calibration.rules import judge, judge_raw
-    from rig.chosen_rig import choose_rig
+    from rig.configuration.chosen import choose_rig
 
     settings = choose_rig(config, sim)
     kept = _store(store, settings)
@@ -300,7 +300,7 @@ def _flat(record: "CalibrationRecord") -> dict[str, Any]:
     """Return a record as dotted names and values; a hash of the figure, a line of the raw logs."""
     from hashlib import sha256
 
-    from rig.cli.output import plain
+    from rig.output.console import plain
 
     flat: dict[str, Any] = {"hash": record.content_hash}
 

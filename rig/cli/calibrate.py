@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.help import GroupedHelp
-from rig.cli.output import JsonFlag
 from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.output.console import JsonFlag
 
 if TYPE_CHECKING:
     from calibration.procedure import Procedure

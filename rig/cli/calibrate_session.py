@@ -4,8 +4,8 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.cli.output import emit_json, remarks, results
 from rig.cli.rig_options import chosen_rig
+from rig.output.console import emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drivers.device import Device
     from rig.calibrate.run import Kept
     from rig.cli.calibrate import Keeping
-    from rig.config import Config
+    from rig.configuration.config import Config
 
 QUESTION = "Enter when done, b to measure the step before again, q to stop: "
 
@@ -86,9 +86,9 @@ def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "
 
 def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list[Any]:
     from calibration.procedure import AbortedError, carry_out
+    from rig.bench.logger import open_logger
     from rig.calibrate.bench import RigBench
     from rig.calibrate.shown import reading
-    from rig.logger import open_logger
 
     screen = remarks()
     operator: Operator

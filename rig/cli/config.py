@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from rig.cli.help import GroupedHelp
-from rig.cli.output import JsonFlag, emit_json, results
 from rig.cli.rig_options import SimFlag
 from rig.cli.shipped import complete_config, config_names
+from rig.output.console import JsonFlag, emit_json, results
 
 config_app = typer.Typer(
     name="config",
@@ -47,7 +47,7 @@ def init(
     from difflib import get_close_matches
 
     from estimation.files import write_text_atomic
-    from rig.config import SHIPPED
+    from rig.configuration.config import SHIPPED
     from rig.doctor.ports import serial_ports
     from rig.errors import UsageError
 
@@ -81,8 +81,8 @@ def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fa
 
     Exit code 2 when the configuration cannot be used; every problem is named.
     """
-    from rig.chosen_rig import choose_rig
-    from rig.config_check import problems
+    from rig.configuration.check import problems
+    from rig.configuration.chosen import choose_rig
 
     settings = choose_rig(path, sim)
     found = problems(settings)
@@ -101,8 +101,8 @@ def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fa
 @config_app.command()
 def show(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """Show the whole configuration as every log keeps it, defaults and units written out."""
-    from rig.chosen_rig import choose_rig
-    from rig.config_text import to_toml
+    from rig.configuration.chosen import choose_rig
+    from rig.configuration.text import to_toml
 
     settings = choose_rig(path, sim)
     if json:
@@ -114,7 +114,7 @@ def show(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fal
 @config_app.command(name="list")
 def list_(json: JsonFlag = False) -> None:
     """List the shipped configurations."""
-    from rig.config import SHIPPED, load_config, shipped_configs
+    from rig.configuration.config import SHIPPED, load_config, shipped_configs
 
     found = {name: load_config(Path(name)).name for name in shipped_configs()}
     if json:

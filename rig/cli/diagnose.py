@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, plain, remarks, results, say_left_out
+from rig.cli.left_out import say_left_out
 from rig.cli.shipped import model_names
+from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
@@ -59,10 +60,10 @@ def diagnose(
     from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters, written_models
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
-    from rig.reports.provenance import Provenance
-    from rig.reports.render import write_report
 
     page_file = report / "diagnosis.html" if report else None
     outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}

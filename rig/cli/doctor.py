@@ -4,8 +4,8 @@ from typing import Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, emit_json, results
 
 
 def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -34,8 +34,8 @@ def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = F
 def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """List serial ports, CAN interfaces, installed drivers, and what is configured."""
     from drivers.registry import drivers
-    from rig.chosen_rig import choose_rig, default_config
-    from rig.config_check import LOGGER
+    from rig.configuration.check import LOGGER
+    from rig.configuration.chosen import choose_rig, default_config
     from rig.doctor.ports import can_interfaces, serial_ports
 
     configured: dict[str, Any] = {}
@@ -79,7 +79,7 @@ def selftest(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag =
 
     Nothing moves. Exit code 1 when a check fails.
     """
-    from rig.config_check import refuse_problems
+    from rig.configuration.check import refuse_problems
     from rig.doctor.selftest import selftest as checks
 
     settings = chosen_rig(config, sim)

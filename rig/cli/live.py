@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, results
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, results
 
 
 def live(
@@ -45,7 +45,8 @@ def live(
     a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
     q leaves.
     """
-    from rig.config_check import refuse_problems
+    from rig.bench.logger import open_logger
+    from rig.configuration.check import refuse_problems
     from rig.errors import ExitCode
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
@@ -56,9 +57,8 @@ def live(
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
     from rig.live.watching import watched
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
-    from rig.protocol import load_protocol
+    from rig.protocols.protocol import load_protocol
 
     settings = chosen_rig(config, sim)
     refuse_problems(settings)

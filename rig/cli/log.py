@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.help import GroupedHelp
-from rig.cli.output import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
@@ -75,7 +75,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
     """Return the runs of a campaign's protocol that have no log; none where it is no campaign."""
-    from rig.record import MANIFEST, read_manifest
+    from rig.recording.campaign import MANIFEST, read_manifest
 
     if not (path / MANIFEST).is_file():
         return []

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
 from rig.cli.rig_options import ConfigOption, SimFlag, announced, chosen_rig
 from rig.cli.shipped import complete_protocol, protocol_names
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
-    from rig.config import Config
+    from rig.configuration.config import Config
     from rig.machines.machine import Machine
 
 
@@ -44,14 +44,19 @@ def record(
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
     from calibration.rules import refuse_errors
-    from rig.config_check import refuse_problems
+    from rig.bench.logger import open_logger
+    from rig.bench.session import Session
+    from rig.configuration.check import refuse_problems
     from rig.errors import UsageError
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
-    from rig.protocol import load_protocol
-    from rig.record import RunResult, open_campaign_folder, read_manifest, record_campaign
-    from rig.session import Session
-    from rig.watching import watch_runs
+    from rig.protocols.protocol import load_protocol
+    from rig.recording.campaign import (
+        RunResult,
+        open_campaign_folder,
+        read_manifest,
+        record_campaign,
+    )
+    from rig.recording.watch import watch_runs
 
     screen = remarks()
     if resume is not None:

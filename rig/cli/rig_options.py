@@ -8,7 +8,7 @@ import typer
 from rig.cli.shipped import complete_config, config_names
 
 if TYPE_CHECKING:
-    from rig.config import Config
+    from rig.configuration.config import Config
 
 ConfigOption = Annotated[
     Path | None,
@@ -29,14 +29,14 @@ def chosen_rig(config: Path | None, sim: bool) -> "Config":
     Raises:
         UsageError: No rig is configured, or the configuration is wrong.
     """
-    from rig.chosen_rig import choose_rig
+    from rig.configuration.chosen import choose_rig
 
     return announced(choose_rig(config, sim))
 
 
 def announced(settings: "Config") -> "Config":
     """Return a configuration; the session on it begins with a line if it is simulated."""
-    from rig.cli.output import remarks
+    from rig.output.console import remarks
 
     if settings.is_simulated:
         remarks().print(f"Simulated rig ({settings.name}): nothing real moves or is measured.")

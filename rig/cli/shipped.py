@@ -12,7 +12,7 @@ def _names(folder: Path, ending: str = ".toml") -> list[str]:
 
 def config_names() -> list[str]:
     """Return the names of the shipped configurations."""
-    names = _names(Path(rig.__file__).parent / "configs")
+    names = _names(Path(rig.__file__).parent / "configuration" / "shipped")
     return [name for name in names if not name.endswith(".model")]
 
 

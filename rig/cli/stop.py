@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from rig.cli.output import JsonFlag, emit_json, remarks, results
 from rig.cli.rig_options import ConfigOption, SimFlag, announced
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 
 def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -14,8 +14,8 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
     every rig itself has confirmed it; 4 when the state of one is unknown; 2 when none is
     configured.
     """
-    from rig.chosen_rig import ONE_OF, choose_config, configured_rigs
-    from rig.config import load_config
+    from rig.configuration.chosen import ONE_OF, choose_config, configured_rigs
+    from rig.configuration.config import load_config
     from rig.errors import ExitCode, UsageError
 
     if config is not None:
@@ -39,9 +39,9 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
     """Disarm one rig; whatever fails, the next one is still stopped."""
     from drivers.errors import DriverError
     from drivers.teensy.driver import TeensyLogger
-    from rig.config import load_config
+    from rig.bench.logger import open_logger
+    from rig.configuration.config import load_config
     from rig.errors import RigError
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
 
     name = str(path)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli.main import main
-from rig.config import SIMULATED
+from rig.configuration.config import SIMULATED
 
 CONFIG = SIMULATED.read_text().replace("simulated rig", "bench of Ada")
 BROKEN = CONFIG.replace('"sim://"', '"/dev/no-such-board"').replace("bench of Ada", "dead bench")

@@ -10,14 +10,14 @@ import typer
 
 from estimation.recording import Recording
 from rig.cli.log import log_app
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.errors import ExitCode, UsageError
 from rig.log.convert import write_recording
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS_STREAM
 from rig.log.writer import LogExistsError, LogWriter
-from rig.protocol import Protocol
-from rig.record import open_campaign_folder
+from rig.protocols.protocol import Protocol
+from rig.recording.campaign import open_campaign_folder
 
 
 @pytest.fixture
