@@ -1,8 +1,8 @@
 """A session with the rig: connected devices, limits checked at every sample, safe on every way out.
 
 The session streams from start to end. `rest` reads the disarmed rig; `play` arms it and plays a
-trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM), the logger is disarmed
-first, and the disarming is confirmed by the logger itself.
+trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM, a lost terminal), the
+logger is disarmed first, and the disarming is confirmed by the logger itself.
 """
 
 from collections.abc import Iterator, Mapping

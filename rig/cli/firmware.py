@@ -4,12 +4,14 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.doctor import ConfigOption
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
     help="Say which firmware is where, build it, flash it.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -20,15 +22,14 @@ BoardOption = Annotated[
 
 
 @firmware_app.command()
-def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
+def version(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Hold the board's firmware against this program's and this source tree's.
 
     Exit code 1 when they do not go together.
     """
     from rig.bench.firmware import compare
-    from rig.configuration.config import load_config
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     versions = compare(settings)
     screen = results(json)
     screen.print(f"program   {versions.program}", markup=False)
