@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: setup demo test lint site bench blind soak fuzz figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo test lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler
 $(VENV)/.installed: pyproject.toml
@@ -39,11 +39,11 @@ bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
 	$(BIN)/python docs/figures/diagnosis_cost.py
 
-# resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster,
-# BLIND=--baselines for textbook methods beside it (minutes a case)
-BLIND ?=
-blind: $(VENV)/.developing
-	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md $(BLIND)
+# how good the diagnosis is: appends a line to docs/results/diagnosis-versions.md; resumes where it
+# stopped; MEASURE="--otherlab FOLDER --machines FOLDER --rig OTHER_CHECKOUT/.venv/bin/rig" for more
+MEASURE ?=
+measure: $(VENV)/.developing
+	$(BIN)/python -m benchmarks.diagnosis measure $(MEASURE)
 
 # an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
 # listening sockets;
@@ -57,6 +57,12 @@ FUZZ ?=
 fuzz: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.reliability.fuzz $(FUZZ)
 	$(BIN)/python -m benchmarks.reliability fuzz
+
+# damages the drivers' wire formats in 200 places and runs their tests on each; a quarter of an hour.
+# MUTANTS="ati_net amt21" for some drivers
+MUTANTS ?=
+mutants: $(VENV)/.developing
+	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
 figures: $(VENV)/.installed
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done

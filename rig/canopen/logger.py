@@ -12,7 +12,7 @@ their own (`rig.canopen.process`), so that they wait for nobody.
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.epos4.driver import Epos4
+from drivers.epos4.drive import Epos4
 from drivers.errors import LinkLostError
 from drivers.teensy.control import PREVIOUS_MOTOR_COUNT
 from drivers.teensy.fake import PythonBoard

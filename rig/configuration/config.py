@@ -325,6 +325,17 @@ class Config(_Section):
         named = self.calibration_store
         return CalibrationStore(default_folder() if named == "default" else Path(named))
 
+    @property
+    def default_store(self) -> CalibrationStore:
+        """The store where neither the configuration nor a command names one.
+
+        What comes from a simulated rig is kept beside the real calibrations, not among them.
+        """
+        folder = default_folder()
+        if self.is_simulated:
+            folder = folder.with_name(f"{folder.name}-simulated")
+        return CalibrationStore(folder)
+
     def calibration_set(self) -> CalibrationSet:
         """Return the calibrations in use: the set, with the store's active lines in place of its.
 
@@ -388,7 +399,8 @@ def load_config(path: Path | None = None) -> Config:
     """
     path = SIMULATED if path is None else _found(path)
     try:
-        return Config.model_validate(tomllib.loads(path.read_text()))
+        text = path.read_text()
+        return Config.model_validate(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(
             f"The configuration {path} cannot be read.",
@@ -399,7 +411,7 @@ def load_config(path: Path | None = None) -> Config:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:
         raise UsageError(
-            f"{path} is not a configuration.", explain(error, _keys(Config))
+            f"{path} is not a configuration.", explain(error, _keys(Config), text)
         ) from error
 
 
