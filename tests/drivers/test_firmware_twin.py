@@ -95,7 +95,8 @@ def test_a_whole_session(library: Path) -> None:
     script += [setpoints(4, sweep(0)), setpoints(5, sweep(100), 300), 150, ping(6, 2**63 + 5), 100]
     script += [setpoints(7, sweep(200)), 40, command(Kind.DISARM, 8), 20, command(Kind.STOP, 9), 10]
     seen = statuses(assert_twins(script, library, start_tick_us=2**32 - 100_000))
-    assert seen == {0, protocol.STATUS_ARMED, protocol.STATUS_ARMED | protocol.STATUS_QUEUE_DRY}
+    armed = protocol.STATUS_REFERENCED | protocol.STATUS_ARMED
+    assert seen == {protocol.STATUS_REFERENCED, armed, armed | protocol.STATUS_QUEUE_DRY}
 
 
 def test_the_watchdog(library: Path) -> None:

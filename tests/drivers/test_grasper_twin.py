@@ -132,7 +132,7 @@ def test_a_whole_session_at_2_khz_with_three_motors_each_on_its_own_way(library:
     script += [setpoints(4, *ways), 60, command(Kind.DISARM, 5), 4, command(Kind.STOP, 6), 3]
     samples = assert_twins(script, library, moving(90), start_tick_us=2**32 - 10_000)
     assert set(np.diff(samples["tick_us"]).tolist()) == {500}
-    asked = samples["status"] == protocol.STATUS_ARMED
+    asked = samples["status"] == protocol.STATUS_REFERENCED | protocol.STATUS_ARMED
     for k, way in enumerate(ways, 1):
         assert samples[f"target_{k}"][asked][-50:].tolist() == way
         assert np.abs(samples[f"command_{k}_e4"]).max() > 0

@@ -70,7 +70,7 @@ def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) ->
     assert identity.protocol_hash == REFERENCE.protocol_hash
     logger.start()
     rest = joined(read_for(logger, 100))
-    assert not rest["status"].any()
+    assert (rest["status"] == protocol.STATUS_REFERENCED).all()
     assert not rest["command_e4"].any()
     logger.arm(GAINS, WIDEST)
     targets = START_SPINDLE - np.arange(600)
@@ -383,7 +383,8 @@ def test_leaving_the_with_block_disarms(make_board: MakeBoard) -> None:
         arm_and_fail(logger_of(board))
     with logger_of(board) as logger:
         logger.start()
-        assert not logger.read(0.1).samples["status"].any()
+        status = logger.read(0.1).samples["status"]
+        assert (status == protocol.STATUS_REFERENCED).all()
 
 
 def test_a_disarm_needs_no_matching_protocol() -> None:

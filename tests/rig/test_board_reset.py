@@ -1,0 +1,44 @@
+"""A board that is started anew while a session uses it: the firmware core on the simulated rig."""
+
+from pathlib import Path
+
+import pytest
+
+from drivers.teensy.firmware_fake import FirmwareBoard
+from drivers.transport.simulated import SimulatedTransport
+from rig.bench.session import BoardResetError, Session
+from rig.simulation.bench import SimulatedBench
+from tests.rig.simulated import simulated
+
+
+class BoardThatIsReset:
+    """Implements `drivers.transport.simulated.Board`: a board, and another start of it later."""
+
+    def __init__(self, library: Path, reset_at_tick: int) -> None:
+        self._bench, self._library = SimulatedBench(), library
+        self._board = FirmwareBoard(self._bench, library=library, boot=4)
+        self._left = reset_at_tick
+
+    def receive(self, data: bytes) -> None:
+        self._board.receive(data)
+
+    def transmit(self) -> bytes:
+        return self._board.transmit()
+
+    def advance(self, ticks: int) -> None:
+        if 0 < self._left <= ticks:
+            self._board = FirmwareBoard(
+                self._bench, library=self._library, boot=5, referenced=False
+            )
+        self._left -= ticks
+        self._board.advance(ticks)
+
+
+def test_a_session_notices_that_its_board_was_reset_and_says_what_to_do(library: Path) -> None:
+    link = SimulatedTransport(BoardThatIsReset(library, 800), "sim://")
+    with Session(simulated(), link) as session:
+        assert session.board["board_start"] == "4"
+        readings = session.rest(5.0)
+        with pytest.raises(BoardResetError, match="rig reference") as caught:
+            list(readings)
+    assert "start number 5" in caught.value.why
