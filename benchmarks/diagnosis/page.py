@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks.diagnosis.case import KINDS, MACHINE
 from benchmarks.diagnosis.measure import Row
-from benchmarks.diagnosis.seeds import use_of
 from estimation.files import write_text_atomic
+from rig.simulation.varied import part_of
 
 PAGE = Path("docs/results/diagnosis-versions.md")
 
@@ -131,7 +131,7 @@ def _key(section: str, cells: Sequence[str]) -> tuple[str, ...]:
 def _simulated(
     measured: Measured, rows: Sequence[Row], earlier: Sequence[Sequence[str]]
 ) -> list[str]:
-    use = "develop" if measured.seed is None else use_of(measured.seed)
+    use = "develop" if measured.seed is None else part_of(measured.seed)
     seed = "-" if measured.seed is None else str(measured.seed)
     if use == "judge" and any(c[3] == seed and c[0] != measured.version for c in earlier):
         use = "seen"
