@@ -1,4 +1,4 @@
-"""Errors of the `estimation` room: what an estimate or a recording cannot do."""
+"""Errors of the `estimation` package."""
 
 
 class EstimationError(Exception):

@@ -1,4 +1,4 @@
-"""Writing a file so that a reader sees the old one or the new one, never half of either."""
+"""Atomic writing of files: a reader gets the old or the new content, never a part."""
 
 import os
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def write_text_atomic(path: Path, text: str) -> None:
-    """Write a text file under a temporary name beside the target and rename it.
+    """Write a text file under a temporary name in the target's folder and rename it.
 
     Args:
         path: Target; its folder is made when it is missing.
@@ -19,7 +19,7 @@ def write_text_atomic(path: Path, text: str) -> None:
 
 
 def write_bytes_atomic(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name beside the target and rename it.
+    """Write a file under a temporary name in the target's folder and rename it.
 
     Args:
         path: Target; its folder is made when it is missing.

@@ -20,7 +20,7 @@ from estimation.rest import closing
 from estimation.scores import Score, score
 
 AUTHORS_SKIP = 1 / 8
-"""The authors' linear fit leaves out this first part of the closing samples."""
+"""The authors' linear fit omits this first part of the closing samples."""
 
 TEST_SHARE = 0.15
 """Share of the samples that the paper's random split tests on."""
@@ -37,7 +37,7 @@ SPEED = "spindle_velocity_rad_s"
 
 
 class StudyError(EstimationError):
-    """The paper's processing leaves nothing to fit or to score."""
+    """After the paper's processing no samples remain to fit or to score."""
 
 
 def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER) -> Recording:
@@ -51,7 +51,7 @@ def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PA
 
 
 def is_closing(run: Recording) -> NDArray[np.bool_]:
-    """Say which samples of a processed run the paper keeps, shape (n,)."""
+    """Return which samples of a processed run the paper keeps, shape (n,)."""
     return closing(run[SPEED], run.sample_rate_hz)
 
 
@@ -60,8 +60,8 @@ def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:
 
     Args:
         run: A run from `processed`.
-        keep_flagged: Keep samples that carry a flag. The paper knows no flags, so its counts and
-            its errors come out only with them.
+        keep_flagged: Keep samples that carry a flag. The paper has no flags, so its counts and
+            its errors are reproduced only with them.
     """
     kept = is_closing(run)
     if not keep_flagged:

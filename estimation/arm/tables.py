@@ -41,7 +41,7 @@ class Joint:
         lower: Lower end of its range.
         upper: Upper end of its range.
         speed: Largest speed.
-        link: What of its link's ten parameters counts, see `Link`.
+        link: Which of its link's ten parameters count, see `Link`.
         spring: Whether an elastic torque proportional to its position acts on it.
     """
 
@@ -65,9 +65,9 @@ class Body:
     """One body of an arm's spanning tree, on a joint along or about its z axis.
 
     Attributes:
-        name: What it is called.
-        parent: Number of the body it hangs on, from 1; 0 is the base.
-        row: Where its joint sits on that body.
+        name: Name.
+        parent: Number of the parent body, from 1; 0 is the base.
+        row: Position of its joint on that body.
         closure: How far its joint moves with each actuated joint: its row of G.
         prismatic: Whether its joint slides.
         link: As `Joint.link`.
@@ -85,7 +85,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class PointMass:
-    """A mass fixed to a link, beside what the link's own parameters say.
+    """A mass fixed to a link, in addition to the link's own parameters.
 
     Attributes:
         name: What it is called.
@@ -102,7 +102,7 @@ class PointMass:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """What is mounted on the last link: where its own tip is, and what it weighs.
+    """A tool mounted on the last link: its tip and its masses.
 
     Attributes:
         name: What it is called.
@@ -131,8 +131,8 @@ class Arm:
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
         loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
             see `bodies`.
-        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` says
-            what they ask of the joints.
+        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns
+            their joint torque.
     """
 
     name: str
@@ -147,7 +147,7 @@ class Arm:
     carried: tuple[PointMass, ...] = ()
 
     def with_payload(self, *masses: PointMass) -> "Arm":
-        """Return the arm with masses added to what it carries."""
+        """Return the arm with additional masses."""
         return replace(self, carried=(*self.carried, *masses))
 
     def with_tool(self, tool: Tool) -> "Arm":

@@ -71,7 +71,7 @@ class Training:
 
 
 def has_torch() -> bool:
-    """Say whether torch is installed."""
+    """Whether torch is installed."""
     from importlib.util import find_spec
 
     return find_spec("torch") is not None

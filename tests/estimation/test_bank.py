@@ -286,7 +286,7 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
     assert new.interval.least >= fitted.interval.least  # a run does not make it surer of itself
     assert one.covered(new).mean() > 0.99
     assert closing_error(new, other(runs[6]))[1].min() > 0
-    with pytest.raises(NetworkError, match="no closing sample"):
+    with pytest.raises(NetworkError, match="No closing samples"):
         adapted(fitted, [])
 
 
@@ -300,5 +300,5 @@ def test_a_damaged_file_is_refused(fitted, tmp_path):
         BankEstimator.load(path)
     with pytest.raises(NetworkError, match="weights"):
         replace(fitted, weights=fitted.weights[:-1])
-    with pytest.raises(NetworkError, match="no closing sample"):
+    with pytest.raises(NetworkError, match="No closing samples"):
         BankRecipe(TARGET, BANK).fit(Campaign(()))
