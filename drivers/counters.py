@@ -19,7 +19,7 @@ class DeviceCounters(LinkCounters):
         stalls: Silences of a stream longer than it should ever be silent.
         late: Packets dropped because later ones had come before them.
         device_errors: Samples in which the device itself reports a fault.
-        restarts: Times the device's own numbers began anew.
+        restarts: Number of restarts of the device's own numbering.
     """
 
     timeouts: int = 0
@@ -34,7 +34,7 @@ class Arrivals:
 
     Args:
         counters: Where silences are counted.
-        longest_silence_s: Longest time between samples that is no fault, s.
+        longest_silence_s: Longest time between samples that is not a fault, s.
     """
 
     def __init__(self, counters: DeviceCounters, longest_silence_s: float) -> None:

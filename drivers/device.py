@@ -50,7 +50,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """Who answers; a part that the device does not tell is empty."""
+    """Identity of the device; a part that it does not report is empty."""
 
     model: str
     serial: str
@@ -65,7 +65,7 @@ class Batch:
         columns: Values by channel name, each float64 of shape (n,), in the channel's unit.
         time_s: When each sample was taken (`device` clock) or had arrived (`host` clock), s,
             shape (n,). The zero is arbitrary.
-        clock: Whose clock `time_s` is.
+        clock: The clock of `time_s`.
         sequence: Number of each sample since `start`, int64, shape (n,); lost samples leave a gap
             where the device numbers its samples.
         flags: `SampleFlag` bits, uint8, shape (n,).
@@ -140,7 +140,7 @@ def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> Non
     """End a device's stream where it can still be reached, and let go of its link in any case.
 
     Args:
-        stop: Ends the stream; a link that is gone already is no error here.
+        stop: Ends the stream; a lost link is not an error here.
         let_go: Closes the link.
     """
     try:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drivers.counters import DeviceCounters
 
 Check = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
-"""Says of each row of candidates, shape (m, size), whether its checksum holds."""
+"""Returns for each row of candidates, shape (m, size), whether its checksum is right."""
 
 
 class SlidingFrames:

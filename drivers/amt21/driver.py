@@ -1,4 +1,4 @@
-"""The driver of an AMT21: it is asked for every sample, at a steady rate."""
+"""The driver of an AMT21: it is polled for every sample, at a steady rate."""
 
 import math
 from typing import Annotated
@@ -63,7 +63,7 @@ class Amt21:
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Ask for one position: the encoder says nothing else of itself.
+        """Request one position: the encoder has no other identification.
 
         Raises:
             LinkTimeoutError: Nobody answers at this address.

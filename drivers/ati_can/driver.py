@@ -1,4 +1,4 @@
-"""The driver of a NETCANOEM: it is asked for every sample, at a steady rate."""
+"""The driver of a NETCANOEM: it is polled for every sample, at a steady rate."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -86,7 +86,7 @@ class AtiCan:
 
         Raises:
             LinkTimeoutError: Nobody answers with this base identifier.
-            FrameError: What answers is no NETCANOEM, or its calibration is empty.
+            FrameError: The answer is not of a NETCANOEM, or its calibration is empty.
         """
         version = protocol.decode_firmware(self._ask(protocol.FIRMWARE)[0])
         serial = protocol.decode_serial(self._ask(protocol.SERIAL)[0])
@@ -137,7 +137,7 @@ class AtiCan:
         """Take the present load for zero: the mean of some readings, kept in this program.
 
         Raises:
-            DriverError: A gauge is saturated, or the sensor says that its readings are unusable.
+            DriverError: A gauge is saturated, or the sensor reports that its readings are unusable.
             LinkTimeoutError: The sensor does not answer.
         """
         taken = []
@@ -239,7 +239,7 @@ class AtiCan:
                 continue  # of another device
             if frame.can_id == first:
                 if answer:
-                    self._counters.late += 1  # that was another request's: begin anew
+                    self._counters.late += 1  # that was another request's: start again
                 answer = [frame.data]
             elif answer and frame.can_id == first + len(answer):
                 answer.append(frame.data)

@@ -69,7 +69,7 @@ class AtiNet:
 
     @property
     def counts_per_unit(self) -> dict[str, float]:
-        """Counts a newton and a newton metre, as the device says; empty before it was asked."""
+        """Counts per newton and newton metre, from the device; empty before they are read."""
         if self._calibration is None:
             return {}
         slopes = self._calibration.slopes()
@@ -81,11 +81,11 @@ class AtiNet:
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Ask for the calibration: units and counts per unit. Neither serial nor firmware is told.
+        """Read the calibration: units and counts per unit. Serial and firmware are not available.
 
         Raises:
             LinkTimeoutError: Nobody answers.
-            FrameError: The answer is no calibration.
+            FrameError: The answer is not a calibration.
         """
         link = self._open_calibration()
         try:
@@ -195,7 +195,7 @@ def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 100
         rate_hz: The RDT rate set on its web page, 1 to 7000.
 
     Raises:
-        LinkError: The URL is no UDP address, or the host is out of reach.
+        LinkError: The URL is not a UDP address, or the host is out of reach.
     """
     host, _ = split_address(url)
     calibration = f"socket://{host}:{protocol.CALIBRATION_PORT}"

@@ -7,7 +7,7 @@ from drivers.counters import DeviceCounters
 
 _WRAP = 2**32
 RESTART_STEP = 1000
-"""A number this far behind the newest is a device that began anew, not a late packet."""
+"""A number this far behind the newest is from a restarted device, not from a late packet."""
 
 
 class RecordSequence:
@@ -31,7 +31,7 @@ class RecordSequence:
         self.lost = 0
 
     def follow(self, numbers: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Say which records are new and in order, and number those from 0 since `restart`.
+        """Return which records are new and in order, with their numbers from 0 since `restart`.
 
         Args:
             numbers: `rdt_sequence` of the records as they came, shape (n,).

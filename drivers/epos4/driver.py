@@ -39,7 +39,7 @@ STATE_TIMEOUT_S = 0.8
 _INSTANT_S = 1e-9
 DRIVE_HEARTBEAT_MS = 100
 SILENT_S = 3.5 * DRIVE_HEARTBEAT_MS / 1000
-"""Longest silence of the drive that is no fault."""
+"""Longest silence of the drive that is not a fault."""
 HOST_NODE = 127
 """Node number under which the host sends its heartbeat."""
 
@@ -143,7 +143,7 @@ class Epos4:
         vendor = read(0x1018, 1)
         if vendor != protocol.VENDOR_ID:
             raise ProtocolMismatchError(
-                f"Node {self._node_id} on {self._bus.url} is no maxon drive.",
+                f"Node {self._node_id} on {self._bus.url} is not a maxon drive.",
                 f"Its vendor number is {vendor:#x}, maxon's is {protocol.VENDOR_ID:#x}.",
                 "Check the node number.",
             )
@@ -366,7 +366,7 @@ class Epos4:
             )
 
     def _switch_off(self, communication: int, cob_base: int) -> None:
-        """Make sure that a PDO which is not used says nothing."""
+        """Disable a PDO that is not used."""
         self._link.write(communication, 1, (cob_base + self._node_id) | protocol.PDO_INVALID)
 
     def _command_network(self, command: int) -> None:
@@ -388,7 +388,7 @@ class Epos4:
         self._wait(f"the state {wanted.value!r}", reached)
 
     def _state(self) -> State:
-        """Return the state, asked for: before the first SYNC no process data tell it."""
+        """Return the state by request: before the first SYNC no process data contain it."""
         return protocol.state_of(self._link.read(0x6041))
 
     def _wait(self, what: str, reached: Callable[[], bool]) -> None:
@@ -556,7 +556,7 @@ def open_epos4(
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
 
     Raises:
-        LinkError: The bus cannot be opened, an option is no drive's, or `canopen` is missing.
+        LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.
     """
     bus = open_can(url)
     try:

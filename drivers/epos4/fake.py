@@ -97,7 +97,7 @@ class Epos4Fake:
         self._node.add_write_callback(self._written)  # type: ignore[no-untyped-call]
         self._node.add_read_callback(self._asked)  # type: ignore[no-untyped-call]
         self._network.subscribe(0x80, lambda *_: self._synchronise())
-        self._node.nmt.state = "INITIALISING"  # says that it has booted
+        self._node.nmt.state = "INITIALISING"  # reports that it has booted
         self._node.nmt.state = "PRE-OPERATIONAL"
 
     # drivers.transport.simulated_can.CanNode

@@ -2,8 +2,8 @@
 
 The bench behind it is physics; this file is the board's logic, block by block instead of tick by
 tick: between two commands everything but a limit is known ahead, so one call of the bench and one
-bulk encode do for as many ticks. `firmware/core/board.hpp` is the twin that runs tick by tick; a
-test holds the two against each other byte for byte.
+bulk encode do for as many ticks. `firmware/core/board.hpp` is the implementation that runs tick by
+tick; a test compares the two byte for byte.
 
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
@@ -152,7 +152,7 @@ class TeensyFake:
         return is_in_force(self._state)
 
     def set_clock(self, tick_us: int) -> None:
-        """Say what the board's clock will show at the next tick, where ticks are not regular."""
+        """Set the board's clock of the next tick, where ticks are not regular."""
         self._next_tick_us = tick_us % 2**32
 
     def skip(self, ticks: int) -> None:
@@ -351,7 +351,7 @@ class TeensyFake:
 
 
 def _reason_of_refusal(payload: bytes) -> Result:
-    """Say why `protocol.decode` refused a frame with a header."""
+    """Return why `protocol.decode` refused a frame with a header."""
     if payload[0] != protocol.VERSION:
         return Result.WRONG_VERSION
     if payload[1] not in [kind.value for kind in Kind if kind >= Kind.HELLO]:

@@ -56,7 +56,7 @@ class FirmwareBoard:
         profile: What the board samples and moves.
 
     Raises:
-        FirmwareMissingError: There is no library.
+        FirmwareMissingError: The library is missing.
     """
 
     def __init__(
