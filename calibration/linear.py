@@ -31,7 +31,7 @@ class LinearCalibration:
         slope: SI units a count; negative where the raw count falls on closing.
         zero_counts: Counts at zero, from the certificate or the mounting.
         source: Where slope and zero come from.
-        tared: Whether the zero is measured anew before each run.
+        tared: Whether the zero is measured again before each run.
     """
 
     channel: str

@@ -65,7 +65,7 @@ def check_levels(values: FloatArray, least: int, name: str) -> None:
 
 
 def check_change(values: FloatArray, least: float, name: str) -> None:
-    """Refuse values that hardly change."""
+    """Refuse values with too little change."""
     span = float(np.ptp(values))
     if not span >= least:
         raise BadDataError(

@@ -115,7 +115,7 @@ class CalibrationRecord:
             0 where the board was not built from any.
         raw: Files it was made from.
         code_version: Version of the code that fitted it.
-        tared: Whether the zero is measured anew before each run.
+        tared: Whether the zero is measured again before each run.
         figure_svg: Residual figure as SVG text; empty if there is none.
         notes: Operator's notes.
     """
@@ -144,7 +144,7 @@ class CalibrationRecord:
         if not self.operator.strip():
             raise CalibrationError("A calibration needs the name of who made it.")
         if _time(self.made_at).tzinfo is None:
-            raise CalibrationError(f"{self.made_at!r} does not say its offset from UTC.")
+            raise CalibrationError(f"{self.made_at!r} lacks its offset from UTC.")
 
     @property
     def key(self) -> tuple[str, str, str]:

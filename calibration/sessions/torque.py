@@ -26,7 +26,7 @@ class TorqueSession:
         sensor: `proximal` or `distal`.
         arm_m: From the axis to where the weights hang, the arm level.
         masses_kg: Weights, rising.
-        repeats: How often to go up and down; four tell a bend from weights hung badly.
+        repeats: Number of passes up and down; four separate non-linearity from misplaced weights.
         shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
         counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
         temperature_k: Temperature of the sensor; None if it was not measured.
@@ -49,7 +49,7 @@ class TorqueSession:
         if self.sensor not in SENSORS:
             raise BadDataError(
                 "points",
-                f"There is no torque sensor {self.sensor!r}.",
+                f"Unknown torque sensor {self.sensor!r}.",
                 f"Known: {', '.join(SENSORS)}.",
             )
         rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
@@ -134,8 +134,8 @@ class TorqueSession:
         if not checked.passes:
             raise BadDataError(
                 "shunt",
-                f"The shunt changes the reading by {checked.change_counts:.0f} counts, the "
-                f"certificate says {checked.certificate_counts:.0f}.",
+                f"The shunt changes the reading by {checked.change_counts:.0f} counts, "
+                f"by the certificate {checked.certificate_counts:.0f}.",
                 f"That is {checked.deviation:+.2%}; {checked.tolerance:.0%} passes.",
                 "Check wiring, excitation and the amplifier's gain before hanging weights.",
             )
