@@ -1,12 +1,13 @@
 """The logger of a rig that has none: its logic in this computer, behind it a drive on CANopen.
 
-The drive knows torque and position; guards, position loop, queue of setpoints and watchdog are the
-logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to a
-logger like any other. What a board does better: a pause of this computer is a pause of the position
-loop; the drive then keeps its last torque until its own watch on this computer's heartbeat ends it.
+The drive handles torque and position; guards, position loop, queue of setpoints and watchdog are
+the logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to
+a logger like any other. What a board does better: a pause of this computer is a pause of the
+position loop; the drive then keeps its last torque until its own watch on this computer's heartbeat
+ends it.
 
-In virtual time a tick is run whenever somebody reads. In real time the ticks have a process of
-their own (`rig.canopen_process`), so that they wait for nobody.
+In virtual time a tick runs at every read. In real time the ticks run in a separate
+process (`rig.canopen_process`), so that nothing delays them.
 """
 
 import numpy as np
@@ -42,8 +43,8 @@ MOST_MISSED = 3
 class Epos4Bench:
     """The drive as `drivers.teensy.fake.Bench`: inputs from it, torque to it.
 
-    The spindle is the motor's encoder; current is told by torque, 1 mA a count; what the drive does
-    not measure is 0.
+    The spindle is the motor's encoder; current is computed from torque, 1 mA per count; quantities
+    that the drive does not measure are 0.
 
     Args:
         device: The drive, started.

@@ -74,7 +74,7 @@ class LoggerSection(_Section):
 
 
 class DeviceSection(_Section):
-    """A further device whose channels are recorded beside the logger's.
+    """A further device whose channels are recorded with the logger's.
 
     Attributes:
         driver: Name of its driver; `rig devices` lists them.
@@ -233,8 +233,8 @@ class SimulationSection(_Section):
     Attributes:
         seed: Seed of noise, offsets and drift.
         spread: Relative spread of the plant's parameters drawn by the seed.
-        hidden: Hidden effect to strength; effects that no declared model is told of.
-        draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
+        hidden: Hidden effect to strength; effects that no declared model contains.
+        draw_hidden: Seed that draws one more hidden effect without showing its name.
         firmware: Put the compiled firmware core in the loop where it is built.
         plant: `measured`, with losses that no declared model holds, or `declared`, without them.
         grasper: Prototype of the simulated grasper, where the profile is the grasper's.
@@ -257,7 +257,7 @@ class Config(_Section):
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.
         devices: Further devices by the name their recorded channels go under.
-        serials: Serial numbers of the devices on the rig, held against those of the records.
+        serials: Serial numbers of the devices on the rig, compared with those of the records.
     """
 
     name: str
@@ -342,7 +342,7 @@ class Config(_Section):
         return {name: limit for name, limit in self.drift if limit is not None}
 
     def calibration_verdicts(self) -> list[Verdict]:
-        """Return what speaks against the store's active lines now; empty without a store."""
+        """Return the objections to the store's active lines now; empty without a store."""
         if self.store is None:
             return []
         lines = active_lines(self.store, self.instrument.serial).values()
@@ -357,7 +357,7 @@ class Config(_Section):
         return Config.model_validate(whole)
 
     def logged(self) -> dict[str, Any]:
-        """Return what a log holds of it: all but what is hidden, which a diagnosis is to find."""
+        """Return the part for a log: all but the hidden effects, which a diagnosis must find."""
         whole = self.model_dump()
         for secret in ("hidden", "draw_hidden"):
             del whole["simulation"][secret]
@@ -365,7 +365,7 @@ class Config(_Section):
 
 
 def is_simulated(url: str) -> bool:
-    """Say whether a URL names a fake."""
+    """Whether a URL names a fake."""
     return url.startswith("sim:")
 
 

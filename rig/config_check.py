@@ -34,7 +34,7 @@ class Problem:
 
 
 def problems(config: Config) -> list[Problem]:
-    """Return what is wrong with a configuration beyond its keys and ranges; empty when sound."""
+    """Return the problems of a configuration beyond its keys and ranges; empty when sound."""
     known = drivers()
     sections: dict[str, LoggerSection | DeviceSection] = {LOGGER: config.logger, **config.devices}
     found = [
@@ -154,7 +154,7 @@ def _place(
 
 
 def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
-    """Return what keeps two devices from sharing a bus."""
+    """Return the conflicts of two devices on one bus."""
     found = []
     shared = sorted(one.identifiers & other.identifiers)
     if shared:

@@ -1,8 +1,8 @@
-"""Holding a grip torque by the estimate from motor current alone; the sensor only looks on.
+"""Control of a grip torque by the estimate from motor current alone; the sensor is a check.
 
-The load motor plays what is gripped. The jaw moves to and fro a little: at rest friction hides as
-much torque as a grip may have, and in motion the estimate knows it. Once a period the load is moved
-by a share of what the estimate lacks.
+The load motor represents the gripped object. The jaw moves to and fro a little: at standstill
+friction hides as much torque as a grip may have, and in motion the estimate includes it. Once per
+period the load is corrected by a fraction of the control error.
 """
 
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class Held:
 
 
 class Grip:
-    """The controller: says what to play next, and hears what was read.
+    """The controller: returns the next setpoints and takes the readings.
 
     Args:
         torque_n_m: What to hold.

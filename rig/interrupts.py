@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM while a rig is connected: the first asks to leave, no other stops that."""
+"""Ctrl-C and SIGTERM while a rig is connected: only the first requests the end."""
 
 import signal
 import sys

@@ -309,7 +309,7 @@ def load_protocol(name_or_path: str) -> Protocol:
     """Read a protocol file, or a shipped protocol by its name.
 
     Raises:
-        UsageError: There is no such file, or it is not a protocol; names the key that is wrong.
+        UsageError: The file is missing or not a protocol; the message names the wrong key.
     """
     path = Path(name_or_path)
     if not path.exists() and path.suffix == "":

@@ -73,7 +73,7 @@ class RunResult:
 
     @property
     def remark(self) -> str:
-        """What a person should know about the run; empty when it is as planned."""
+        """Message about the run; empty when it went as planned."""
         remarks = []
         if not self.complete:
             remarks.append(f"{self.samples} of {self.expected} samples, {self.lost} lost")
@@ -334,7 +334,7 @@ def _log_path(folder: Path, plan: MachinePlan) -> Path:
 
 
 def _is_recorded(path: Path) -> bool:
-    """Say whether a run went to its end; one that was aborted is made again."""
+    """Whether a run was completed; an aborted run is repeated."""
     if not path.exists():
         return False
     end = read_log(path, topics=(), tolerant=True, checksums=False).end

@@ -158,7 +158,7 @@ class Session:
             yield self._read()
 
     def play(self, *setpoints: NDArray[np.float64]) -> Iterator[Reading]:
-        """Arm the rig and play a trajectory; each sample says which setpoint it played.
+        """Arm the rig and play a trajectory; each sample has the number of its setpoint.
 
         Args:
             setpoints: What is asked for at the board's rate, closing-positive, each of shape (n,):
@@ -184,10 +184,10 @@ class Session:
     def follow(
         self, setpoints: Iterator[tuple[NDArray[np.float64], ...]], lead_s: float = LEAD_S
     ) -> Iterator[Reading]:
-        """Arm the rig and play setpoints that are decided while it goes, until there are no more.
+        """Arm the rig and play setpoints that are computed during the run, until there are no more.
 
-        A piece is asked for `lead_s` before it is played, so what a reading tells can change what
-        comes so much later.
+        A piece is requested `lead_s` before it is played, so a reading can change setpoints from
+        then on.
 
         Args:
             setpoints: Pieces of what `play` takes, each of shape (n,), n from 1 to the profile's

@@ -110,7 +110,7 @@ def _numbers(report: TripReport, calibrations: CalibrationSet, machine: Machine)
 
 
 def tripped(reading: Reading) -> tuple[Trip, bool] | None:
-    """Return what the board tripped over and whether it holds, None where it did not."""
+    """Return the crossed limit and whether the board holds, None without a trip."""
     newest = int(reading.counts["status"][-1])
     if not newest & (STATUS_LIMIT_TRIPPED | STATUS_WATCHDOG_TRIPPED):
         return None

@@ -1,4 +1,4 @@
-"""The residual watch of a recording session: every finished run is held against fitted models."""
+"""The residual monitor of a session: every finished run is compared with fitted models."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

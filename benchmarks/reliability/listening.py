@@ -61,7 +61,7 @@ def measure() -> dict[str, list[str]]:
 
 
 def is_loopback(address: str) -> bool:
-    """Say whether an address of /proc is 127.0.0.1 or ::1."""
+    """Whether an address of /proc is 127.0.0.1 or ::1."""
     host = address.split(":")[0]
     return host in ("0100007F", "00000000000000000000000001000000")
 

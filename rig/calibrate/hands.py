@@ -99,7 +99,7 @@ class LoadedRdt(RdtFake):
 GRAVITY_M_S2 = 9.80665
 TOOL_KG = 0.215
 TOOL_CENTRE_M = np.array([0.004, -0.002, 0.031])
-"""Mass and centre of mass of the simulated tool, which a session does not know."""
+"""Mass and centre of mass of the simulated tool, which are unknown to a session."""
 
 
 class SimulatedHands:

@@ -217,7 +217,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     store: StoreOption = None,
     ledger: Annotated[
-        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+        Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

@@ -115,7 +115,7 @@ def torque(
 def current(
     loads_a: Annotated[str, typer.Option(help="Loads to move against, A.")] = "0.1,0.3,0.5,0.7,0.9",
     speeds_rad_s: Annotated[str, typer.Option(help="Speeds of the spindle.")] = "0.5,1.0",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
     motor_constant: Annotated[
         float | None, typer.Option(help="Data sheet's torque constant, N m/A; gives an efficiency.")
     ] = None,
@@ -136,7 +136,7 @@ def current(
 @session
 def gearbox(
     loads_a: Annotated[str, typer.Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
     ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
     stiffness_only: Annotated[
         bool, typer.Option("--stiffness-only", help="Model no backlash.")
@@ -154,10 +154,12 @@ def gearbox(
 @session
 def encoder(
     which: Annotated[str, typer.Option(help="spindle or jaw.")] = "spindle",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 2,
-    line_only: Annotated[bool, typer.Option("--line-only", help="Model no wave.")] = False,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 2,
+    line_only: Annotated[
+        bool, typer.Option("--line-only", help="Model no periodic error.")
+    ] = False,
 ) -> "Procedure":
-    """Encoder: zero at its mark, and against the next one ratio, offset and wave."""
+    """Encoder: zero at its mark, and against the next one ratio, offset and periodic error."""
     from calibration.sessions.encoder import EncoderSession
 
     return EncoderSession(encoder=which, repeats=repeats, line_only=line_only)
@@ -296,7 +298,7 @@ class Asking:
 
         if not stdin.isatty():
             raise UsageError(
-                "A guided calibration asks, and this is no terminal.",
+                "A guided calibration asks questions, and stdin is not a terminal.",
                 fix="Run it in a terminal, or on the simulated rig with --yes.",
             )
         self._hands = hands
@@ -328,9 +330,9 @@ class Unasked:
 
         if step.instruction:
             raise UsageError(
-                f"The step {step.name} needs hands: {step.instruction}",
-                "With --yes nobody is asked, and a real rig has no hands.",
-                "Leave --yes away.",
+                f"The step {step.name} needs a person: {step.instruction}",
+                "With --yes no questions are asked, and a real rig cannot carry out the step.",
+                "Run it without --yes.",
             )
 
 

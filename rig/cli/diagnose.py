@@ -14,7 +14,7 @@ def diagnose(
         Path | None,
         typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name."),
     ] = None,
-    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: Annotated[
         Path | None, typer.Option("--json", help="Where the diagnosis goes; - is stdout.")
     ] = None,
@@ -27,7 +27,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A first answer in seconds, without simulated twins.")
+        bool, typer.Option("--quick", help="A first answer in seconds, without simulated nulls.")
     ] = False,
     scheduler: Annotated[
         str | None,
@@ -37,13 +37,13 @@ def diagnose(
         Path | None, typer.Option(help="Where the next experiment goes, as a protocol file.")
     ] = None,
     ledger: Annotated[
-        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+        Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
     ] = None,
 ) -> None:
-    """Find the effect that the declared model lacks, and prove it on runs that nobody touched."""
+    """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
     import json
 
     from estimation import model_file

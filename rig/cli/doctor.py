@@ -13,7 +13,7 @@ ConfigOption = Annotated[
 
 
 def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
-    """Look for what is wrong with the rig, and say what to type.
+    """Check the rig for faults and suggest the next command.
 
     Exit code 1 when something must be put right, 0 when there are at most warnings.
     """

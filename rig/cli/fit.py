@@ -177,13 +177,13 @@ def _dated(model: "Model") -> "Model":
     from dataclasses import replace
     from datetime import UTC, datetime
 
-    assert model.evidence is not None  # noqa: S101  a fit leaves its evidence
+    assert model.evidence is not None  # noqa: S101  a fit sets its evidence
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return replace(model, evidence=replace(model.evidence, made_at=now))
 
 
 def _told(model: "Model", error: "HeldOutError", out: Path | None) -> dict[str, Any]:
-    """Return what a machine is told of a fit."""
+    """Return the JSON result of a fit."""
     parameters = [
         {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}
         | {"estimate": term.values[p.name]}

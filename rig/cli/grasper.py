@@ -91,8 +91,8 @@ def follow(
 ) -> None:
     """Send the three motors where the master goes, within the limits of the configuration.
 
-    The grasper moves. It starts where it stands, however the master is held. Ctrl-C leaves, with
-    the motors out of force.
+    The grasper moves. It starts at its present position, for any position of the master. Ctrl-C
+    quits and disarms the motors.
     """
     from rig.config import load_config
     from rig.config_check import refuse_problems

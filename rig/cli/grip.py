@@ -22,7 +22,7 @@ def grip(
     ] = None,
     json: JsonFlag = False,
 ) -> int:
-    """Hold a grip torque by the estimate from motor current alone; the sensor looks on.
+    """Control a grip torque by the estimate from motor current alone; the sensor is for comparison.
 
     The rig moves: the jaw goes to and fro a little against its load motor. Exit code 1 when the
     sensor, which nothing is controlled by, is further from the torque than the estimate's interval,

@@ -40,9 +40,9 @@ def live(
 ) -> int:
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
-    A simulated rig plays a first look unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
-    terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
+    A simulated rig plays a default protocol; a real rig is never moved without
+    --protocol. Ctrl-C quits, with the rig in its safe state. With --json, one object per line. In a
+    terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q quits.
     """
     from rig.config import load_config
     from rig.config_check import refuse_problems
@@ -93,7 +93,7 @@ def live(
             plain=plain,
             json=json_,
             half_widths=half_widths_of(estimators),
-            footer=HELP if keys else "Ctrl-C leaves",
+            footer=HELP if keys else "Ctrl-C quits",
         )
         show(until(blocks, duration), options, results(json_))
     return 0

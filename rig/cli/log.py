@@ -26,7 +26,7 @@ OneLog = Annotated[Path, typer.Argument(help="A log.")]
 
 @log_app.command()
 def info(path: LogOrFolder, json: JsonFlag = False) -> None:
-    """Say what is in a log: run, conditions, streams, rates, marks, attachments."""
+    """Show the content of a log: run, conditions, streams, rates, marks, attachments."""
     from rig.log.reader import read_log
 
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
@@ -79,7 +79,7 @@ def export(
     format_name: Annotated[str, typer.Option("--format", help="csv, parquet or npz.")] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File with --topic, else folder; beside the log by default.")
+        Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[
@@ -119,7 +119,7 @@ def _other_calibrations(
 ) -> "CalibrationSet | None":
     """Return the set an export is to be made with; None for the one it was recorded with.
 
-    A record whose range the log leaves is held to the rules: a remark, or an error.
+    If the log exceeds the range of a record, the rules apply: a remark, or an error.
     """
     if calibration is None and not records:
         return None
@@ -160,7 +160,7 @@ def _logs(path: Path) -> list[Path]:
 
 
 def _described(log: "LogFile") -> dict[str, Any]:
-    """Return what `info` tells about a log."""
+    """Return the result of `info` for a log."""
     from rig.log.check import stream_time_s
     from rig.log.convert import exclusion
 

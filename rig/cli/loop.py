@@ -17,16 +17,18 @@ def loop(
         list[str] | None,
         typer.Option(help="Hidden effect, or effect=strength; by seed if none; `none` for none."),
     ] = None,
-    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     protocol: Annotated[
         str | None, typer.Option("--protocol", "-p", help="First protocol; diagnosis if none.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for everything.")] = None,
     rounds: Annotated[int, typer.Option(help="Campaigns at most.")] = 3,
     minutes: Annotated[float, typer.Option(help="No round begins later than this.")] = 20.0,
-    seed: Annotated[int | None, typer.Option(help="Seed; by the clock if none.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Without simulated twins.")] = False,
-    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option(help="Random seed; taken from the clock by default.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Without simulated nulls.")] = False,
+    workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler to work on.")
     ] = None,
@@ -89,7 +91,7 @@ def loop(
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
             bar.start()
     told = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
-    screen.print(f"What was hidden: {told or 'nothing'}.", markup=False)
+    screen.print(f"Hidden effects: {told or 'none'}.", markup=False)
     if json:
         last = made[-1]
         emit_json(

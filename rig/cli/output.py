@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig.reports.table import TextTable
 
 PIPE_WIDTH = 240
-"""Columns of a table where nobody's window limits it."""
+"""Columns of a table without a window to limit it."""
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
@@ -48,7 +48,7 @@ def remarks() -> "Console":
 
 
 def progress() -> "Progress":
-    """Return a progress bar on stderr, silent where that is no terminal.
+    """Return a progress bar on stderr, silent where that is not a terminal.
 
     What is said while it runs goes through its `console`, which prints above it.
     """

@@ -1,4 +1,4 @@
-"""`rig record`: run a protocol and leave one log a run."""
+"""`rig record`: run a protocol and write one log per run."""
 
 from datetime import datetime
 from pathlib import Path
@@ -28,7 +28,7 @@ def record(
     notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
-    """Run a protocol on the rig and leave one log a run in logs/.
+    """Run a protocol on the rig and write one log per run to logs/.
 
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """

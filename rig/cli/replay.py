@@ -35,8 +35,8 @@ def replay(
 ) -> int:
     """Show a recording as it looked live, with the estimate of any model.
 
-    Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object a line: a
-    frame every 0.1 s, a summary last. Ctrl-C leaves with exit code 130.
+    Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
+    a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.
     """
     from rig.errors import ExitCode, UsageError
     from rig.importers.registry import open_campaign
@@ -75,7 +75,7 @@ def replay(
 
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
-    """Return the named run, or the first that counts, and tell the person which one it is."""
+    """Return the named run, or the first valid one, and print its name."""
     from rig.errors import DataError, UsageError
 
     if not len(campaign):
@@ -94,7 +94,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 
 def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
-    """Say which run is shown, if there are more, and what speaks against it."""
+    """Print which run is shown, if there are more, and the objections to it."""
     people = remarks()
     if len(campaign) > 1 and not chosen:
         place = campaign.names.index(recording.name) + 1

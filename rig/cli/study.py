@@ -55,7 +55,8 @@ def oneill(
         Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
+        float | None,
+        typer.Option(help="Start no network after this time, min; tables list the rest."),
     ] = None,
     every: Annotated[int, typer.Option(min=1, help="Train on every n-th closing sample.")] = 8,
     workers: Annotated[int, typer.Option(min=1, help="Networks trained at once.")] = 1,

@@ -122,7 +122,7 @@ def excitation(
     out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Design an arm's excitation within its limits at every instant, beside the thesis' search."""
+    """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
     from rig.reports.table import to_markdown
     from rig.studies.excitation import run_excitation, table, write_trajectory
 

@@ -16,7 +16,7 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
 
     Args:
         config: What should be there.
-        root: Root of the file system, for what the operating system tells.
+        root: Root of the file system, for the files of the operating system.
     """
     wrong = problems(config)
     for problem in wrong:

@@ -1,4 +1,4 @@
-"""A device's stream held against what it promises: rate, loss, saturation, stuck channels."""
+"""Checks of a device's stream: rate, loss, saturation, stuck channels."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ STANDING_STILL_UNITS = ("rad", "1")
 
 
 def device_findings(name: str, open_it: Callable[[], Device]) -> list[Finding]:
-    """Open a device, watch its stream for a second, and say what is wrong with it.
+    """Open a device, read its stream for a second, and report its faults.
 
     Args:
         name: Name of the device in the configuration.

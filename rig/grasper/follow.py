@@ -14,7 +14,7 @@ from rig.machines.grasper import axes_of_joints
 
 READ_S = 0.02
 LEAD_S = 0.05
-"""Setpoints are this far ahead of the motors, s: what a hand feels as delay."""
+"""Setpoints are this far ahead of the motors, s: the delay for the user's hand."""
 SILENT_READS = 50
 
 

@@ -76,14 +76,14 @@ def follow_master(
         What yaw, jaw 1 and jaw 2 did, and the log.
 
     Raises:
-        UsageError: The configuration is of another kind of rig, or nobody said where the master is.
+        UsageError: The configuration is of another kind of rig, or the master's URL is missing.
         GrasperError: A potentiometer is at its rail.
         SafetyTripError: A limit was crossed.
         DriverError: A link is lost.
     """
     if config.logger.profile != "grasper":
         raise UsageError(
-            f"{config.name} is no grasper.",
+            f"{config.name} is not a grasper.",
             "Only the 3-DOF grasper has a master.",
             'Name a configuration with [logger] profile = "grasper".',
         )

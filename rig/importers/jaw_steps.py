@@ -20,7 +20,7 @@ ALIKE = (
     "wrist_roll_rad",
     "wrist_pitch_rad",
 )
-"""Runs that agree in these conditions should leave the jaw at the same mean angle."""
+"""Runs that agree in these conditions should have the same mean angle of the jaw."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,8 @@ class Identity:
 
     Attributes:
         instrument: Identity of the instrument.
-        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where they are stated.
-        remarks: What a reader should know about how the identity was found, one sentence each.
+        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where available.
+        remarks: How the identity was found, one sentence each.
     """
 
     instrument: Instrument

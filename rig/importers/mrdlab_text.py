@@ -22,7 +22,7 @@ COLUMNS = (
     ("Back-end Maxon", "maxon", 1e9),
     ("Trajectory Target", "target", 1e9),
 )
-"""Name of each column, the word that tells it apart in a header, and its largest credible value."""
+"""Name of each column, the word that identifies it in a header, its largest credible value."""
 TIME, SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, LOAD, COMMAND, MOTOR, TARGET = range(10)
 
 MAX_BYTES = 1 << 30
@@ -46,7 +46,7 @@ class Text:
 
 
 def looks_like_log(first_bytes: bytes) -> bool:
-    """Say whether the first bytes of a file are those of an MRDLab log."""
+    """Whether the first bytes of a file are those of an MRDLab log."""
     return first_bytes[:1] == b"%" and b"Back-end" in first_bytes
 
 

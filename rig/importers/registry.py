@@ -1,7 +1,7 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
-An importer is an object in the entry point group `rig.importers`. It says whether a path looks like
-its format without reading the samples, and opens it as a campaign of run handles.
+An importer is an object in the entry point group `rig.importers`. It checks whether a path looks
+like its format without reading the samples, and opens it as a campaign of run handles.
 """
 
 from importlib.metadata import EntryPoint, entry_points
@@ -23,7 +23,7 @@ class Importer(Protocol):
     """One line on the format."""
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path looks like this format, from names and first lines only."""
+        """Whether the path looks like this format, from names and first lines only."""
 
     def open(self, path: Path) -> Campaign:
         """Open a file, folder or archive as a campaign whose runs load when asked.
@@ -38,7 +38,7 @@ def importers() -> dict[str, Importer]:
     """Return every installed importer by name; a third party adds one by entry point.
 
     Raises:
-        UsageError: An entry point does not load, or is no importer; none is skipped silently.
+        UsageError: An entry point does not load, or is not an importer; none is skipped silently.
     """
     return {entry.name: _loaded(entry) for entry in sorted(entry_points(group="rig.importers"))}
 
@@ -55,7 +55,7 @@ def _loaded(entry: EntryPoint) -> Importer:
         ) from error
     if not isinstance(importer, Importer):
         raise UsageError(
-            f"{entry.value} of {package} is no importer.",
+            f"{entry.value} of {package} is not an importer.",
             "Expected an object with name, description, recognises() and open().",
             f"Install {package} again, or remove it.",
         )

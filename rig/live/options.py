@@ -27,7 +27,7 @@ class ShowOptions:
     plain: bool = False
     json: bool = False
     half_widths: Mapping[str, float] = field(default_factory=dict)
-    footer: str = "Ctrl-C leaves"
+    footer: str = "Ctrl-C quits"
 
     def __post_init__(self) -> None:
         """Check the lever arm.

@@ -49,7 +49,7 @@ class LiveRecorder:
 
     @property
     def said(self) -> str:
-        """What a person should know of it; empty before the first recording."""
+        """Message for the user; empty before the first recording."""
         if self._path is None:
             return ""
         words = f"{self._path.name}, {self._samples} samples, {self._marks} marks"

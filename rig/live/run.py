@@ -1,4 +1,4 @@
-"""Show a stream of blocks until it ends or a person leaves."""
+"""Show a stream of blocks until it ends or the user quits."""
 
 import math
 import time

@@ -59,7 +59,7 @@ def session_blocks(
 
 
 class _Hand:
-    """What keys do to a session: tare, mark, record, leave."""
+    """Actions of the keys in a session: tare, mark, record, quit."""
 
     def __init__(self, session: Session, keys: Keys, folder: Path) -> None:
         self._session = session
@@ -84,7 +84,7 @@ class _Hand:
         self._recorder.write(reading)
 
     def status(self) -> tuple[DeviceStatus, ...]:
-        """Return what a person should see of it."""
+        """Return the message for the user."""
         said = ", ".join(part for part in (self._recorder.said, self._said) if part)
         if not said:
             return ()

@@ -1,4 +1,4 @@
-"""What the display knows: accumulates blocks, and gives one picture of them when asked.
+"""State of the display: accumulates blocks, and returns one picture of them on request.
 
 No input or output and no clock but the device's, so every number here is tested without a terminal.
 """
@@ -22,7 +22,7 @@ RATE_S = 2.0
 ERROR_S = 5.0
 TRACE_S = 10.0
 SILENT_BLOCKS = 2
-"""From so many blocks without samples in a row on, the last value is no longer that of now."""
+"""After this many consecutive blocks without samples, the last value is out of date."""
 
 FLAGS = tuple(flag for flag in Flag if flag)
 RECEIVED, ROWS, FIRST_FLAG = 0, 1, 2
@@ -178,7 +178,7 @@ class LiveState:
             self._inside_samples += int(np.isfinite(squared[inside]).sum())
 
     def _signals(self, block: SampleBlock) -> FloatArray:
-        """Return what the window keeps of a block, shape (signals, n), NaN where nothing is."""
+        """Return the values of a block for the window, shape (signals, n), NaN where missing."""
         nan = np.full(len(block), np.nan)
         valid = block.flags == 0
         received = (block.flags & Flag.MISSING) == 0
@@ -205,7 +205,7 @@ class LiveState:
         )
 
     def summary(self, ended: str) -> Summary:
-        """Return what everything since the start came to; `ended` says how it ended."""
+        """Return the summary since the start; `ended` is the reason of the end."""
         n, known = self._error_samples, self._inside_samples
         return Summary(
             ended=ended,

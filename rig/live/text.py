@@ -36,7 +36,7 @@ STATES = {
     "suspect": ("▲", "warning"),
     "fault": ("✖", "bad"),
 }
-"""State of a device to its symbol and style, so that no state is told by colour alone."""
+"""State of a device to its symbol and style, so that no state is shown by colour alone."""
 
 
 def in_shown_unit(unit: str) -> tuple[float, str, int]:
@@ -45,7 +45,7 @@ def in_shown_unit(unit: str) -> tuple[float, str, int]:
 
 
 def name_of(channel: str) -> str:
-    """Return what people call a channel."""
+    """Return the common name of a channel."""
     return NAMES.get(channel) or describe(channel).description.capitalize()
 
 
@@ -67,7 +67,7 @@ def with_unit(value: Value, unit: str) -> str:
 
 
 def main_value(reading: Reading) -> tuple[str, Value]:
-    """Return what the display shows first: the estimate, or the sensor when nothing estimates."""
+    """Return the main value of the display: the estimate, or the sensor without an estimate."""
     if reading.has_estimator:
         return "estimate", reading.estimate
     return "sensor", reading.sensor
@@ -133,7 +133,7 @@ def limit_words(limit: LimitStatus) -> str:
 
 
 def summary_lines(summary: Summary, unit: str) -> list[str]:
-    """Return what a whole stream came to, in lines."""
+    """Return the summary of a whole stream, in lines."""
     how = {"finished": "Finished", "interrupted": "Stopped"}.get(summary.ended, "Ended")
     lines = [
         f"{how} after {summary.duration_s:.1f} s: {summary.samples} samples, "

@@ -13,8 +13,8 @@ from rig.live.digits import big
 from rig.live.sparkline import round_scale, sparkline
 from rig.live.state import TRACE_S, Reading, Snapshot, Value
 
-# The palette of Okabe and Ito (2008), told apart by every kind of colour vision; each style is
-# also told apart by a word or a symbol.
+# The palette of Okabe and Ito (2008), distinguishable by every kind of colour vision; each
+# style also has a word or a symbol.
 STYLES = {
     "title": "bold",
     "quiet": "dim",
@@ -26,10 +26,10 @@ STYLES = {
 }
 
 WIDE = 64
-"""From this many columns on, the numbers stand beside the digits and not under them."""
+"""From this many columns on, the numbers are next to the digits and not below them."""
 
 LEAST_TRACES = 5
-"""Lines that limits leave to the traces."""
+"""Lines reserved for the traces."""
 
 MARGIN = 18
 """Columns left of a trace, for its name and the edges of its scale."""
@@ -50,7 +50,7 @@ class View:
     snapshot: Snapshot
     title: str
     lever_m: float
-    footer: str = "Ctrl-C leaves"
+    footer: str = "Ctrl-C quits"
     half_widths: Mapping[str, float] = field(default_factory=dict)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -199,7 +199,7 @@ def _limits(limits: Sequence[LimitStatus], width: int, room: int) -> Iterator[Te
 
 
 def _urgency(share: float | None) -> float:
-    """Return a rank: a limit whose share nobody knows comes first."""
+    """Return a rank: a limit with an unknown share comes first."""
     return np.inf if share is None else share
 
 

@@ -221,7 +221,7 @@ def stream_time_s(topic: Topic) -> NDArray[np.float64]:
 
 
 def not_finite(topic: Topic) -> NDArray[np.bool_]:
-    """Say which messages hold a value that is not finite, shape (n,)."""
+    """Return which messages hold a value that is not finite, shape (n,)."""
     bad = np.zeros(len(topic), bool)
     for field in topic.stream.fields:
         if field.dtype.startswith("float"):

@@ -1,8 +1,8 @@
 """Unpacking chunks into arrays.
 
 A chunk of one stream of fixed-size messages is, unpacked, an array of records, and is read as one.
-The message index behind a chunk says which chunks are such; that is checked against every record. A
-chunk in which other records stand between (another writer's), or a damaged one, is walked record by
+The message index behind a chunk identifies such chunks; that is checked against every record. A
+chunk in which other records stand between (another writer's), or a damaged one, is read record by
 record. Chunks are independent, so they are unpacked on several threads.
 """
 
@@ -290,7 +290,7 @@ def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDec
 def _walk(
     data: bytes, layouts: dict[int, Layout], wanted: set[int]
 ) -> tuple[list[tuple[int, _Target]], str | None]:
-    """Read a chunk record by record; stop, and say why, where that is not possible."""
+    """Read a chunk record by record; stop with the reason where that is not possible."""
     places: dict[int, list[int]] = defaultdict(list)
     position, problem = 0, None
     while position < len(data):

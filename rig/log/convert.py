@@ -42,7 +42,7 @@ def log_times_ns(time_s: FloatArray, started_at_ns: int | None) -> NDArray[np.ui
 
 
 def run_info(recording: Recording) -> RunInfo:
-    """Return what a recording knows about its run."""
+    """Return the metadata of a recording about its run."""
     return RunInfo(
         name=recording.name,
         rig=recording.rig,
@@ -111,7 +111,7 @@ def recording_from_log(log: LogFile) -> Recording:
     topic = log.topics[SAMPLE]
     if (topic.rows["flags"] > np.iinfo(np.uint8).max).any():
         raise DataError(
-            f"{log.path} holds flags this version does not know.",
+            f"{log.path} has flags that are unknown to this version.",
             "They must not be dropped: a flagged sample would pass for a valid one.",
             "Read the log with the version of rig that wrote it.",
         )

@@ -28,7 +28,7 @@ from rig.log.schema import CHECKSUM_KEY, LayoutError, Stream
 
 
 class DamagedLogError(DataError):
-    """The log is damaged; what is left of it can be repaired."""
+    """The log is damaged; the readable part can be recovered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def read_log(
             unpacked.
         tolerant: Read what is readable and list the damage, instead of raising.
         checksums: Check the file's overall checksum as well as each chunk's. That reads the whole
-            file; leave it out to look at metadata only.
+            file; omit it to read metadata only.
 
     Raises:
         DamagedLogError: The log is damaged, and `tolerant` is False.

@@ -42,7 +42,7 @@ class RepairReport:
 
 
 def repaired_path(path: Path) -> Path:
-    """Return where the repair of a log goes: `NAME.repaired.mcap` beside it."""
+    """Return the path of the repaired log: `NAME.repaired.mcap` in the same folder."""
     name = path.name.removesuffix(PART_SUFFIX).removesuffix(".mcap")
     return path.with_name(f"{name}.repaired.mcap")
 
@@ -70,8 +70,8 @@ def repair_log(path: Path, out: Path | None = None) -> RepairReport:
         return result
     if not log.topics or (log.unread and not written_by_rig(log)):
         raise RepairError(
-            f"{path} holds nothing that can be repaired.",
-            f"Its topics are: {', '.join(log.unread) or 'none'}; a repair knows messages of fixed"
+            f"{path} contains nothing that can be repaired.",
+            f"Its topics are: {', '.join(log.unread) or 'none'}; repair supports messages of fixed"
             f" size as {LIBRARY} writes them.",
         )
     target = out or repaired_path(path)

@@ -114,7 +114,7 @@ def _checksum(metadata: Mapping[str, str]) -> str:
 
 
 def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
-    """Return the record that `to_metadata` wrote; fields it does not know are ignored.
+    """Return the record that `to_metadata` wrote; unknown fields are ignored.
 
     Raises:
         DataError: The record does not match its checksum, or a value is of the wrong kind.

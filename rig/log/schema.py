@@ -92,7 +92,7 @@ class Stream:
     def __post_init__(self) -> None:
         if not _TYPE.fullmatch(self.message_type):
             raise LayoutError(
-                f"{self.message_type!r} is no ROS 2 message type.",
+                f"{self.message_type!r} is not a ROS 2 message type.",
                 fix="Name it like `rig_msgs/msg/Sample`.",
             )
         names = [field.name for field in self.fields]

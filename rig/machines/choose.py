@@ -5,7 +5,7 @@ from rig.machines.machine import Machine
 
 
 def machine_of(config: Config) -> Machine:
-    """Return what a session on this configuration moves."""
+    """Return the machine of a session with this configuration."""
     if config.logger.profile == "grasper":
         from rig.machines.grasper import GrasperMachine
 

@@ -127,7 +127,7 @@ def _better(study: ZhangStudy) -> tuple[int, int]:
     wins = []
     for cell in (*compared, "grasp | RMSE, NRMSE, scale"):
         near = np.array([word is True for word in study.near(cell)])
-        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is no error
+        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is not an error
         ours, theirs = (study.values(f"{cell} | {method}") for method in (OURS, NETWORKS))
         wins.append((ours < theirs)[:, near])
     ours, theirs = (

@@ -104,7 +104,7 @@ def _with_cable(model: Model, plant: PlantParameters) -> PlantParameters:
     """Read proximal torque = ratio x distal torque + viscous + Coulomb + inertia.
 
     Its ratio of torques is left aside: a plant has one ratio, that of the angles, and a loss that
-    makes the torques' differ is no part of the declared model.
+    makes the torques' differ is not a part of the declared model.
     """
     ratio, changed = plant.cable_ratio, plant
     viscous = _term(model, "friction.viscous")

@@ -440,7 +440,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
         seed: Seed of the draw.
 
     Raises:
-        UnknownHiddenEffectError: A name is unknown or a strength is no number.
+        UnknownHiddenEffectError: A name is unknown or a strength is not a number.
     """
     if not words:
         drawn = draw(seed)
@@ -454,7 +454,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
             found[name] = float(strength or 1.0)
         except ValueError as error:
             raise UnknownHiddenEffectError(
-                f"{strength!r} is no strength.", "Write for example motor_ripple=0.5."
+                f"{strength!r} is not a strength.", "Write for example motor_ripple=0.5."
             ) from error
     table(HiddenEffect(name, strength) for name, strength in found.items())
     return found

@@ -94,5 +94,5 @@ def plant_and_sensors(
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:
-    """Say whether the compiled firmware core is in the loop, rather than the Python fake."""
+    """Whether the compiled firmware core is in the loop, rather than the Python fake."""
     return simulation.firmware and firmware_library() is not None

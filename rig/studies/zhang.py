@@ -91,7 +91,7 @@ class ZhangStudy:
         ]
 
     def near_in_contact(self) -> tuple[bool, bool, bool]:
-        """Say whether force, moment (by either of its numbers) and grasp land near the paper's."""
+        """Whether force, moment (by either of its numbers) and grasp land near the paper's."""
         force, moment, grasp = worst_axes(self.median(f"contact | wrench, grasp | {NETWORKS}"))
         return (
             abs(force / PAPER_FORCE_N - 1) <= WITHIN,

@@ -70,7 +70,7 @@ def test_gearbox_finds_stiffness_and_the_gap_that_is_there(calibrate, tmp_path, 
     fit = by_channel(said)["gear_twist_rad"]
     assert fit["stiffness_n_m_rad"] == pytest.approx(5.4, rel=0.01)
     assert fit["backlash_rad"] == pytest.approx(0.015 * strength, abs=2e-4)
-    assert said["found"]["backlash"].startswith("told" if strength else "not told")
+    assert said["found"]["backlash"].startswith("significant" if strength else "not significant")
 
 
 def test_encoder_finds_the_wave_that_is_there(calibrate, tmp_path):
@@ -109,7 +109,7 @@ def test_a_refused_or_unattended_session_leaves_nothing(calibrate, tmp_path):
     assert "changes by" in said["error"]["what"]
     code, said = calibrate("torque", yes=False)
     assert code == 2
-    assert "no terminal" in said["error"]["what"]
+    assert "not a terminal" in said["error"]["what"]
     assert list(tmp_path.iterdir()) == []
 
 

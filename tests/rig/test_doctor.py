@@ -225,7 +225,7 @@ def test_the_hash_of_the_sources_is_that_of_posix_cksum(library: Path) -> None:
     versions = firmware.compare(load_config())
     assert versions.fits
     assert versions.sources.removeprefix("build ") in versions.board
-    assert versions.remarks == ("Program and board speak one protocol.",)
+    assert versions.remarks == ("Program and board have the same protocol.",)
 
 
 def test_a_build_of_other_sources_is_told(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:

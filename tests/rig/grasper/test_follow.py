@@ -164,7 +164,7 @@ def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("config", "url", "said"),
     [
-        ("simulated", None, "is no grasper"),
+        ("simulated", None, "is not a grasper"),
         ("bench", None, "Where is the master"),
         ("bench", "sim://", "simulated master"),
     ],

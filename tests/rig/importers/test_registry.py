@@ -65,7 +65,7 @@ def test_a_third_party_format_opens_by_its_entry_point(installed, tmp_path):
     [
         ("acme_gone:IMPORTER", "cannot be loaded: No module named 'acme_gone'"),
         ("acme_rig:GONE", "cannot be loaded"),
-        ("acme_rig:NOTHING", "is no importer"),
+        ("acme_rig:NOTHING", "is not an importer"),
     ],
 )
 def test_an_entry_point_that_does_not_load_is_named(installed, value, message):
