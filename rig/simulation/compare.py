@@ -107,7 +107,7 @@ def simulate_like(
 
 
 def compare(recording: Recording) -> list[Row]:
-    """Return the levels of a measured run beside those of its simulation.
+    """Return the levels of a measured run and of its simulation.
 
     Raises:
         DataError: The run has no trajectory to follow.
@@ -150,7 +150,7 @@ def main(
     figure: Annotated[Path | None, typer.Option(help="Also write a figure here (PNG).")] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Print the levels of a measured run beside those of its simulation."""
+    """Print the levels of a measured run and of its simulation."""
     from rig.importers.registry import open_campaign
 
     chosen = [handle for handle in open_campaign(data).runs if handle.name == run]

@@ -38,7 +38,7 @@ def open_simulated_logger(
         UnknownHiddenEffectError: A hidden effect has no such name.
     """
     board, tick_s = _BOARDS[profile](simulation)
-    # nobody watches a rig that is faster than real time, so it may move in larger steps
+    # a rig faster than real time is not displayed, so it may advance in larger steps
     usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
     step_s = min(step_s or usual_s, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace, tick_s=tick_s)

@@ -1,7 +1,7 @@
 """Effects of an arm chosen on one path alone, so that another path is untouched by the choice.
 
-The path is cut into stretches, at the same places of every period: what fits one period fits the
-next by heart. Every other stretch is fitted and the rest tested on, and back.
+The path is cut into segments, at the same places of every period. Periods repeat, so a random
+split would leak. Every other segment is fitted and the rest is the test, and back.
 """
 
 from collections.abc import Sequence

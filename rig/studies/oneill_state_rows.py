@@ -1,6 +1,6 @@
 """What an estimate from physical states is scored by, on runs that were not fitted.
 
-The run is the unit: a share of samples has a spread that is that of runs drawn anew.
+The run is the unit: the spread of a share of samples is that over resampled runs.
 """
 
 from collections.abc import Mapping, Sequence

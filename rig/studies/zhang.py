@@ -80,7 +80,7 @@ class ZhangStudy:
         return middle
 
     def near(self, condition: str) -> list[bool | None]:
-        """Say of each of the paper's numbers whether its method lands near it here.
+        """Return for each of the paper's numbers whether its method comes near it here.
 
         The median over the seeds counts; None where the paper's number is not known.
         """
