@@ -66,7 +66,7 @@ class Batch:
         time_s: When each sample was taken (`device` clock) or had arrived (`host` clock), s,
             shape (n,). The zero is arbitrary.
         clock: The clock of `time_s`.
-        sequence: Number of each sample since `start`, int64, shape (n,); lost samples leave a gap
+        sequence: Number of each sample since `start`, int64, shape (n,); lost samples are a gap
             where the device numbers its samples.
         flags: `SampleFlag` bits, uint8, shape (n,).
         lost: Samples known to be lost since `start`, up to the end of this batch. None is made up

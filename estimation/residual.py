@@ -104,7 +104,7 @@ class Structure:
         return (
             f"The residual depends on {self.variable.replace('_', ' ')}, which explains"
             f" {100 * self.explained_fraction:.0f} % of the residual's variance on"
-            f" runs held out, {self.detail}. This is a screening; it names no effect."
+            f" runs held out, {self.detail}. This is a screening; it identifies no effect."
         )
 
 

@@ -25,7 +25,7 @@ class Amt21:
         transport: The way to the line; the device closes it.
         address: The encoder's address.
         multi_turn: Whether it also counts turns.
-        rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         reply_timeout_s: Time for an answer, on a USB adapter some milliseconds.
     """
 
@@ -138,7 +138,7 @@ class Amt21:
         return None
 
     def _receive(self, request: bytes) -> bytes:
-        """Return what came, without an echo of the question where the adapter makes one."""
+        """Return the answer, without the request where the adapter returns it."""
         give_up_s = self._transport.now_s + self._reply_timeout_s
         came = b""
         while len(came) < protocol.REPLY_SIZE:

@@ -30,7 +30,7 @@ class AtiCan:
         bus: The bus; the device closes it.
         base: The sensor's base identifier, 0 to 127.
         calibration: Which of its 16 calibrations to use.
-        rate_hz: How often it is asked. A question without an answer leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
     """
 
     name = "ati-can"

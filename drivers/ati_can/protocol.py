@@ -1,8 +1,8 @@
 """NETCANOEM's frames: one operation a request, replies of one to three frames. All big-endian.
 
 The identifier is `base << 4 | operation`, of a reply as of a request; a reply's second and third
-frame carry the operations that follow. Frames have no number: nothing but their order tells which
-request a reply belongs to.
+frame carry the operations that follow. Frames have no number: only their order identifies the
+request of a reply.
 
 Source: ATI manual 9610-05-1030 (NETCANOEM).
 """

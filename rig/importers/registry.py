@@ -1,7 +1,7 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
-An importer is an object in the entry point group `rig.importers`. It checks whether a path looks
-like its format without reading the samples, and opens it as a campaign of run handles.
+An importer is an object in the entry point group `rig.importers`. It recognises the format of a
+path without reading the samples, and opens it as a campaign of run handles.
 """
 
 from importlib.metadata import EntryPoint, entry_points

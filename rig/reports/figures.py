@@ -90,7 +90,7 @@ def over_time(
 
     Args:
         time_s: Shape (n,), s.
-        series: Name to values, each of shape (n,); NaN leaves a gap.
+        series: Name to values, each of shape (n,); NaN makes a gap.
         unit: Unit of the values.
         caption: What is seen, also for readers who do not see it.
         shaded: Samples to shade, shape (n,), or None.

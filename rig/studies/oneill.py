@@ -1,6 +1,6 @@
 """The linear rows of Table I of O'Neill et al. 2018, made again on measured or simulated data.
 
-The public data set is probably not the paper's exact set: the paper's processing leaves 308,117
+The public data set is probably not the paper's exact set: the paper's processing gives 308,117
 closing samples of Tool_4_Maryland_L_4, the paper states 260,581, and no threshold, window or subset
 of runs explains the difference. The same processing gives the paper's count of its third experiment
 exactly. So the paper's errors are printed next to ours, and are not expected to agree.

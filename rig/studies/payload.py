@@ -162,5 +162,5 @@ def table(study: Payload) -> TextTable:
         rows,
         f"At {100 * study.height_m:g} cm above the remote centre, standard error"
         f" {100 * study.height_error_m:g} cm; its distance from the axis is estimated. The interval"
-        " is two standard errors: scatter over periods, half the difference of the joints, the lever.",
+        " is two standard errors: scatter over periods, half the joints' difference, the lever.",
     )
