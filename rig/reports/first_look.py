@@ -15,9 +15,9 @@ from rig.reports.table import TextTable
 
 LIMITS = (
     "Screening only: smooth functions of one variable at a time, fitted on the other runs, each"
-    " run's mean or the mean of all removed. Variables that move together share what they explain. A share"
-    " means that something depends on the variable, or on one that moves with it; it identifies no"
-    " effect."
+    " run's mean or the mean of all removed. Variables that move together share what they explain."
+    " A share means that something depends on the variable, or on one that moves with it; it"
+    " identifies no effect."
 )
 
 

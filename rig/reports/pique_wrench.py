@@ -37,8 +37,8 @@ NOTES = (
     f" 7 N and a bad grip of the torsion about z, and no sizes. Largest forces {PUSHED[0]} N where"
     f" forces, {TWISTED[0]} N where moments are measured, and a torsion of {TWISTED[1]} N m,"
     f" of which the sensor gets at most {GRIP_N_M} N m, and joints that move over"
-    f" {CONTACT_SHARE:.0%} of their ranges were set on arms that are not shown here so that its method comes near its"
-    " table 3.3: the loss in the grip is an error of every method.",
+    f" {CONTACT_SHARE:.0%} of their ranges were set on arms that are not shown here so that its"
+    " method comes near its table 3.3: the loss in the grip is an error of every method.",
     "By the body Jacobian the same contact is expressed in the tip's frame. Bending moments at the"
     " tip are zero there except for the sensor's errors, so they have no range for a ratio.",
 )
