@@ -50,7 +50,7 @@ def listening(process_id: int) -> set[str]:
 
 
 def measure() -> dict[str, list[str]]:
-    """Return what listened: while recording and watching every rig, and with Foxglove asked for."""
+    """Return the open sockets: while recording and watching every rig, and with Foxglove."""
     unasked: set[str] = set()
     with tempfile.TemporaryDirectory() as folder:
         for name in CONFIGS:

@@ -156,7 +156,7 @@ class TeensyFake:
         self._next_tick_us = tick_us % 2**32
 
     def skip(self, ticks: int) -> None:
-        """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
+        """Let ticks pass without running them: samples are lost, setpoints are played."""
         self._queued = self._queued[ticks:]
         self._sequence = (self._sequence + ticks) % 2**32
         self._next_tick_us = (self._next_tick_us + ticks * self._profile.tick_us) % 2**32

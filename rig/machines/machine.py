@@ -75,7 +75,7 @@ class Machine(Protocol):
     def shown(self) -> tuple[str, ...]: ...  # noqa: D102
 
     def first_look(self, config: Config) -> str:
-        """Return the shipped protocol of a first look at this rig."""
+        """Return the shipped protocol for a quick check of this rig."""
         ...
 
     def gains(self, config: Config) -> Sequence[Any]:

@@ -76,7 +76,7 @@ def test_gearbox_finds_stiffness_and_the_gap_that_is_there(calibrate, tmp_path, 
 def test_encoder_finds_the_wave_that_is_there(calibrate, tmp_path):
     config = hidden(tmp_path, "{ jaw_encoder_wave = 1.0 }")
     _, said = calibrate("encoder", "--which", "jaw", "--config", config)
-    assert said["found"]["wave"] == "17 per turn"
+    assert said["found"]["wave"] == "17 periods per turn"
     assert said["found"]["wave_amplitude_rad"] == pytest.approx(5e-3, rel=0.05)
 
 
