@@ -1,6 +1,6 @@
 """What every driver offers: typed channels, an identity, and samples in batches.
 
-A driver is made from an open link, speaks to one device, and does nothing in the background: time
+A driver is made from an open link, controls one device, and does nothing in the background: time
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
@@ -16,7 +16,7 @@ from drivers.errors import LinkError
 
 
 class SampleFlag(IntFlag):
-    """What a device says about a sample; 0 is a good one.
+    """Status of a sample from the device; 0 is good.
 
     The bits are those of a recording's flags, so that they pass on unchanged.
     """

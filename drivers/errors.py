@@ -54,7 +54,7 @@ class UnknownSchemeError(LinkError):
 
 
 class ProtocolMismatchError(DriverError):
-    """The board's firmware and this program speak different protocols."""
+    """The board's firmware and this program have different protocols."""
 
 
 class CommandRefusedError(DriverError):

@@ -6,8 +6,8 @@ the catalogue with its own statistics: that search takes the same inputs (a fitt
 `Campaign`) and starts from the same `residuals`.
 
 The unit of evidence is the run: a smooth function of a variable is fitted to the residual of all
-other runs and scored on the run left out. Each run's mean is removed first where the model says
-that run offsets are a nuisance; else the mean over all runs is.
+other runs and scored on the run left out. Each run's mean is removed first where run offsets
+are a nuisance in the model; else the mean over all runs is.
 """
 
 from collections.abc import Iterable, Sequence

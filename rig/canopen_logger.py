@@ -34,7 +34,7 @@ from drivers.transport.can_bus import CanBus
 
 SERIAL_PREFIX = "EPOS4-"
 TICKS_A_READ = 20
-"""Most ticks between looks at what the host has to say; shorter than any patience of the board."""
+"""Most ticks between polls of the host; shorter than any watchdog time of the board."""
 ANSWER_S = 0.005
 MOST_MISSED = 3
 """SYNCs on end without an answer after which the motor's position is missing."""
@@ -82,10 +82,10 @@ class Epos4Bench:
         return rows
 
     def follow(self, in_force: bool) -> None:
-        """Put the power stage in force, or take it out, and return when the drive has said so.
+        """Switch the power stage on or off, and return when the drive has confirmed it.
 
         Raises:
-            DriverError: It has not said so.
+            DriverError: It has not confirmed it.
         """
         if in_force and not self._powered:
             self._powered = True  # a drive that failed half-way is to be disarmed
@@ -100,7 +100,7 @@ class Epos4Bench:
         self._powered = False
 
     def _judge_by_time(self, drive: Drive) -> None:
-        """Let guard and controller see the way of one tick where more time than that has passed."""
+        """Scale the travel to one tick for guard and controller where more time has passed."""
         if drive.guard[PRIMED]:
             watch = drive.guard[MOTOR_WATCH:]
             judge_by_time(watch, self._position_count, self._ticks_since)

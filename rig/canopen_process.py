@@ -146,7 +146,7 @@ class CanopenProcess:
                 return
 
     def _hear(self) -> bool:
-        """Take what the process says; return whether it is ready.
+        """Read the messages of the process; return whether it is ready.
 
         Raises:
             DriverError: It reports one.

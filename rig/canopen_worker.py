@@ -22,11 +22,11 @@ from rig.canopen_logger import CanopenLogger
 from rig.config import Config
 
 PERIOD_S = 0.002
-"""Ticks between two looks at what the host has to say."""
+"""Ticks between two polls of the host."""
 LATE_S = 0.05
 """How late a SYNC may be on a real bus and still be sent."""
 SAID_EVERY_S = 0.5
-"""An error that stays is said again after this time."""
+"""A persistent error is reported again after this time."""
 LARGEST_READ = 65536
 
 

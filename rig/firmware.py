@@ -29,7 +29,7 @@ class Versions:
     """Which firmware is where.
 
     Attributes:
-        program: What this program speaks.
+        program: Protocol of this program.
         sources: The build of the source tree, or a note that there is none.
         board: The board's identity, or the reason why it is unknown.
         fits: Whether program and board have the same protocol.
@@ -78,7 +78,7 @@ _TABLE = [
 
 
 def compare(config: Config) -> Versions:
-    """Ask the board which firmware it has and hold it against program and sources."""
+    """Read the board's firmware version and compare it with program and sources."""
     profile = machine_of(config).profile
     version = protocol.version_text(protocol.FIRMWARE_VERSION)
     program = f"{version}, {profile.name} protocol {profile.protocol_hash:08x}"

@@ -363,7 +363,7 @@ def _epoch_ns(session: Session, folder: Path) -> int:
 
 
 def _end_ns(path: Path) -> int:
-    """Return when a recorded run ended, ns since the Unix epoch; 0 when its log does not say."""
+    """Return when a recorded run ended, ns since the Unix epoch; 0 when it is not in the log."""
     run = read_log(path, topics=(), checksums=False).run
     if run is None or run.started_at_ns is None or run.duration_s is None:
         return 0

@@ -275,7 +275,7 @@ class Session:
         return trip_error(report, self.calibrations, state, self.machine)
 
     def _queue(self, *columns: NDArray[np.int32]) -> None:
-        """Queue setpoints; a board that has tripped since it was read says over what."""
+        """Queue setpoints; raise the trip of a board that has tripped since the last read."""
         try:
             self._logger.queue(*columns)
         except CommandRefusedError as error:
@@ -289,7 +289,8 @@ class Session:
         """Look for what the board itself tripped over.
 
         Raises:
-            SafetyTripError: It did and is in its safe state; says over what, and how late.
+            SafetyTripError: It did and is in its safe state; the message has the limit and the
+                delay.
         """
         trip = tripped(reading)
         if self._watch is not None and trip is not None:

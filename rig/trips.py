@@ -21,8 +21,8 @@ from rig.reading import Reading, has_status
 
 WORDS: dict[Trip, tuple[str, str]] = {
     Trip.HOST_SILENT: (
-        "The board heard nothing from this computer for too long",
-        "Look for what kept this computer busy; [safety] watchdog_s says how long it may be.",
+        "The board received nothing from this computer for too long",
+        "Look for the load on this computer; [safety] watchdog_s sets the permitted time.",
     ),
     Trip.OVER_CURRENT: (
         "The motor current crossed its limit",

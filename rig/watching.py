@@ -17,7 +17,7 @@ class RunWatch:
     """Watches the runs of a campaign as they are finished.
 
     Attributes:
-        watches: Each model's watch, and what each run said of it, in order.
+        watches: Each model's monitor, and the result of each run, in order.
     """
 
     watches: list[tuple[ResidualWatch, list[Sight]]]

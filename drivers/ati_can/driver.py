@@ -146,7 +146,9 @@ class AtiCan:
             if self._flag(gauges):
                 said = ", ".join(protocol.status_words(self.status)) or "a gauge is saturated"
                 raise DriverError(
-                    "The sensor cannot be zeroed.", f"It says: {said}.", "Take the load off it."
+                    "The sensor cannot be zeroed.",
+                    f"Reported status: {said}.",
+                    "Take the load off it.",
                 )
             taken.append(gauges)
         self.bias = np.mean(taken, axis=0, dtype=np.float64)

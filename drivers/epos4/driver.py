@@ -231,8 +231,9 @@ class Epos4:
         """Send command and SYNC when due and return what the drive answers, if it does.
 
         Raises:
-            DriveFaultError: An armed drive has a fault or has left operation. It is said once.
-            LinkTimeoutError: The drive's heartbeat is missing; every reading says so while it is.
+            DriveFaultError: An armed drive has a fault or is not in operation. It is raised once.
+            LinkTimeoutError: The drive's heartbeat is missing; it is raised at every read while
+                missing.
         """
         ratings = self.ratings
         self._idle(min(self.wait_s, timeout_s))
@@ -279,10 +280,10 @@ class Epos4:
     def disarm(self) -> None:
         """Take the motor out of force: target torque 0, voltage off, read back.
 
-        Returns only when the drive has said that its power stage is off.
+        Returns only when the drive has confirmed that its power stage is off.
 
         Raises:
-            DisarmUnconfirmedError: It has not said so; its state is unknown.
+            DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
         self._armed = False
         self._target = 0
@@ -345,7 +346,7 @@ class Epos4:
     def _map(
         self, communication: int, mapping: int, cob_base: int, kind: int, entries: tuple[int, ...]
     ) -> None:
-        """Write a process data mapping and hold what the drive then says against it."""
+        """Write a process data mapping and verify it by reading it back."""
         cob_id = cob_base + self._node_id
         write = self._link.write
         write(communication, 1, cob_id | protocol.PDO_INVALID)
@@ -361,7 +362,7 @@ class Epos4:
         if found != [cob_id, kind, len(entries), *entries]:
             raise ProtocolMismatchError(
                 f"Node {self._node_id} does not hold the process data written to {mapping:#06x}.",
-                f"It says {', '.join(f'{value:#x}' for value in found)}.",
+                f"It has {', '.join(f'{value:#x}' for value in found)}.",
                 "Restore its default parameters, or update its firmware.",
             )
 

@@ -1,4 +1,4 @@
-"""An EPOS4 that speaks the frames a real one would, on the library's own CANopen server.
+"""An EPOS4 with the frames of a real one, on the library's own CANopen server.
 
 Not modelled: the times its controllers and the wire take, its inputs, homing, and every mode but
 cyclic torque. Averaged torque follows the target at once.
@@ -130,7 +130,7 @@ class Epos4Fake:
         out, self._network.out = self._network.out, []
         return out
 
-    # what a test may do to it and see
+    # controls and observations for tests
 
     @property
     def torque_n_m(self) -> float:

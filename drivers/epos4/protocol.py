@@ -65,10 +65,10 @@ _STATES = (
 
 
 def state_of(statusword: int) -> State:
-    """Return the state a statusword says.
+    """Return the state of a statusword.
 
     Raises:
-        FrameError: It says none.
+        FrameError: It contains none.
     """
     for mask, value, state in _STATES:
         if statusword & mask == value:

@@ -25,7 +25,7 @@ class TeensyDevice:
 
     Args:
         transport: The way to the board; the device closes it.
-        wired: What the fields of a sample mean; raw counts if not said.
+        wired: Meaning of the fields of a sample; raw counts by default.
         profile: What the board samples.
     """
 

@@ -28,7 +28,7 @@ FLASH = "Run: rig firmware flash"
 _REASONS: dict[int, tuple[str, str]] = {
     Result.UNKNOWN_KIND: ("The command is unknown to the board.", "Run: rig firmware flash"),
     Result.WRONG_SIZE: ("The command has the wrong size.", "Run: rig firmware flash"),
-    Result.WRONG_VERSION: ("It speaks another frame version.", "Run: rig firmware flash"),
+    Result.WRONG_VERSION: ("Its frame version differs.", "Run: rig firmware flash"),
     Result.BAD_VALUE: (
         "A value is not finite, out of its range, or beyond the limits it was armed with.",
         "Check gains, limits and setpoints.",
@@ -77,8 +77,8 @@ class ClockExchange:
 class TeensyLogger:
     """The logger on the other end of a transport. Nothing runs in the background.
 
-    While armed, the board wants to hear something every 250 ms: a block of setpoints or a
-    `heartbeat`; otherwise it makes itself safe.
+    While armed, the board needs a frame every 250 ms: a block of setpoints or a
+    `heartbeat`; otherwise it goes to its safe state.
 
     Args:
         transport: The way to the board; the logger closes it.
@@ -271,7 +271,7 @@ class TeensyLogger:
 
     def _mismatch(self, theirs: str, why: str, fix: str = FLASH) -> ProtocolMismatchError:
         return ProtocolMismatchError(
-            f"The board at {self._link.transport.url} speaks {theirs}, this program"
+            f"The board at {self._link.transport.url} has {theirs}, this program"
             f" protocol {self._profile.protocol_hash:08x} ({self._profile.name}).",
             why,
             fix,
@@ -282,7 +282,7 @@ class TeensyLogger:
             f"The board at {self._link.transport.url} has not confirmed that it is disarmed.",
             why,
             "Take the motor for live and cut its supply. A working board makes itself safe"
-            f" {protocol.WATCHDOG_US // 1000} ms after the last command it heard.",
+            f" {protocol.WATCHDOG_US // 1000} ms after the last received command.",
         )
 
     def _require_identity(self) -> None:

@@ -85,8 +85,8 @@ class TeensyFake:
         bench: The physics.
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
-        protocol_hash: Protocol the board claims to speak; its profile's if None.
-        build_hash: Build the board claims to be.
+        protocol_hash: Protocol hash of the board; its profile's if None.
+        build_hash: Build hash of the board.
         logic: What its profile does a tick.
     """
 

@@ -1,8 +1,8 @@
 """The links' torque regressor along a whole motion, compiled: one recursion from the base outwards.
 
 A torque is linear in a link's mass, first moments and inertia about its joint's origin (W. Khalil
-and E. Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9). Pinocchio gives the
-same columns sample by sample and is what the tests hold this against; called from Python 5000 times
+and E. Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9). Pinocchio computes
+the same columns sample by sample and is the reference in the tests; called from Python 5000 times
 it costs several times as much as its own work.
 """
 

@@ -218,7 +218,7 @@ def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
         Term(effect("motor.torque_constant"), 1, {"source": source}),
         Term(effect("sensor.offset"), 1),
     )
-    about = "What the calibrated sensor says, against what it was given."
+    about = "The calibrated reading of the sensor against its reference."
     return Model(kind, f"calibration.{kind}", target, terms, about, low_pass, False, "all")
 
 

@@ -1,4 +1,4 @@
-"""`rig stop`: take the motors out of force, and say so only once the board has said so."""
+"""`rig stop`: disarm the motors, and report it only after the board has confirmed it."""
 
 from rig.cli.doctor import ConfigOption
 from rig.cli.output import JsonFlag, emit_json, remarks, results
@@ -7,7 +7,7 @@ from rig.cli.output import JsonFlag, emit_json, remarks, results
 def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
     """Disarm the rig and read back that it is disarmed.
 
-    Exit code 0 only when the rig itself has said so; 4 when its state is unknown.
+    Exit code 0 only when the rig itself has confirmed it; 4 when its state is unknown.
     """
     from drivers.errors import DriverError
     from drivers.teensy.driver import TeensyLogger
@@ -28,7 +28,7 @@ def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
         if json:
             emit_json({"state": "unknown", "why": str(error)})
         return int(ExitCode.SAFETY)
-    results(json).print(f"{settings.name}: disarmed, and it has said so.", markup=False)
+    results(json).print(f"{settings.name}: disarmed, confirmed by the board.", markup=False)
     if json:
         emit_json({"state": "disarmed"})
     return 0

@@ -46,7 +46,7 @@ def _show(
 
     Args:
         study: The study.
-        lines: What is said before its tables.
+        lines: Lines printed before its tables.
         tables: Its tables.
         page: Makes its page, with figures at the places given.
         drawn: Figures that were drawn.
@@ -62,7 +62,7 @@ def _show(
 def resumable(
     state: Path | None, study: str, total: int, what: str = "arms"
 ) -> Iterator[tuple[Path, Callable[[], None]]]:
-    """Show how much of a study is done; where it is interrupted, say how to go on.
+    """Show how much of a study is done; after an interruption, print how to resume.
 
     Yields:
         Where the study keeps what is done, and what to call after each step.

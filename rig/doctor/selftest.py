@@ -118,8 +118,8 @@ BOARD_CHECKS: dict[str, Callable[[TeensyLogger, Config], tuple[bool, str]]] = {
     "zeros stay where they are": _zero_drift,
     "the board trips at a travel limit": _travel_limit,
     "the board refuses a setpoint beyond the travel": _setpoint_limit,
-    "the board makes itself safe when the host falls silent": _watchdog,
-    "the board disarms and says so": _stop,
+    "the board goes to its safe state when the host is silent": _watchdog,
+    "the board disarms and confirms it": _stop,
 }
 """Checks on the logger alone, each on a fresh link."""
 

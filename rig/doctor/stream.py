@@ -96,7 +96,7 @@ def _channel_findings(name: str, device: Device, batches: list[Batch]) -> list[F
     findings = []
     if saturated:
         what = f"Saturated in {saturated} of {flags.size} samples."
-        fix = "Check wiring and amplifier; unload the sensor; see that its range fits."
+        fix = "Check wiring and amplifier; unload the sensor; check its range."
         findings.append(Finding(name, "saturation", Level.ERROR, what, fix))
     for channel in device.channels:
         if channel.unit in STANDING_STILL_UNITS or channel.name.startswith(STANDING_STILL):

@@ -66,7 +66,7 @@ def follow_master(
 
     Args:
         config: Of a grasper.
-        url: Where the master is; where the configuration says if none.
+        url: URL of the master; from the configuration if None.
         duration_s: How long.
         scale: Angle of a joint for an angle of the master.
         folder: Where the log goes.

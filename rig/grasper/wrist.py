@@ -169,7 +169,7 @@ class Design:
 def designs(gear_ratios: tuple[float, ...] = GEAR_RATIOS) -> list[Design]:
     """Return all combinations of Table 1's three steps, 27 for three gear ratios.
 
-    The paper does not say how it measures compactness. Here the smallest gear and the smallest
+    The paper does not define compactness. Here the smallest gear and the smallest
     pulley have diameter 1, gears mesh, pulleys do not touch, and the area is that of the rectangle
     around them. A sun that is not fixed needs a stage that ties it to the carrier; driving the
     planet needs one that reaches its moving axis.

@@ -9,8 +9,8 @@ hold one or the other. In a run,
 - text is a condition, except `notes`, which becomes the notes.
 
 Anything else is refused, with the list of what was found. Closing motion and torque are positive,
-and units are SI: the file's author sees to that, or a sidecar `<file>.mat.toml` does, which maps
-other names and then alone decides what is imported (`variable` may be `struct.field`):
+and units are SI: the file follows these rules, or a sidecar `<file>.mat.toml` maps other names
+and then alone decides what is imported (`variable` may be `struct.field`):
 
     sample_rate_hz = 1000               # where there is no time variable
     [channels.spindle_angle_rad]

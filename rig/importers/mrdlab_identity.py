@@ -1,4 +1,4 @@
-"""What names and header lines of the MRDLab format say about a run: instrument, wrist, jaw stop.
+"""Properties of a run from names and header lines of MRDLab logs: instrument, wrist, jaw stop.
 
 Header text about the tool can be left over from an earlier session, so the folder's name wins: a
 lot is believed only where the header's tool number agrees with the folder's.

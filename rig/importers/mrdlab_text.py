@@ -168,7 +168,7 @@ def _check_range(path: Path, columns: FloatArray, header_lines: int) -> None:
 
 
 def _seconds(path: Path, time: FloatArray, header_lines: int) -> FloatArray:
-    """Return time in seconds: the header says ms, the values step by 0.001; believe the step."""
+    """Return time in seconds: the header has ms, the values step by 0.001; use the step."""
     steps: NDArray[np.float64] = np.diff(time)
     if steps.min() <= 0:
         row = int(np.argmax(steps <= 0)) + 1

@@ -64,7 +64,7 @@ class ModelStatus:
 def with_model_status(
     blocks: Iterator[SampleBlock], estimators: Sequence[ModelEstimator]
 ) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with what can be said of what estimates.
+    """Yield blocks as they come, each with the status of its estimators.
 
     Args:
         blocks: The stream. It is closed when this one is.

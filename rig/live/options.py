@@ -1,4 +1,4 @@
-"""How a person wants a stream shown."""
+"""Options of the display of a stream."""
 
 import math
 from collections.abc import Mapping

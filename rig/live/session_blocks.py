@@ -38,7 +38,7 @@ def session_blocks(
         config: The rig's configuration.
         open_transport: Opens the way to the logger.
         plans: Runs to play one after the other; without any, the rig is only watched.
-        estimators: Streams that have seen nothing yet; none for none.
+        estimators: Streams before their first sample; empty for none.
         keys: Keys pressed; see `rig.live.keys`.
         folder: Where recordings go that a key starts.
     """

@@ -45,7 +45,7 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One quantity: what the estimator says and what the sensor says.
+    """One quantity: estimate and sensor reading.
 
     Attributes:
         channel: Name of the channel.
@@ -107,7 +107,7 @@ class Summary:
         channel: The main quantity.
         error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
         error_samples: Samples in that number: those not flagged and with both values.
-        inside_rms: The same where the estimator says it is within what it was fitted on, or None.
+        inside_rms: The same within the fitted range of the estimator, or None.
         inside_samples: Samples in that number.
     """
 

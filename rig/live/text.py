@@ -40,7 +40,7 @@ STATES = {
 
 
 def in_shown_unit(unit: str) -> tuple[float, str, int]:
-    """Return the factor from SI, the unit's name and the decimals people see."""
+    """Return the factor from SI, the unit's name and the decimals of the display."""
     return SHOWN.get(unit, (1.0, unit, 3))
 
 
@@ -50,7 +50,7 @@ def name_of(channel: str) -> str:
 
 
 def digits(value: Value, unit: str) -> str | None:
-    """Return the number alone in the unit people see, or None when there is none."""
+    """Return the number alone in the display's unit, or None when there is none."""
     if value.number is None:
         return None
     factor, _, decimals = in_shown_unit(unit)

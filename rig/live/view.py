@@ -1,4 +1,4 @@
-"""The display as a person sees it: lines of text made from one snapshot, for any terminal size."""
+"""The text of the display: lines made from one snapshot, for any terminal size."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

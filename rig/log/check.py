@@ -65,7 +65,7 @@ class TopicReport:
         expected: Samples that should be there: the largest of the three below and of `received`.
         expected_by_sequence: From the first sequence number to the last; None without them.
         expected_by_plan: From the planned duration and rate; None without a plan.
-        expected_by_recorder: What the recorder had counted at the end; None if it did not say.
+        expected_by_recorder: What the recorder had counted at the end; None if not recorded.
         gaps: Missing stretches.
         repeats: Samples whose sequence number does not come after the one before.
         time_steps_back: Samples whose time does not come after the one before.

@@ -180,7 +180,7 @@ def _plan(
 
 
 def _owner(chunk: ChunkRef, layouts: dict[int, Layout]) -> int | None:
-    """Return the one channel a chunk's index says it holds, if the sizes bear that out."""
+    """Return the one channel in a chunk's index, if the sizes confirm it."""
     if chunk.torn or len(chunk.indexed) != 1:
         return None
     ((channel, count),) = chunk.indexed.items()
@@ -208,7 +208,7 @@ def _read_batch(
         try:
             _read_array(buffer, batch.chunks, batch.channel, layouts[batch.channel], batch.target)
         except (DataError, zstandard.ZstdError):
-            pass  # one of the chunks is not what its index says: take them one at a time
+            pass  # one of the chunks does not match its index: take them one at a time
         else:
             return _Read([(batch.channel, batch.target)])
     return _read_singly(buffer, batch.chunks, layouts, wanted)

@@ -90,7 +90,7 @@ def write_recording(path: Path, recording: Recording) -> Path:
 def recording_from_log(log: LogFile) -> Recording:
     """Return the samples of a log as a recording.
 
-    A run that did not end as planned says so in its notes. One whose log was not closed, or is
+    A run that did not end as planned has a remark in its notes. One whose log was not closed, or is
     damaged, is excluded from evidence, with the reason.
 
     Args:

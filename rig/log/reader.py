@@ -151,7 +151,7 @@ def read_log(
 
 
 def damaged(log: LogFile) -> DamagedLogError:
-    """Return the error that says how a log is damaged."""
+    """Return the error that describes the damage of a log."""
     first = log.damage[0]
     more = f" and {len(log.damage) - 1} more" if len(log.damage) > 1 else ""
     return DamagedLogError(

@@ -110,7 +110,7 @@ def _write(log: LogFile, report: LogReport, target: Path) -> None:
 
 
 def _verify(log: LogFile, target: Path) -> None:
-    """Read the new log and hold it against what was recovered."""
+    """Read the new log and compare it with the recovered data."""
     again = read_log(target)
     for name, topic in log.topics.items():
         copy = again.topics[name]

@@ -258,7 +258,7 @@ class LogWriter:
     def _abandon(self) -> None:
         """Close the file as it stands."""
         self._closed = True
-        with suppress(OSError):  # what led here says more than a buffer that cannot be flushed
+        with suppress(OSError):  # the first error is more useful than that of flushing
             self._file.close()
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""What a session has to know of what it moves, the same for every kind of rig."""
+"""The interface of a machine to a session, the same for every kind of rig."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol

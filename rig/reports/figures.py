@@ -92,7 +92,7 @@ def over_time(
         time_s: Shape (n,), s.
         series: Name to values, each of shape (n,); NaN makes a gap.
         unit: Unit of the values.
-        caption: What is seen, also for readers who do not see it.
+        caption: Description of the figure, also for readers who cannot see it.
         shaded: Samples to shade, shape (n,), or None.
     """
     figure, (ax,) = _axes(7.2, 2.6)

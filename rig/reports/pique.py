@@ -45,7 +45,7 @@ def _reached(study: Study) -> str:
         for model in (EFFECTS, WITHIN)
     ]
     return (
-        f" What was aimed at is reached by {said[0]} and {said[1]}; beyond that by {said[2]} and"
+        f" The goal is reached by {said[0]} and {said[1]}; the further goal by {said[2]} and"
         f" {said[3]}."
     )
 

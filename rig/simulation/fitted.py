@@ -61,7 +61,7 @@ def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -
 def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:
     """Read proximal torque = K i - J a - b w - F sgn w, per motor speed, torque at the spindle.
 
-    The sensor carries the drive unit, so of the rotor's inertia it sees ratio - 1 times.
+    The sensor carries the drive unit, so the rotor's inertia acts on it ratio - 1 times.
     """
     ratio = plant.gear_ratio
     return replace(

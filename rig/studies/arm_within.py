@@ -17,7 +17,8 @@ from estimation.recording import Recording
 from rig.studies.arm_search import RATE_SHARE, Prepared, search
 
 STRETCHES = 8
-"""Of a period: each longer than the filter remembers, and half of them see most of the range."""
+"""Of a period: each is longer than the filter's memory, and half of them cover most of the
+range."""
 
 
 def period_of(run: Recording) -> float | None:

@@ -62,7 +62,7 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Answer:
-    """What one method says.
+    """The result of one method.
 
     Attributes:
         method: Name of the method.

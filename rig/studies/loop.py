@@ -43,7 +43,7 @@ class Task:
     """One row of the study.
 
     Attributes:
-        name: What is estimated from what.
+        name: Target and regressor of the estimate.
         balance: Equation whose effects are searched.
         target: Channel that is estimated.
         source: Channel of the linear model.

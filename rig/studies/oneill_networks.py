@@ -82,7 +82,7 @@ class Job:
 
     @property
     def nodes(self) -> int:
-        """Hidden nodes: the paper's 30, fewer where the inputs say more."""
+        """Hidden nodes: the paper's 30, fewer with more informative inputs."""
         return 30 if self.way in ("end-to-end", "staged") else STATE_NODES
 
     @property

@@ -24,7 +24,7 @@ CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
 """What each protocol that holds a level out holds out."""
 
 RESAMPLED = 2000
-"""Campaigns drawn from the runs, to see how far a share is chance."""
+"""Campaigns resampled from the runs, for the standard error of a share."""
 
 
 @dataclass(frozen=True)

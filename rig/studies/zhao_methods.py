@@ -35,7 +35,7 @@ ToForce = Callable[[Recording], FloatArray]
 
 @dataclass(frozen=True)
 class Lacking:
-    """What the diagnosis says a degree of freedom's model lacks.
+    """The effects that the diagnosis finds missing in a degree of freedom's model.
 
     Attributes:
         findings: Family and verdict of each finding.
