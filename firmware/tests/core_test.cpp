@@ -134,7 +134,7 @@ TEST_CASE("a Teensy answers a hello, with interrupts off only while it touches t
     CHECK(Serial.out.size() > rig::kSerialSize);
 }
 
-TEST_CASE("an enabled controller that is not ready tells no current") {
+TEST_CASE("an enabled controller that is not ready reports no current") {
     rig::ReferenceHardware teensy;
     teensy.begin();
     board.analog[rig::wiring::kDriveCurrentPin] = 2048;

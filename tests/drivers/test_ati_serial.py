@@ -118,7 +118,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")
 
 
-def test_what_no_source_settles_can_be_told_otherwise() -> None:
+def test_unpublished_settings_are_options() -> None:
     fake = AtiSerialFake()
     told = AtiSerial(SimulatedTransport(fake))
     told.start()

@@ -183,7 +183,7 @@ def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand() -> None:
     device.close()
 
 
-def test_a_drive_that_leaves_operation_by_itself_is_said() -> None:
+def test_a_drive_that_stops_operation_by_itself_is_reported() -> None:
     node = Epos4Fake()
     device, _ = armed(node)
     node.state = State.QUICK_STOP

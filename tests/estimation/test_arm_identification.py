@@ -53,7 +53,7 @@ def test_the_links_columns_give_the_torques_of_recursive_newton_euler():
         np.testing.assert_allclose(found[k], expected, atol=1e-9)
 
 
-def test_the_thesis_68_parameters_have_48_combinations_that_can_be_told():
+def test_the_thesis_68_parameters_have_48_identifiable_combinations():
     base = base_of(PSM)
     assert len(names(PSM)) == 68
     assert len(base.names) == len(set(base.names)) == 48

@@ -155,7 +155,7 @@ def test_the_means_of_runs_are_fitted_once_more_by_few_weights():
     assert both[2] == alone[2]
 
 
-def test_a_column_that_hardly_varies_gets_no_weight():
+def test_a_nearly_constant_column_gets_no_weight():
     rng = np.random.default_rng(0)
     slope = rng.normal(size=400)
     design = np.column_stack([np.ones(400), slope, 0.5 + 1e-6 * rng.normal(size=400)])
@@ -177,7 +177,7 @@ def test_its_interval_holds_on_a_run_it_has_not_seen(runs):
     assert np.concatenate(inside).mean() > 0.8
 
 
-def test_samples_beyond_what_was_fitted_are_told(fitted, runs):
+def test_samples_outside_the_fitted_range_are_flagged(fitted, runs):
     closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3
     assert fitted.estimate(runs[1]).inside[closing].mean() > 0.9
     far = runs[1].with_columns(motor_current_a=runs[1]["motor_current_a"] + 5)
@@ -191,7 +191,7 @@ def test_live_fits_have_a_target_without_lag(runs):
     assert np.sqrt(np.mean((both["estimate_n_m"] - both[TARGET]) ** 2)) < 0.01
 
 
-def test_another_instrument_is_refused_unless_told(runs):
+def test_another_instrument_is_refused_unless_allowed(runs):
     own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
     mine = [replace(run, instrument=own) for run in runs[1:5]]
     fitted = BankRecipe(TARGET, BANK).fit(Campaign.of(mine))
@@ -208,7 +208,7 @@ def test_another_instrument_is_refused_unless_told(runs):
     )
 
 
-def test_a_file_of_an_older_version_is_told_to_be_fitted_again(fitted, tmp_path, monkeypatch):
+def test_a_file_of_an_older_version_must_be_fitted_again(fitted, tmp_path, monkeypatch):
     monkeypatch.setattr(BankEstimator, "SCHEMA", "rig.bank/1")
     fitted.save(tmp_path / "old.npz")
     monkeypatch.undo()
@@ -231,7 +231,7 @@ def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_p
     assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
 
 
-def test_a_node_that_hardly_moves_in_the_runs_adapted_with_keeps_its_weight(runs):
+def test_a_node_that_barely_varies_in_the_adaptation_keeps_its_weight(runs):
     draw = np.random.default_rng(0)
     inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[-0.7, -0.2], [0.7, 0.5]])
     hidden = draw.normal(size=(4, 3))

@@ -140,7 +140,7 @@ def test_raw_logs_of_another_kind_are_refused(calibrate):
 
 
 @pytest.mark.parametrize("hysteresis", [0.3, 0.0])
-def test_a_curve_on_data_with_hysteresis_is_told_so(
+def test_hysteresis_is_identified_in_the_residual_of_a_curve(
     calibrate, monkeypatch, capsys, tmp_path, hysteresis
 ):
     from rig.simulation import press

@@ -74,12 +74,12 @@ def test_the_first_look_keeps_off_the_runs_that_prove(demo, told):
     assert not [name for name in confirm if name in page]
 
 
-def test_the_demo_remembers_what_it_looked_at(demo, told):
+def test_the_demo_logs_its_use_of_held_out_data(demo, told):
     recordings = evidence(open_campaign(demo / "logs"))
     assert Ledger(Path(told["ledger"])).known(recordings) == {r.name for r in recordings}
 
 
-def test_the_hidden_effect_is_not_told_to_whoever_reads_the_logs(demo, told):
+def test_the_logs_do_not_contain_the_hidden_effect(demo, told):
     from rig.simulation.hidden import NAMES
 
     for path in (demo / "logs").glob("*.mcap"):
