@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.reliability import faults, fuzz, kills, listening, soak
 from estimation.files import write_text_atomic
-from rig.reports.provenance import Provenance
+from rig.output.provenance import Provenance
 
 SEED = 0
 STATE = Path("build/reliability.json")

@@ -31,9 +31,9 @@ from drivers.teensy.guard import (
 from drivers.teensy.protocol import MISSING, STATUS_ARMED, Trip
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
-from rig.config import Config, load_config
+from rig.bench.session import Session
+from rig.configuration.config import Config, load_config
 from rig.errors import RigError
-from rig.session import Session
 
 STEP_S = 0.005
 MOTOR_STEP = 3

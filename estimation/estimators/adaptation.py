@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import rescaled
 from estimation.bank.states import LAGS, Bank
+from estimation.closing import is_closing, processed
 from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
 from estimation.estimators.network import NetworkEstimator
 from estimation.networks import training
 from estimation.networks.network import NetworkError, to_unit
-from estimation.oneill import is_closing, processed
 from estimation.recording import FloatArray, Recording
 
 Adaptable = BankEstimator | NetworkEstimator

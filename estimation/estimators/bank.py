@@ -12,11 +12,11 @@ from estimation.bank.fitting import Normal, Pool, Settings, chosen, solve
 from estimation.bank.interval import COVERAGE, Interval, calibrate
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.closing import is_closing, processed
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
-from estimation.oneill import is_closing, processed
 from estimation.recording import FloatArray, Recording, read_only
 from estimation.scores import Score, score
 

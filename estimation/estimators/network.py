@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.campaign import Campaign
+from estimation.closing import closing_samples, processed
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.filters import PAPER, LowPass
 from estimation.networks import network as files
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, train
-from estimation.oneill import closing_samples, processed
 from estimation.recording import FloatArray, Recording
 
 STATE_INPUTS = (

@@ -12,7 +12,7 @@ from drivers.ati_net.fake import RdtFake, fake_calibration
 from drivers.teensy.fake import TeensyFake
 from drivers.teensy.guard import COLUMNS, Drive
 from drivers.transport.simulated import SimulatedTransport
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench
 from rig.simulation.logger import plant_and_sensors
 from rig.simulation.press import PressedFsr, press_force_n

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import emit_json, progress, results, to_json
+from rig.output.console import emit_json, progress, results, to_json
 
 
 def adapt(
@@ -28,9 +28,9 @@ def adapt(
     from estimation.estimator import load
     from estimation.files import write_text_atomic
     from rig.importers.registry import open_campaign
+    from rig.models.adapt import open_source, run_adaptation
+    from rig.output.table import to_rich
     from rig.reports import adapt as shown
-    from rig.reports.table import to_rich
-    from rig.studies.adapt import open_source, run_adaptation
 
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
     from calibration.store import CalibrationStore
-    from rig.config import Config
+    from rig.configuration.config import Config
 
 cal_app = typer.Typer(
     name="cal",
@@ -189,7 +189,7 @@ def check(
     from datetime import UTC, datetime
 
     from calibration.rules import judge, judge_raw
-    from rig.config import load_config
+    from rig.configuration.config import load_config
 
     settings = load_config(config)
     kept = _store(store, settings)
@@ -298,7 +298,7 @@ def _flat(record: "CalibrationRecord") -> dict[str, Any]:
     """Return a record as dotted names and values; a hash of the figure, a line of the raw logs."""
     from hashlib import sha256
 
-    from rig.cli.output import plain
+    from rig.output.console import plain
 
     flat: dict[str, Any] = {"hash": record.content_hash}
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.procedure import Operator, Procedure, Step
     from drivers.device import Device
     from rig.calibrate.run import Kept
-    from rig.config import Config
+    from rig.configuration.config import Config
 
 calibrate_app = typer.Typer(
     name="calibrate",
@@ -224,7 +224,7 @@ def _conduct(procedure: "Procedure", how: Keeping) -> None:
     from calibration.store import CalibrationStore, default_folder
     from rig.calibrate.raw import read_raw
     from rig.calibrate.run import Signature, keep
-    from rig.config import load_config
+    from rig.configuration.config import load_config
     from rig.errors import UsageError
 
     settings = load_config(how.config)
@@ -262,8 +262,8 @@ def _conduct(procedure: "Procedure", how: Keeping) -> None:
 
 def _measure(procedure: "Procedure", settings: "Config", how: Keeping) -> list[Any]:
     from calibration.procedure import carry_out
+    from rig.bench.logger import open_logger
     from rig.calibrate.bench import RigBench
-    from rig.logger import open_logger
 
     screen = remarks()
     operator: Operator

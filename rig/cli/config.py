@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 config_app = typer.Typer(
     name="config",
@@ -26,8 +26,8 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
 
     Exit code 2 when the configuration cannot be used; every problem is named.
     """
-    from rig.config import load_config
-    from rig.config_check import problems
+    from rig.configuration.check import problems
+    from rig.configuration.config import load_config
 
     settings = load_config(path)
     found = problems(settings)
@@ -46,8 +46,8 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
 @config_app.command()
 def show(path: ConfigArgument = None, json: JsonFlag = False) -> None:
     """Show the whole configuration as every log keeps it, defaults and units written out."""
-    from rig.config import load_config
-    from rig.config_text import to_toml
+    from rig.configuration.config import load_config
+    from rig.configuration.text import to_toml
 
     settings = load_config(path)
     if json:
@@ -59,7 +59,7 @@ def show(path: ConfigArgument = None, json: JsonFlag = False) -> None:
 @config_app.command(name="list")
 def list_(json: JsonFlag = False) -> None:
     """List the shipped configurations."""
-    from rig.config import SHIPPED, load_config, shipped_configs
+    from rig.configuration.config import SHIPPED, load_config, shipped_configs
 
     found = {name: load_config(Path(name)).name for name in shipped_configs()}
     if json:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import emit_json, plain, remarks, results
+from rig.output.console import emit_json, plain, remarks, results
 
 
 def diagnose(
@@ -54,10 +54,10 @@ def diagnose(
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters, written_models
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
-    from rig.reports.provenance import Provenance
-    from rig.reports.render import write_report
 
     working = remarks()
     with engine(workers, scheduler) as executor:

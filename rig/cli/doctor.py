@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 ConfigOption = Annotated[
     Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
@@ -17,7 +17,7 @@ def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     Exit code 1 when something must be put right, 0 when there are at most warnings.
     """
-    from rig.config import load_config
+    from rig.configuration.config import load_config
     from rig.doctor.examine import examine
     from rig.doctor.finding import Level, worst
 
@@ -39,8 +39,8 @@ def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
 def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
     """List serial ports, CAN interfaces, installed drivers, and what is configured."""
     from drivers.registry import drivers
-    from rig.config import load_config
-    from rig.config_check import LOGGER
+    from rig.configuration.check import LOGGER
+    from rig.configuration.config import load_config
     from rig.doctor.ports import can_interfaces, serial_ports
 
     settings = load_config(config)
@@ -82,8 +82,8 @@ def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     Nothing moves. Exit code 1 when a check fails.
     """
-    from rig.config import load_config
-    from rig.config_check import refuse_problems
+    from rig.configuration.check import refuse_problems
+    from rig.configuration.config import load_config
     from rig.doctor.selftest import selftest as checks
 
     settings = load_config(config)

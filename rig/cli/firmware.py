@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
@@ -25,8 +25,8 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 
     Exit code 1 when they do not go together.
     """
-    from rig.config import load_config
-    from rig.firmware import compare
+    from rig.bench.firmware import compare
+    from rig.configuration.config import load_config
 
     settings = load_config(config)
     versions = compare(settings)
@@ -44,8 +44,8 @@ def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
 @firmware_app.command()
 def build(board: BoardOption = "", json: JsonFlag = False) -> None:
     """Build the firmware: for the simulated rig, or with --board for a Teensy."""
-    from rig.firmware import build as make
-    from rig.firmware import build_for
+    from rig.bench.firmware import build as make
+    from rig.bench.firmware import build_for
 
     where = build_for(board) if board else make()
     results(json).print(f"Built {where}.", markup=False)
@@ -56,7 +56,7 @@ def build(board: BoardOption = "", json: JsonFlag = False) -> None:
 @firmware_app.command()
 def flash(board: BoardOption = "teensy41", json: JsonFlag = False) -> None:
     """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
-    from rig.firmware import flash as write
+    from rig.bench.firmware import flash as write
 
     write(board)
     results(json).print("Flashed. Next: rig firmware version", markup=False)

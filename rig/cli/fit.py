@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results
+from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -135,8 +135,8 @@ def fit(
     from estimation.fitting import fit as fit_model
     from rig.importers.registry import open_campaign
     from rig.live.estimator import models_in_use
+    from rig.output.table import to_rich
     from rig.reports.first_look import parameter_table
-    from rig.reports.table import to_rich
 
     screen = results(json_)
     campaign = open_campaign(path, format_)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 grasper_app = typer.Typer(
     name="grasper",
@@ -20,7 +20,7 @@ def designs(json: JsonFlag = False) -> None:
     """List every combination of Table 1 of Zhao and Nelson 2016, the most compact one marked."""
     from rig.grasper.wrist import designs as every
     from rig.grasper.wrist import most_compact
-    from rig.reports.table import TextTable, to_rich
+    from rig.output.table import TextTable, to_rich
 
     found = every()
     best = most_compact(found)
@@ -57,8 +57,8 @@ def record(
     All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
     the simulated grasper, with its board in the loop.
     """
+    from rig.grasper.wrist_plant import Wrist, wrist_campaign
     from rig.log.convert import write_recording
-    from rig.simulation.wrist_plant import Wrist, wrist_campaign
 
     out.mkdir(parents=True, exist_ok=True)
     logs = []
@@ -94,8 +94,8 @@ def follow(
     The grasper moves. It starts at its present position, for any position of the master. Ctrl-C
     quits and disarms the motors.
     """
-    from rig.config import load_config
-    from rig.config_check import refuse_problems
+    from rig.configuration.check import refuse_problems
+    from rig.configuration.config import load_config
     from rig.grasper.following import follow_master
 
     settings = load_config(config or Path("grasper"))

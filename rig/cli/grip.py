@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 REACHED_RATIO = 0.1
 """The mean estimate of the second half is this near to the torque, as a share of it."""
@@ -30,13 +30,13 @@ def grip(
     """
     import numpy as np
 
-    from rig.config import load_config
+    from rig.bench.logger import open_logger
+    from rig.bench.session import Session
+    from rig.configuration.config import load_config
     from rig.errors import UsageError
-    from rig.grip import SHARE, hold_grip
     from rig.live.estimator import ModelEstimator
-    from rig.logger import open_logger
-    from rig.session import Session
-    from rig.trajectory import SAMPLE_RATE_HZ
+    from rig.live.grip import SHARE, hold_grip
+    from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
     settings = load_config(config)
     most_a = SHARE * settings.reference_limits.load_command_a

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, results
+from rig.output.console import JsonFlag, results
 
 
 def live(
@@ -44,8 +44,9 @@ def live(
     --protocol. Ctrl-C quits, with the rig in its safe state. With --json, one object per line. In a
     terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q quits.
     """
-    from rig.config import load_config
-    from rig.config_check import refuse_problems
+    from rig.bench.logger import open_logger
+    from rig.configuration.check import refuse_problems
+    from rig.configuration.config import load_config
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
@@ -55,9 +56,8 @@ def live(
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
     from rig.live.watching import watched
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
-    from rig.protocol import load_protocol
+    from rig.protocols.protocol import load_protocol
 
     settings = load_config(config)
     refuse_problems(settings)

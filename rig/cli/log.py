@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet

@@ -109,8 +109,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _report(error: Exception, words: list[str]) -> int:
     """Write an error for people to stderr, for machines to stdout, and return its exit code."""
-    from rig.cli.output import emit_json
     from rig.errors import KNOWN_ERRORS, ExitCode, exit_code_of
+    from rig.output.console import emit_json
 
     if isinstance(error, typer.Abort):
         sys.stderr.write("Interrupted.\n")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 
 def record(
@@ -33,15 +33,20 @@ def record(
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
     from calibration.rules import refuse_errors
-    from rig.config import load_config
-    from rig.config_check import refuse_problems
+    from rig.bench.logger import open_logger
+    from rig.bench.session import Session
+    from rig.configuration.check import refuse_problems
+    from rig.configuration.config import load_config
     from rig.errors import UsageError
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
-    from rig.protocol import load_protocol
-    from rig.record import RunResult, open_campaign_folder, read_manifest, record_campaign
-    from rig.session import Session
-    from rig.watching import watch_runs
+    from rig.protocols.protocol import load_protocol
+    from rig.recording.campaign import (
+        RunResult,
+        open_campaign_folder,
+        read_manifest,
+        record_campaign,
+    )
+    from rig.recording.watch import watch_runs
 
     screen = remarks()
     if resume is not None:

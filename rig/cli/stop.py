@@ -1,7 +1,7 @@
 """`rig stop`: disarm the motors, and report it only after the board has confirmed it."""
 
 from rig.cli.doctor import ConfigOption
-from rig.cli.output import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 
 def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
@@ -11,9 +11,9 @@ def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
     """
     from drivers.errors import DriverError
     from drivers.teensy.driver import TeensyLogger
-    from rig.config import load_config
+    from rig.bench.logger import open_logger
+    from rig.configuration.config import load_config
     from rig.errors import ExitCode
-    from rig.logger import open_logger
     from rig.machines.choose import machine_of
 
     settings = load_config(config)

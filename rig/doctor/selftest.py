@@ -14,11 +14,11 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Trip
-from rig.config import Config
-from rig.devices import openers
+from rig.bench.devices import openers
+from rig.bench.logger import open_logger
+from rig.configuration.config import Config
 from rig.doctor.finding import Level
 from rig.doctor.stream import device_findings
-from rig.logger import open_logger
 from rig.machines.choose import machine_of
 
 ZERO_S = 1.0

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rig import trajectory
-from rig.protocol import Protocol, RunPlan, load_protocol
+from rig.protocols import trajectory
+from rig.protocols.protocol import Protocol, RunPlan, load_protocol
 
 RUNS = 14
 EXCITATIONS = ("usual", "one spring", "constant speed", "rests", "wrist")

@@ -14,10 +14,10 @@ import numpy as np
 
 from estimation.files import write_text_atomic
 from estimation.recording import FloatArray, Instrument, Recording
-from rig import trajectory
 from rig.log.convert import write_recording
-from rig.motion import motion_of
-from rig.protocol import RunPlan
+from rig.protocols import trajectory
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import KINDS, NAMES, HiddenEffect

@@ -21,10 +21,10 @@ from typing import Annotated, Any
 import typer
 
 from estimation.files import write_text_atomic
-from rig.cli.output import JsonFlag, emit_json, results
 from rig.errors import UsageError
-from rig.reports.provenance import Provenance
-from rig.reports.table import to_markdown, to_rich
+from rig.output.console import JsonFlag, emit_json, results
+from rig.output.provenance import Provenance
+from rig.output.table import to_markdown, to_rich
 from tests.blind.generate import CLASSES, Answer, draw, write
 from tests.blind.score import outcome, right
 from tests.blind.summary import counted, tables
@@ -185,7 +185,7 @@ def blind(
     json_: JsonFlag = False,
 ) -> None:
     """Diagnose blind cases and count what comes out."""
-    from rig.cli.output import progress
+    from rig.output.console import progress
 
     places = Places(out)
     wanted = counts_of(counts)

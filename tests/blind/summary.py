@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from rig.reports.table import TextTable
+from rig.output.table import TextTable
 from tests.blind.generate import CLASSES
 from tests.blind.score import OUTCOMES, wilson
 from tests.blind.truths import TRUTHS

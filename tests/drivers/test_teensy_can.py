@@ -17,7 +17,7 @@ from drivers.teensy.can_segments import Joiner, Splitter
 from drivers.teensy.can_transport import CanTransport
 from drivers.teensy.fake import TeensyFake
 from drivers.transport.simulated_can import SimulatedCanBus
-from rig.session import Session
+from rig.bench.session import Session
 from rig.simulation.bench import SimulatedBench
 from tests.drivers.bench_physics import PlainBench
 from tests.rig.simulated import simulated

@@ -9,6 +9,7 @@ import pytest
 from estimation.bank.fitting import AS_GOOD, CHOICES, Normal, Pool, Settings, Shape, chosen, solve
 from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
 from estimation.campaign import Campaign
+from estimation.closing import closing_samples, processed
 from estimation.derived import ago_of, causal_channels, fall_of, rise_of, zero_phase_channels
 from estimation.estimator import load
 from estimation.estimators.adaptation import adapted, evidence
@@ -19,7 +20,6 @@ from estimation.estimators.bank import (
 from estimation.estimators.instrument import InstrumentError
 from estimation.estimators.network import NetworkEstimator
 from estimation.networks.network import Network, NetworkError
-from estimation.oneill import closing_samples, processed
 from estimation.recording import Instrument, Recording
 from tests.estimation.synthetic import campaign
 

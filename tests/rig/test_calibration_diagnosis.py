@@ -7,7 +7,7 @@ import pytest
 
 from rig.calibrate.hands import HandledBench, LoadedRdt
 from rig.cli.main import main
-from rig.config import SIMULATED
+from rig.configuration.config import SIMULATED
 
 
 @pytest.fixture

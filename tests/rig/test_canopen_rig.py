@@ -11,16 +11,16 @@ from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import State
 from drivers.errors import DriverError
 from drivers.transport.simulated_can import SimulatedCanBus
-from rig.canopen_logger import CanopenLogger
-from rig.companions import topic
-from rig.config import Config, load_config
+from rig.bench.companions import topic
+from rig.bench.session import Session
+from rig.canopen.logger import CanopenLogger
+from rig.canopen.simulated import open_simulated_canopen
+from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
 from rig.log.reader import read_log
-from rig.protocol import Protocol
-from rig.record import open_campaign_folder, record_campaign
-from rig.session import Session
-from rig.simulation.canopen import open_simulated_canopen
+from rig.protocols.protocol import Protocol
+from rig.recording.campaign import open_campaign_folder, record_campaign
 
 ANGLE = np.linspace(-1.0, -0.8, 600)
 NO_LOAD = np.zeros(600)

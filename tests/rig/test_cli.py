@@ -10,8 +10,8 @@ import pytest
 from typer.main import get_command
 
 from rig.cli.main import app, main
-from rig.cli.output import plain
 from rig.errors import DataError, ExitCode, UsageError, exit_code_of
+from rig.output.console import plain
 
 
 def test_help_imports_nothing_heavy():

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from rig.cli.main import main
-from rig.config import SIMULATED, load_config
+from rig.configuration.config import SIMULATED, load_config
 
 CERTIFICATE = """
 name = "certificate"
@@ -87,8 +87,8 @@ def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
 
     from calibration.record import Validity
     from calibration.store import CalibrationStore
-    from rig.record import open_campaign_folder, record_campaign
-    from rig.session import Session
+    from rig.bench.session import Session
+    from rig.recording.campaign import open_campaign_folder, record_campaign
     from tests.rig.simulated import short_protocol, simulated, transport
 
     config = simulated()

@@ -8,7 +8,7 @@ import pytest
 from calibration.fsr import ZHANG_2022
 from calibration.store import CalibrationStore
 from rig.cli.main import main
-from rig.config import SIMULATED
+from rig.configuration.config import SIMULATED
 from rig.simulation.parameters import PlantParameters
 
 

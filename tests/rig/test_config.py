@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from rig.cli.main import main
-from rig.config import SIMULATED, load_config, shipped_configs
-from rig.config_check import problems, refuse_problems
-from rig.config_text import to_toml
+from rig.configuration.check import problems, refuse_problems
+from rig.configuration.config import SIMULATED, load_config, shipped_configs
+from rig.configuration.text import to_toml
 from rig.errors import ExitCode, UsageError
 
 

@@ -10,11 +10,11 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.diagnosis.paths import path_of, split_paths
 from estimation.recording import Recording
+from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 from rig.cli.main import main
 from rig.diagnosis import subject
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.schema import DiagnosisSchema
-from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 

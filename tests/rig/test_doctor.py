@@ -14,9 +14,9 @@ from drivers.teensy.fake import TeensyFake
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.faulty import Fault, Faults
 from drivers.transport.simulated import SimulatedTransport
-from rig import firmware
+from rig.bench import firmware
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.doctor.examine import examine
 from rig.doctor.finding import Finding, Level, worst
 from rig.doctor.ports import Port, can_interfaces, port_findings
@@ -205,9 +205,7 @@ def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(
 ) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(
-        (Path(firmware.__file__).parent / "configs" / "reference.toml")
-        .read_text()
-        .replace("usb:16c0:0483", "/dev/nonesuch")
+        (SHIPPED / "reference.toml").read_text().replace("usb:16c0:0483", "/dev/nonesuch")
     )
     code, result = told(capsys, ["doctor", "-c", str(path)])
     assert code == ExitCode.FAILED

@@ -11,11 +11,11 @@ from calibration.linear import shipped_calibration_set
 from drivers.teensy.protocol import STATUS_ARMED, TOP, SafeState, Trip, TripReport
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
+from rig.bench.session import Session
+from rig.bench.trips import WORDS, HostWatch, trip_error
 from rig.errors import ExitCode, SafetyTripError, exit_code_of
 from rig.machines.reference import ReferenceMachine
-from rig.safety import board_limits, check_samples
-from rig.session import Session
-from rig.trips import WORDS, HostWatch, trip_error
+from rig.machines.safety import board_limits, check_samples
 from tests.rig.simulated import Wrapped, is_armed, simulated, transport
 
 HOLD = np.full(3000, -1.0)

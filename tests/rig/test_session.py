@@ -15,9 +15,9 @@ from drivers.teensy.protocol import (
 )
 from drivers.transport.simulated import SimulatedTransport
 from estimation.recording import Flag
+from rig.bench.session import LoggerStalledError, Session
 from rig.errors import ExitCode, SafetyTripError, exit_code_of
-from rig.reading import reading_of, with_setpoints
-from rig.session import LoggerStalledError, Session
+from rig.machines.reading import reading_of, with_setpoints
 from tests.rig.simulated import Wrapped, is_armed, simulated, transport
 
 HOLD = np.full(600, -1.0)

@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rig.cli.study import study_app
-from rig.studies import delsol
-from rig.studies.delsol_diagnosis import PULLS
+from rig.studies.delsol import study as delsol
+from rig.studies.delsol.diagnosis import PULLS
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 

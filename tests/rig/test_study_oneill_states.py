@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
-from rig.reports import oneill_goals as goals
-from rig.reports import oneill_states as shown
-from rig.studies import oneill_states
-from rig.studies.oneill_paper import DISTAL, JAW, PROXIMAL
-from rig.studies.oneill_state_rows import StateJob, ablated
-from rig.studies.oneill_states import run_states
+from rig.studies.oneill import goals
+from rig.studies.oneill import states as oneill_states
+from rig.studies.oneill import states_page as shown
+from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
+from rig.studies.oneill.state_rows import StateJob, ablated
+from rig.studies.oneill.states import run_states
 from tests.estimation.synthetic import campaign
 
 EFFECT = "load of the last 0.5 s"

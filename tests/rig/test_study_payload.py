@@ -11,10 +11,10 @@ from estimation.arm.payload import carried_torque
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM, PointMass
 from estimation.recording import Recording
+from rig.arm.payload import find_payload
+from rig.arm.simulated import draw_arm
 from rig.cli.main import main
 from rig.cli.study import study_app
-from rig.simulation.arm import draw_arm
-from rig.studies.payload import find_payload
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 

@@ -13,10 +13,11 @@ from estimation.arm.tables import PSM
 from estimation.arm.wrist import candidates
 from estimation.campaign import Campaign
 from estimation.recording import Recording
+from rig.arm import search as arm_search
 from rig.cli.study import study_app
 from rig.errors import DataError
 from rig.importers.dvrk_psm import MOTOR_TO_JOINT
-from rig.studies import arm_search, pique
+from rig.studies.pique import study as pique
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 

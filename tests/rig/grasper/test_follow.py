@@ -12,17 +12,17 @@ from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy_master.fake import MIDDLE, REACH, open_fake
 from drivers.transport.faulty import Faults
+from rig.bench.firmware import source_hash
+from rig.bench.logger import open_logger
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.errors import ExitCode, UsageError
-from rig.firmware import source_hash
 from rig.grasper import following
 from rig.grasper.coupling import GrasperError
 from rig.grasper.follow import setpoints
+from rig.grasper.machine import axes_of_joints
 from rig.grasper.master import master_of
 from rig.log.reader import read_log
-from rig.logger import open_logger
-from rig.machines.grasper import axes_of_joints
 from tests.rig.simulated import is_armed
 
 CHIEF = master_of(load_config(Path("grasper")))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.cli.main import main
-from rig.simulation.wrist_plant import Wrist, play_wrist
+from rig.grasper.wrist_plant import Wrist, play_wrist
 
 
 def diagnosed(folder, *, pulley_ratio, seed=3):
