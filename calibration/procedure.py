@@ -30,8 +30,8 @@ class Step:
     Attributes:
         name: Name of the run, unique in the session.
         conditions: What is set, numbers in SI with the unit in the name; kept in the raw log.
-        instruction: What a person has to do first; empty where the rig needs no hands.
-        duration_s: How long to measure a rig that is not moved.
+        instruction: Instruction for a person before the step; empty if none is needed.
+        duration_s: Time to measure a rig that is not moved.
         target_angle_rad: Spindle trajectory at 1 kHz, shape (n,); None where nothing moves.
         load_command_a: Load current at 1 kHz, shape (n,); None where nothing moves.
     """
@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a step gave.
+    """Measurement of one step.
 
     Attributes:
         recording: Channels in SI units and the step's conditions. Sensors are tared once,
@@ -98,7 +98,7 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Conclusion:
-    """What a session came to.
+    """Result of a session.
 
     Attributes:
         results: The calibrations.
@@ -154,7 +154,7 @@ class Operator(Protocol):
 
 
 class Bench(Protocol):
-    """What measures a step."""
+    """The measuring part of a step."""
 
     def measure(self, step: Step) -> Measurement:
         """Play the step's trajectory, or read the rig at rest for the step's duration."""

@@ -85,7 +85,7 @@ def check_rails(
         values: Readings, shape (n,).
         low: Lower rail; None if rest is there anyway.
         high: Upper rail; None if unknown.
-        name: What they are.
+        name: Name.
         pile_up: Whether to look for the pile-up; off for readings at rest, which are all alike.
     """
     for rail, at_rail in (

@@ -1,4 +1,4 @@
-"""What happened on the way to a device, and the numbers of samples that come without any."""
+"""Counters of the link to a device, and numbers for samples without any."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from drivers.link import LinkCounters
 
 @dataclass(slots=True)
 class DeviceCounters(LinkCounters):
-    """What happened on a link since it was opened; see also `drivers.link.LinkCounters`.
+    """Counters of a link since it was opened; see also `drivers.link.LinkCounters`.
 
     `crc_errors` counts checksums that do not fit, whatever their kind.
 
@@ -33,7 +33,7 @@ class Arrivals:
     """Numbers the samples of a stream that does not, and notices its silences.
 
     Args:
-        counters: Where silences are counted.
+        counters: Counters to add silences to.
         longest_silence_s: Longest time between samples that is not a fault, s.
     """
 

@@ -1,4 +1,4 @@
-"""What every driver offers: typed channels, an identity, and samples in batches.
+"""Interface of all drivers: typed channels, an identity, and samples in batches.
 
 A driver is made from an open link, controls one device, and does nothing in the background: time
 passes in `read`. Simulation swaps the link and nothing else.
@@ -37,7 +37,7 @@ class Channel:
         rate_hz: Nominal sample rate.
         lower: Lowest value the device can give, in `unit`; minus infinity where it is not known.
         upper: Highest value the device can give.
-        description: What it is, in a few words.
+        description: Description in a few words.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Device(Protocol):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """What happened on the link since it was opened.
+        """Counters of the link since it was opened.
 
         `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
         """

@@ -18,7 +18,7 @@ REPLY_TIMEOUT_S = 0.1
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What happened on a link since it was opened.
+    """Counters of a link since it was opened.
 
     Attributes:
         frames: Good frames received.

@@ -127,7 +127,7 @@ def open_device(name: str, url: str, **options: Any) -> Device:
 
     Args:
         name: Name of the driver.
-        url: Where the device is.
+        url: URL of the device.
         **options: The driver's own options.
 
     Raises:

@@ -21,7 +21,7 @@ class SlidingFrames:
     Args:
         size: Bytes of a frame.
         check: The checksum.
-        counters: Where frames, bad ones and discarded bytes are counted.
+        counters: Counters of frames, bad ones and discarded bytes.
         agree: Frames in a row that must hold.
     """
 

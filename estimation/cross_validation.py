@@ -76,7 +76,7 @@ def closing_score(
     """Return the error of a recipe's estimators on closing samples, each run held out once.
 
     Args:
-        recipe: What is fitted on all folds but one.
+        recipe: The estimator to fit.
         campaign: The runs.
         folds: Number of folds.
         seed: Seed of the folds.

@@ -127,7 +127,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a model was fitted on, and how well.
+    """Data and errors of a model's fit.
 
     Attributes:
         runs: Names of the runs.
@@ -161,13 +161,13 @@ class Model:
         balance: Id of the equation, see `BALANCES`.
         target: Channel that is estimated.
         terms: The effects.
-        description: What it is and where it comes from.
+        description: Description and origin.
         low_pass: Filter of every channel.
         run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
             zero drifts. Not where the runs differ by what is to be estimated, such as a load that
             is held within a run.
         counted: Which samples count, or None for what suits the effects; see `samples`.
-        evidence: What it was fitted on, or None for a declared model.
+        evidence: Data and errors of the fit, or None for a declared model.
     """
 
     name: str

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Flag(IntFlag):
-    """What is wrong with one sample; 0 is a valid sample."""
+    """Faults of one sample; 0 is a valid sample."""
 
     VALID = 0
     SATURATED = 1  # a sensor or converter at its limit
@@ -36,7 +36,7 @@ class Stretch:
     Attributes:
         start_s: Time of the first flagged sample, s.
         stop_s: Time of the last flagged sample, s.
-        flag: What is wrong.
+        flag: The fault.
         reason: Reason, in words that a person can act on.
         channel: The channel concerned, or None for all of them.
     """
@@ -101,7 +101,7 @@ class Recording:
         time_s: Device clock, shape (n,), strictly increasing.
         columns: Channel name to values, each of shape (n,), SI units.
         flags: Per-sample `Flag` bits, shape (n,), uint8.
-        conditions: What was held constant, numbers in SI with the unit in the name
+        conditions: Constant conditions, numbers in SI with the unit in the name
             (`load_command_a`, `frequency_hz`) or words.
         rig: Name of the rig.
         instrument: Identity of the instrument.
@@ -110,7 +110,7 @@ class Recording:
         stretches: Flagged segments with their reasons.
         started_at_ns: Start of the run, ns since the Unix epoch, or None when not recorded.
         calibrations: Calibration name to content hash.
-        source: Where it was read from.
+        source: File it was read from.
         excluded: Reason for excluding the run, or None when it counts.
     """
 

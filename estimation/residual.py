@@ -71,7 +71,7 @@ class RunResidual:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """How much of a residual goes with one variable.
+    """Dependence of a residual on one variable.
 
     Attributes:
         variable: Name of the variable, see `VARIABLES`.

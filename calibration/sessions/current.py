@@ -32,7 +32,7 @@ class CurrentSession:
     Attributes:
         loads_a: Loads to move against.
         speeds_rad_s: Speeds of the spindle.
-        repeats: How often each is moved.
+        repeats: Number of moves of each.
         motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
         gear_ratio: Ratio of the gear by its label.
         residual_limit: Greatest residual that passes, share of the span of torque.

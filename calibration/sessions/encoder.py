@@ -49,7 +49,7 @@ class EncoderSession:
     Attributes:
         encoder: `spindle`, against the motor's encoder, or `jaw`, against the spindle's.
         loads_a: Loads of the moves.
-        repeats: How often each is moved.
+        repeats: Number of moves of each.
         line_only: Model no periodic error.
     """
 

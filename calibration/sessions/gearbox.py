@@ -40,7 +40,7 @@ class GearboxSession:
     Attributes:
         loads_a: Loads of both signs.
         speeds_rad_s: Speeds of the spindle.
-        repeats: How often each is moved.
+        repeats: Number of moves of each.
         gear_ratio: Motor turns a turn of the spindle.
         stiffness_only: Model no backlash.
     """

@@ -76,7 +76,7 @@ class AtiCan:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the bus, as far as this sensor is concerned, and to the bus itself."""
+        """Counters of this sensor's frames, and of the bus."""
         bus = self._bus.counters
         trouble = {"error_frames": bus.error_frames, "overruns": bus.overruns}
         return self._counters.as_dict() | trouble

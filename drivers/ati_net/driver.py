@@ -77,7 +77,7 @@ class AtiNet:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the network."""
+        """Counters of the network."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
@@ -191,7 +191,7 @@ def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 100
     """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
 
     Args:
-        url: Where it is; the port is 49152 on every such device.
+        url: URL; the port is 49152 on every such device.
         rate_hz: The RDT rate set on its web page, 1 to 7000.
 
     Raises:

@@ -68,7 +68,7 @@ N_M_PER_UNIT = {1: 0.1129848290276167, 2: 1.3558179483314004, 3: 1.0, 4: 1e-3, 5
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How counts become forces and torques.
+    """Conversion of counts to forces and torques.
 
     Attributes:
         force_unit: Code of the force unit.

@@ -14,7 +14,7 @@ class RecordSequence:
     """The thread through a stream of records that may be lost, repeated or overtaken.
 
     Args:
-        counters: Where it is counted.
+        counters: Counters of its errors.
     """
 
     def __init__(self, counters: DeviceCounters) -> None:

@@ -95,7 +95,7 @@ class AtiSerial:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line."""
+        """Counters of the line."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:

@@ -32,7 +32,7 @@ _CALIBRATION = struct.Struct(">8s32s4s20s144sBB24sII6H6H")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """How gauges become forces and torques.
+    """Conversion of gauges to forces and torques.
 
     Attributes:
         serial: Serial number.

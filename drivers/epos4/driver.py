@@ -114,7 +114,7 @@ class Epos4:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened to this drive's frames, and to the bus itself."""
+        """Counters of this drive's frames, and of the bus."""
         counters = self._counters.as_dict()
         counters["retries"] += self._link.retries
         counters["timeouts"] += self._link.timeouts

@@ -26,7 +26,7 @@ class TeensyDevice:
     Args:
         transport: The way to the board; the device closes it.
         wired: Meaning of the fields of a sample; raw counts by default.
-        profile: What the board samples.
+        profile: Samples of the board.
     """
 
     name = "teensy"

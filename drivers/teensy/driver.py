@@ -82,7 +82,7 @@ class TeensyLogger:
 
     Args:
         transport: The way to the board; the logger closes it.
-        profile: What the board samples and moves.
+        profile: Samples and motors of the board.
     """
 
     def __init__(self, transport: Transport, profile: Profile = REFERENCE) -> None:
@@ -109,7 +109,7 @@ class TeensyLogger:
 
     @property
     def counters(self) -> LinkCounters:
-        """What happened on the link."""
+        """Counters of the link."""
         return self._link.counters
 
     def identify(self) -> Identity:

@@ -53,7 +53,7 @@ class FirmwareBoard:
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         library: The shared library; the built one when None.
-        profile: What the board samples and moves.
+        profile: Samples and motors of the board.
 
     Raises:
         FirmwareMissingError: The library is missing.

@@ -44,7 +44,7 @@ class CanFrame:
 
 @dataclass(slots=True)
 class CanCounters:
-    """What happened on a bus since it was opened.
+    """Counters of a bus since it was opened.
 
     Attributes:
         received: Data frames received.
@@ -84,7 +84,7 @@ class CanBus(Protocol):
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         ...
 
     def send(self, frame: CanFrame) -> None:

@@ -41,7 +41,7 @@ class LiveCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._bus.counters
 
     def send(self, frame: CanFrame) -> None:

@@ -91,7 +91,7 @@ class PythonCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._counters
 
     def send(self, frame: CanFrame) -> None:

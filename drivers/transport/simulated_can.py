@@ -59,7 +59,7 @@ class SimulatedCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._counters
 
     def send(self, frame: CanFrame) -> None:

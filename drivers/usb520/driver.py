@@ -48,7 +48,7 @@ class Usb520:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line; bad lines are `crc_errors`."""
+        """Counters of the line; bad lines are `crc_errors`."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:

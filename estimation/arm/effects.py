@@ -44,8 +44,8 @@ class ArmEffect:
     """One effect, as further columns of the torque regressor.
 
     Attributes:
-        name: What it is called, with its joint.
-        what: What it is, in one line.
+        name: Name, with its joint.
+        what: Description in one line.
         columns: Columns along a motion, shape (n, rows, parameters).
         dissipative: Whether physics forbids negative parameters.
         damping: How many times the common damping its fit gets.

@@ -20,7 +20,7 @@ class Block:
     """Columns that belong together: the base, or one effect.
 
     Attributes:
-        name: What they are.
+        name: Name.
         at: Their places among all columns.
         dissipative: Of each, whether it cannot be negative.
         damping: Damping relative to the squared length of the block's columns: of each column

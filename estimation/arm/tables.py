@@ -35,7 +35,7 @@ class Joint:
     """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         kind: How it moves.
         row: Where it sits.
         lower: Lower end of its range.
@@ -88,7 +88,7 @@ class PointMass:
     """A mass fixed to a link, in addition to the link's own parameters.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         link: The link it is fixed to, from 1.
         point_m: Where, in the link's frame, m.
         mass_kg: How much.
@@ -105,7 +105,7 @@ class Tool:
     """A tool mounted on the last link: its tip and its masses.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         tip: The fixed row from the last joint's frame to the tool's tip.
         masses: Its masses.
     """
@@ -120,13 +120,13 @@ class Arm:
     """An arm: its joints in a row, and the bodies of its loops where it has any.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         joints: From the base to the tip.
         tip: The fixed row from the last joint's frame to the tip's.
         viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of
             the first by the speed of the second.
         gravity_m_s2: Gravity in the base frame.
-        source: Where the numbers come from.
+        source: Source of the numbers.
         wrist: First joint (from 0) that cables drive from coupled motors, or None.
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
         loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;

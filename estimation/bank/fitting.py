@@ -23,7 +23,7 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How weights are found.
+    """Settings of the fit of the weights.
 
     Attributes:
         ridge: Penalty on a squared weight in units of its column's variance, a sample.
@@ -176,7 +176,7 @@ def solve(pool: Pool, shape: Shape, settings: Settings) -> FloatArray:
 
     Args:
         pool: The runs to fit.
-        shape: What the columns are.
+        shape: Properties of the columns.
         settings: How.
     """
     share, scale = settings.offset_share, pool.spread
@@ -209,7 +209,7 @@ def chosen(whole: Pool, folds: Sequence[Pool], shape: Shape) -> Settings:
     Args:
         whole: The runs to fit, of one target; nothing else is looked at.
         folds: The same runs in parts.
-        shape: What the columns are.
+        shape: Properties of the columns.
     """
 
     def loss(settings: Settings) -> float:

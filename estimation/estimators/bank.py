@@ -344,7 +344,7 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
     """Return the error on runs not fitted, each held out once; flagged samples are left out.
 
     Args:
-        recipe: What is fitted.
+        recipe: The estimator to fit.
         campaign: The runs; excluded ones are left out.
         folds: Number of folds, at least 2.
         seed: Seed of the folds.

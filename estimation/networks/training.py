@@ -30,7 +30,7 @@ BLOCK = 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a network is trained.
+    """Settings of the training.
 
     Attributes:
         nodes: Hidden nodes.
@@ -49,7 +49,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """How a training went.
+    """Result of a training.
 
     Attributes:
         network: The trained network.

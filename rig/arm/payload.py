@@ -49,7 +49,7 @@ class Payload:
         height_m: Height of the mass above the remote centre, m.
         height_error_m: Its standard error, m.
         runs: Names of the runs.
-        masses: What was found on each.
+        masses: Estimated mass on each.
         provenance: When and from what this was made.
     """
 

@@ -35,7 +35,7 @@ def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) ->
 
     Args:
         path: The path, prepared with these effects.
-        run: What it was prepared from.
+        run: The original run.
         tried: The candidates.
     """
     samples = np.arange(len(path.torque))

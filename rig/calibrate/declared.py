@@ -50,8 +50,8 @@ def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) 
 
     Args:
         kind: Kind of calibration.
-        result: What it came to.
-        measurements: What it came from, in the order of the steps.
+        result: Its result.
+        measurements: Its measurements, in the order of the steps.
 
     Raises:
         UsageError: Nothing is known of the kind.

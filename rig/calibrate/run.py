@@ -39,8 +39,8 @@ class Kept:
 
     Attributes:
         records: The records, by hash.
-        folder: Where their raw logs are.
-        conclusion: What the session came to.
+        folder: Folder of their raw logs.
+        conclusion: Conclusion of the session.
     """
 
     records: dict[str, CalibrationRecord]

@@ -1,4 +1,4 @@
-"""What a configuration that is well written may still get wrong: drivers, options, CAN buses."""
+"""Checks of a valid configuration: drivers, options, CAN buses."""
 
 import inspect
 from collections.abc import Mapping
@@ -24,8 +24,8 @@ class Problem:
 
     Attributes:
         key: The part of the configuration it stands in.
-        what: What is wrong.
-        fix: What to write in its place.
+        what: The fault.
+        fix: Replacement.
     """
 
     key: str

@@ -53,7 +53,7 @@ class _Section(BaseModel):
 
 
 class LoggerSection(_Section):
-    """What moves the rig and samples it, and where it is found.
+    """The board or drive that moves and samples the rig, and its URL.
 
     Attributes:
         driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
@@ -63,7 +63,7 @@ class LoggerSection(_Section):
         options: The driver's own options.
         bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
             with from the factory if none.
-        profile: What the board samples and moves: the reference rig, or the 3-DOF grasper.
+        profile: Samples and motors of the board: the reference rig, or the 3-DOF grasper.
     """
 
     driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
@@ -78,7 +78,7 @@ class DeviceSection(_Section):
 
     Attributes:
         driver: Name of its driver; `rig devices` lists them.
-        url: Where it is; `sim://` for its fake.
+        url: URL; `sim://` for its fake.
         options: The driver's own options.
         bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
             from the factory if none.
@@ -148,12 +148,12 @@ AnyLimits = Annotated[
 
 
 class SafetySection(_Section):
-    """What is watched besides the limits, by the board first and by this computer again; on always.
+    """Monitors in addition to the limits, on the board and again on this computer; always on.
 
     A time or a heat of 0 switches its watch off.
 
     Attributes:
-        safe_state: What the drive motor does once something tripped: `release`, no current; or
+        safe_state: State of the drive motor after a trip: `release`, no current; or
             `hold`, stay where it stands with a low command, where encoder and current are sound.
         hold_command_ratio: Largest command while holding, of full scale.
         continuous_current_a: Motor current that warms the motor no further.
@@ -216,7 +216,7 @@ class MasterSection(_Section):
     """The master a grasper follows: potentiometers of yaw, pitch and grasp.
 
     Attributes:
-        url: Where it is, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
+        url: URL, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
         zero_counts: Counts of the converter at each joint's zero.
         rad_per_count: Turn of each joint for a count, negative where it is mounted the other way
             round; by default a potentiometer of 300 degrees over 12 bits.

@@ -12,7 +12,7 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
     """Return one sentence a problem: the key's path, the message, the nearest known key.
 
     Args:
-        error: What pydantic found.
+        error: Error of pydantic.
         known: Keys to suggest for one that does not exist.
     """
     sentences = []

@@ -15,7 +15,7 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
     """Yield findings as they are made.
 
     Args:
-        config: What should be there.
+        config: The expected configuration.
         root: Root of the file system, for the files of the operating system.
     """
     wrong = problems(config)

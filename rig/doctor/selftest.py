@@ -29,10 +29,10 @@ LATEST_TRIP_S = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What came of one check.
+    """Result of one check.
 
     Attributes:
-        name: What was checked.
+        name: Name of the check.
         passed: Whether it holds.
         detail: Numbers, or what went wrong.
     """

@@ -35,7 +35,7 @@ def setpoints(
         master: The master's potentiometers, started.
         chief: What their counts mean.
         here: Where yaw, jaw 1 and jaw 2 stand, closing positive, rad.
-        duration_s: How long to follow, s.
+        duration_s: Time to follow, s.
         scale: Angle of a joint for an angle of the master.
 
     Yields:

@@ -25,7 +25,7 @@ ZEROS_S = 0.5
 
 @dataclass(slots=True)
 class Followed:
-    """What one motor did.
+    """Motion of one motor.
 
     Attributes:
         axis: `yaw`, `jaw_1` or `jaw_2`.
@@ -67,9 +67,9 @@ def follow_master(
     Args:
         config: Of a grasper.
         url: URL of the master; from the configuration if None.
-        duration_s: How long.
+        duration_s: Duration.
         scale: Angle of a joint for an angle of the master.
-        folder: Where the log goes.
+        folder: Folder of the logs.
         on_time: Told how long it has followed, s.
 
     Returns:

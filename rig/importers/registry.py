@@ -14,7 +14,7 @@ from rig.errors import DataError, UsageError
 
 @runtime_checkable
 class Importer(Protocol):
-    """What a format's importer offers."""
+    """Interface of a format's importer."""
 
     name: str
     """Short name of the format, as typed on the command line."""

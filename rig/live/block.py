@@ -1,4 +1,4 @@
-"""What the display consumes: a block of samples and what was known when it arrived."""
+"""Input of the display: a block of samples and the state at its arrival."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class LimitStatus:
     """One watched quantity and how far it may go.
 
     Attributes:
-        name: What is limited.
+        name: Limited quantity.
         value: Its value now; the limit holds in both directions.
         limit: The magnitude that trips the rig, positive.
         unit: Unit of both.

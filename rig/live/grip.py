@@ -50,10 +50,10 @@ class Grip:
     """The controller: returns the next setpoints and takes the readings.
 
     Args:
-        torque_n_m: What to hold.
+        torque_n_m: Set point.
         centre_rad: Where the spindle moves to and fro.
         most_a: Greatest load it may ask for.
-        duration_s: How long to hold.
+        duration_s: Time to hold.
     """
 
     def __init__(
@@ -103,8 +103,8 @@ def hold_grip(
     Args:
         session: An open session; the rig moves.
         estimator: Estimates the jaw's torque from motor channels; has seen nothing yet.
-        torque_n_m: What to hold, closing positive.
-        duration_s: How long.
+        torque_n_m: Set point, closing positive.
+        duration_s: Duration.
 
     Raises:
         UsageError: The torque is not within the limits, or not what is estimated.

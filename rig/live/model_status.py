@@ -68,7 +68,7 @@ def with_model_status(
 
     Args:
         blocks: The stream. It is closed when this one is.
-        estimators: What made its estimates.
+        estimators: The estimators of its estimates.
     """
     status = ModelStatus([e.model for e in estimators if e.model is not None])
     try:

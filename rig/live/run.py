@@ -28,7 +28,7 @@ def show(
     Args:
         blocks: The stream. A generator is closed on the way out, before anything else is done.
         options: How to show it.
-        console: Where people read.
+        console: Console of the user.
         clock: Monotonic time, s; only for silence and for frames that cost too much.
     """
     state = LiveState(options.channels)

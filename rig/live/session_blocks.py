@@ -40,7 +40,7 @@ def session_blocks(
         plans: Runs to play one after the other; without any, the rig is only watched.
         estimators: Streams before their first sample; empty for none.
         keys: Keys pressed; see `rig.live.keys`.
-        folder: Where recordings go that a key starts.
+        folder: Folder of the recordings started by a key.
     """
     with Session(config, open_transport()) as session:
         session.take_zeros(ZERO_S)

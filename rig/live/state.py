@@ -96,7 +96,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a whole stream came to.
+    """Summary of a whole stream.
 
     Attributes:
         ended: `finished` when the stream ended, `interrupted` when a person left.

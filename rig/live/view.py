@@ -40,10 +40,10 @@ class View:
     """A snapshot as rich renders it. Fits the width; the traces take what height is left.
 
     Attributes:
-        snapshot: What to show.
-        title: What is being shown: a session's or a recording's name.
+        snapshot: Content of the display.
+        title: Title: a session's or a recording's name.
         lever_m: Lever arm from the jaw's axis to its tip, m.
-        footer: What a person can do.
+        footer: Available keys.
         half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
     """
 

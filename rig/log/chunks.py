@@ -33,7 +33,7 @@ _MESSAGE = struct.Struct("<BQH")
 
 @dataclass(frozen=True)
 class Layout:
-    """What a message record of one channel looks like."""
+    """Layout of a message record of one channel."""
 
     topic: str
     stream: Stream
@@ -93,7 +93,7 @@ class _Batch:
 
 @dataclass
 class _Read:
-    """What came of a batch."""
+    """Result of a batch."""
 
     pieces: list[tuple[int, _Target]] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)

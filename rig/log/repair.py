@@ -21,7 +21,7 @@ class RepairError(DataError):
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What a repair did.
+    """Result of a repair.
 
     Attributes:
         original: The damaged log, unchanged.
@@ -30,7 +30,7 @@ class RepairReport:
         recovered: Topic to the samples recovered.
         lost: Topic to the samples known to be lost, from sequence numbers, plan and recorder.
         salvaged: Topic to those of the recovered samples that no checksum vouches for.
-        problems: What was wrong with the original, in words.
+        problems: Faults of the original, in words.
     """
 
     original: Path

@@ -65,7 +65,7 @@ class Damage:
     Attributes:
         offset: Byte it starts at.
         length: Bytes affected; 0 where something is missing.
-        what: What is wrong there.
+        what: The fault there.
     """
 
     offset: int

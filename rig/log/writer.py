@@ -65,8 +65,8 @@ class LogWriter:
     `discard` do it by hand.
 
     Args:
-        path: Where the log shall be, ending in `.mcap`.
-        run: What is known about the run; written at once.
+        path: Path of the log, ending in `.mcap`.
+        run: Metadata of the run; written immediately.
         streams: Streams of the log.
         attachments: Files to carry, such as the configuration and the calibrations.
         clock: Monotonic clock, s.
@@ -230,7 +230,7 @@ class LogWriter:
         """Write what is known at the end, finish the file, and give it its name.
 
         Args:
-            end: What is known at the end; a clean end when None.
+            end: Metadata of the end; a clean end when None.
 
         Returns:
             Path of the log.

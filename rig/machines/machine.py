@@ -25,7 +25,7 @@ class MachinePlan(Protocol):
 
     @property
     def conditions(self) -> dict[str, float | str]:
-        """What is held constant in the run."""
+        """The constant conditions of the run."""
 
     @property
     def samples(self) -> int:
@@ -56,7 +56,7 @@ class Machine(Protocol):
     """One kind of rig.
 
     Attributes:
-        profile: What its board samples and moves.
+        profile: Samples and motors of its board.
         counts: Stream of its raw counts in a log.
         setpoint_channels: Channel whose calibration makes counts of each field of a setpoint.
         channels_of_inputs: Channel of each input of the board.

@@ -1,4 +1,4 @@
-"""What a session reads: a stretch of samples, as counts and in SI units."""
+"""Readings of a session: a segment of samples, as counts and in SI units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What the command line writes: results on stdout, progress, remarks and errors on stderr.
+"""Output of the command line: results on stdout, progress, remarks and errors on stderr.
 
 With `--json` stdout carries JSON alone, and results for people go to stderr.
 """

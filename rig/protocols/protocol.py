@@ -36,7 +36,7 @@ class RunPlan:
         name: Name of the run, unique in its protocol.
         target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
         load_command_a: Load motor current at 1 kHz, shape (n,).
-        conditions: What is held constant in the run.
+        conditions: Constant conditions of the run.
     """
 
     name: str
@@ -233,7 +233,7 @@ class Protocol(BaseModel):
 
     Attributes:
         name: Name of the protocol.
-        description: What it is for.
+        description: Purpose.
         runs: Tables that expand into runs.
     """
 

@@ -48,7 +48,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What became of one run.
+    """Outcome of one run.
 
     Attributes:
         name: Name of the run.
@@ -180,7 +180,7 @@ def record_campaign(
     Args:
         session: An open session.
         plans: The runs.
-        folder: Where the logs go.
+        folder: Folder of the logs.
         notes: Operator's notes, kept in every log.
         on_progress: Told of the samples as they come.
     """

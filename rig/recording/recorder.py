@@ -20,7 +20,7 @@ class LiveRecorder:
 
     Args:
         session: The session.
-        folder: Where logs go.
+        folder: Folder of the logs.
         kind: What is recorded; a log is named after it.
     """
 

@@ -57,7 +57,7 @@ class Kind:
 
     Attributes:
         name: Name in the configuration.
-        description: What it is and what shapes it.
+        description: Description and shape parameters.
         shapes: Up to two numbers of its row.
         weakest: Smallest strength `draw` gives.
         strongest: Largest strength `draw` gives.

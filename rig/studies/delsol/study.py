@@ -105,7 +105,7 @@ def run_delsol(
     """Do the study on arms of several seeds, from 0.
 
     Args:
-        seeds: How many.
+        seeds: Number of seeds.
         state: Folder where the outcome of each seed is kept.
         workers: Processes; each does one seed.
         on_seed: Called after each seed, also after one that was kept.

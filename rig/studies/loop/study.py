@@ -151,7 +151,7 @@ class LoopStudy:
         rows: One a task.
         sealed: The split, the same for every task.
         left_out: Runs left out of evidence, with the reason.
-        source: Where the data came from.
+        source: Source of the data.
         provenance: When, from which commit and seed.
     """
 

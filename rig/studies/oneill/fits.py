@@ -118,7 +118,7 @@ def held_out(splits: list[Split], channels: Iterable[str], fitter: Fitter) -> Ta
     Args:
         splits: Splits of a campaign of closing samples; see `Campaign.folds`.
         channels: Channels the fitter needs, and any others wanted in the table.
-        fitter: What is fitted.
+        fitter: The estimator to fit.
 
     Returns:
         The channels, `TARGET` and `ESTIMATE` of all test runs, N m for the last two.

@@ -28,7 +28,7 @@ UNSEEN, LAG = 1.15, 1.2
 
 @dataclass(frozen=True)
 class Reached:
-    """What one estimate reaches.
+    """Result of one estimate.
 
     Attributes:
         live: On runs not seen, every filter causal.

@@ -61,7 +61,7 @@ class Job:
             with physical states, and `causal` for the last of them on channels filtered as live.
         surrogate: Key of `SURROGATES`.
         protocol: As for `held_out_masks`.
-        targets: What is estimated.
+        targets: Estimated channels.
     """
 
     pose: str

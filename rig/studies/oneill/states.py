@@ -33,7 +33,7 @@ FOLDS = 5
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
 DRAWN = (Bank(LOADS["command"]), "live")
-"""What the figures show."""
+"""Content of the figures."""
 
 
 @dataclass(frozen=True)

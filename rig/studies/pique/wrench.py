@@ -124,7 +124,7 @@ def run_wrench_study(
     """Do the study on arms of several seeds.
 
     Args:
-        seeds: How many; from 0.
+        seeds: Number of seeds; from 0.
         state: Folder where the outcome of each seed is kept.
         workers: Processes at once.
         on_seed: Called after each seed, also after one that was kept.
