@@ -92,7 +92,7 @@ def test_an_interface_that_echoes_is_freed_of_it(other: can.BusABC) -> None:
 
 
 class BrokenBus(can.BusABC):
-    """An interface that raises what it is told to."""
+    """An interface that raises a given error."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(channel=None)

@@ -1,4 +1,4 @@
-"""Excitation within limits at every instant, and better told parameters than at the start."""
+"""Excitation within limits at every instant, and a better condition than at the start."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The simulated twin: the declared model played with the references and noise of a recording."""
+"""The simulated null: the declared model with the references and noise of a recording."""
 
 import pickle
 from dataclasses import replace

@@ -34,7 +34,7 @@ class AcmeImporter:
 
 @pytest.fixture
 def installed(monkeypatch):
-    """Install entry points beside the project's own, as a package would."""
+    """Install entry points in addition to the project's own, as a package would."""
 
     def _install(**values):
         entries = [EntryPoint(n, v, "rig.importers") for n, v in {**OWN, **values}.items()]
