@@ -37,9 +37,10 @@ def calibrate() -> None:
 class Keeping:
     """How a session is run and kept: the options that every command has."""
 
-    operator: Annotated[str, typer.Option(help="Who calibrates; kept in the record.")]
+    operator: Annotated[str, typer.Option(help="Name of the operator, stored in the record.")]
     config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration; by default the simulated rig."),
     ] = None
     store: Annotated[
         Path | None,
@@ -49,16 +50,19 @@ class Keeping:
     ] = None
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the raw logs.")] = None
     raw: Annotated[
-        Path | None, typer.Option("--from", help="Measure nothing: conclude from these raw logs.")
+        Path | None, typer.Option("--from", help="Measure nothing: fit again from these raw logs.")
     ] = None
     force_sensor: Annotated[
-        str | None, typer.Option(help="DRIVER=URL of it, as ati-net=udp:192.168.1.1:49152.")
+        str | None, typer.Option(help="DRIVER=URL, such as ati-net=udp:192.168.1.1:49152.")
     ] = None
-    days: Annotated[float, typer.Option(min=1, help="Stale after so many days.")] = 180
-    notes: Annotated[str, typer.Option(help="Notes, kept in the record.")] = ""
-    use: Annotated[bool, typer.Option("--use", help="Make what comes out active.")] = False
+    days: Annotated[float, typer.Option(min=1, help="Stale after this number of days.")] = 180
+    notes: Annotated[str, typer.Option(help="Notes, stored in the record.")] = ""
+    use: Annotated[bool, typer.Option("--use", help="Make the result the active record.")] = False
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="Ask nothing; simulated hands do what is asked.")
+        bool,
+        typer.Option(
+            "--yes", "-y", help="Ask no questions; on the simulated rig, simulated hands act."
+        ),
     ] = False
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None
     json: JsonFlag = False
@@ -86,15 +90,15 @@ def torque(
     sensor: Annotated[str, typer.Option(help="proximal or distal.")] = "proximal",
     arm_mm: Annotated[float, typer.Option(help="From the axis to the weights, mm.")] = 100.0,
     masses_g: Annotated[str, typer.Option(help="Weights, g, rising.")] = "50,100,150,200,250",
-    repeats: Annotated[int, typer.Option(min=1, help="How often to go up and down.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of passes up and down.")] = 1,
     shunt_v_v: Annotated[
         float | None, typer.Option(help="Change by the shunt on the certificate, V/V.")
     ] = None,
     counts_per_v_v: Annotated[
-        float | None, typer.Option(help="Counts a V/V of amplifier and converter.")
+        float | None, typer.Option(help="Counts per V/V of amplifier and converter.")
     ] = None,
     temperature_c: Annotated[
-        float | None, typer.Option(help="Of the sensor, for the note.")
+        float | None, typer.Option(help="Temperature of the sensor, for the notes.")
     ] = None,
 ) -> "Procedure":
     """Torque sensor: zero, shunt, then known weights on an arm, up and down again."""
@@ -117,7 +121,8 @@ def current(
     speeds_rad_s: Annotated[str, typer.Option(help="Speeds of the spindle.")] = "0.5,1.0",
     repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
     motor_constant: Annotated[
-        float | None, typer.Option(help="Data sheet's torque constant, N m/A; gives an efficiency.")
+        float | None,
+        typer.Option(help="Torque constant of the data sheet, N m/A, for the efficiency."),
     ] = None,
     ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
 ) -> "Procedure":
@@ -142,7 +147,7 @@ def gearbox(
         bool, typer.Option("--stiffness-only", help="Model no backlash.")
     ] = False,
 ) -> "Procedure":
-    """Gear: stiffness of its twist, and backlash."""
+    """Gear: torsional stiffness and backlash."""
     from calibration.sessions.gearbox import GearboxSession
 
     loads = tuple(_numbers(loads_a, "--loads-a"))
@@ -169,11 +174,11 @@ def encoder(
 def ft(
     jaw_mm: Annotated[str, typer.Option(help="The jaw from the sensor's origin, mm.")] = "0,0,0",
     jaw_turn_deg: Annotated[
-        str, typer.Option(help="Turns of the jaw's frame about x, y, z of the sensor.")
+        str, typer.Option(help="Rotations of the jaw's frame about x, y, z of the sensor.")
     ] = "0,0,0",
-    repeats: Annotated[int, typer.Option(min=1, help="How often to go through the poses.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of rounds through the poses.")] = 1,
 ) -> "Procedure":
-    """Force sensor: bias, weight and centre of mass of its tool, and the way to the jaw."""
+    """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
     from math import radians
 
     from calibration.sessions.ft import FtSession
@@ -190,14 +195,15 @@ def ft(
 def fsr(
     top_n: Annotated[float, typer.Option(help="Greatest force of a press, N.")] = 1.6,
     presses: Annotated[int, typer.Option(min=3, help="Number of presses.")] = 8,
-    hold_s: Annotated[float, typer.Option(min=0, help="Hold that shows creep; 0 for none.")] = 30.0,
+    hold_s: Annotated[float, typer.Option(min=0, help="Hold time for creep; 0 for none.")] = 30.0,
     degree: Annotated[
-        int | None, typer.Option(min=1, max=9, help="Of the polynomial; found if none.")
+        int | None,
+        typer.Option(min=1, max=9, help="Degree of the polynomial; by default selected."),
     ] = None,
     force_at_zero: Annotated[
-        float | None, typer.Option(help="Force at 0 V, held; fitted if none.")
+        float | None, typer.Option(help="Fixed force at 0 V; by default fitted.")
     ] = None,
-    axis: Annotated[str, typer.Option(help="Force sensor's channel.")] = "force_z_n",
+    axis: Annotated[str, typer.Option(help="Channel of the force sensor.")] = "force_z_n",
     rail_v: Annotated[float, typer.Option(help="Upper end of the amplifier.")] = 3.3,
     curve_only: Annotated[
         bool, typer.Option("--curve-only", help="Model neither hysteresis nor creep.")

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def demo(
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for everything.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of noise and split; by the clock if none.")
+        int | None, typer.Option(help="Seed of noise and split; from the clock by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

@@ -16,31 +16,29 @@ def diagnose(
     ] = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: Annotated[
-        Path | None, typer.Option("--json", help="Where the diagnosis goes; - is stdout.")
+        Path | None, typer.Option("--json", help="File of the diagnosis; - is stdout.")
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Folder for the page that a person reads.")
-    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder of the HTML report.")] = None,
     model_out: Annotated[
-        Path | None, typer.Option(help="Where the models with what was found go, one file.")
+        Path | None, typer.Option(help="File of the models with the identified effects.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
-    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
     quick: Annotated[
         bool, typer.Option("--quick", help="A first answer in seconds, without simulated nulls.")
     ] = False,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask scheduler to work on."),
+        typer.Option(help="Address of a Dask scheduler."),
     ] = None,
     protocol_out: Annotated[
-        Path | None, typer.Option(help="Where the next experiment goes, as a protocol file.")
+        Path | None, typer.Option(help="Protocol file of the next experiment.")
     ] = None,
     ledger: Annotated[
         Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""

@@ -8,7 +8,7 @@ import typer
 from rig.output.console import JsonFlag, emit_json, results
 
 ConfigOption = Annotated[
-    Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+    Path | None, typer.Option("--config", "-c", help="Configuration; by default the simulated rig.")
 ]
 
 

@@ -108,7 +108,7 @@ def fit(
         ),
     ] = "grip",
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Where the fitted model goes.")
+        Path | None, typer.Option("--out", "-o", help="File of the fitted model.")
     ] = None,
     folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
@@ -116,13 +116,13 @@ def fit(
         str, typer.Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
     surrogate: Annotated[
-        str, typer.Option(help="Channel that stands for the load; with --model states or network.")
+        str, typer.Option(help="Channel that represents the load; with --model states or network.")
     ] = "motor_current_a",
     live: Annotated[
         bool, typer.Option("--live", help="Fit for use live; with --model states.")
     ] = False,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
     json_: JsonFlag = False,
 ) -> None:

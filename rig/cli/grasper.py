@@ -52,7 +52,7 @@ def record(
     seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
     json: JsonFlag = False,
 ) -> None:
-    """Record the simulated wrist, its joints coupled as it was built, one log a run.
+    """Record the simulated wrist with the coupling of its pulleys, one log per run.
 
     All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
     the simulated grasper, with its board in the loop.
@@ -76,20 +76,20 @@ def record(
 def follow(
     config: Annotated[
         Path | None,
-        typer.Option("--config", "-c", help="Configuration; simulated grasper if none."),
+        typer.Option("--config", "-c", help="Configuration; by default the simulated grasper."),
     ] = None,
     master: Annotated[
         str | None,
-        typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
+        typer.Option(help="URL, such as usb:16c0:0483; by default the configured one."),
     ] = None,
-    duration: Annotated[float, typer.Option(min=0.5, help="How long, s.")] = 10.0,
+    duration: Annotated[float, typer.Option(min=0.5, help="Duration, s.")] = 10.0,
     scale: Annotated[
-        float, typer.Option(min=0.01, max=2, help="Angle of a joint for an angle of the master.")
+        float, typer.Option(min=0.01, max=2, help="Joint angle per angle of the master.")
     ] = 0.3,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
     json: JsonFlag = False,
 ) -> None:
-    """Send the three motors where the master goes, within the limits of the configuration.
+    """Make the three motors follow the master, within the limits of the configuration.
 
     The grasper moves. It starts at its present position, for any position of the master. Ctrl-C
     quits and disarms the motors.

@@ -13,12 +13,13 @@ REACHED_RATIO = 0.1
 
 def grip(
     torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
-    duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
+    duration: Annotated[float, typer.Option(min=8, help="Duration, s.")] = 40.0,
     config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration; by default the simulated rig."),
     ] = None,
     model: Annotated[
-        Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
+        Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
     ] = None,
     json: JsonFlag = False,
 ) -> int:

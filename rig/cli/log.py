@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 log_app = typer.Typer(
     name="log",
-    help="Look into, check, repair and export logs.",
+    help="Inspect, check, repair and export logs.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -63,7 +63,7 @@ def repair(
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Write what is readable of a damaged log to a new file; the original stays as it is."""
+    """Write the readable part of a damaged log to a new file; the original is not changed."""
     from rig.log.repair import repair_log
 
     report = repair_log(path, out)

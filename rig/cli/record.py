@@ -15,17 +15,19 @@ def record(
         typer.Option("--protocol", "-p", help="Protocol file or shipped name."),
     ] = None,
     config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration; by default the simulated rig."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
+        Path | None, typer.Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", "-m", help="Fitted model to watch: does it still fit?")
+        Path | None,
+        typer.Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
     ] = None,
-    notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
+    notes: Annotated[str, typer.Option(help="Operator's notes, stored in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
     """Run a protocol on the rig and write one log per run to logs/.

@@ -17,23 +17,25 @@ if TYPE_CHECKING:
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording: a file, folder or archive.")],
     run: Annotated[
-        str | None, typer.Option(help="Name of the run; the first that counts if not given.")
+        str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="Model file that estimates live.")] = None,
-    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as possible.")] = 1.0,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    model: Annotated[Path | None, typer.Option(help="Model file of the live estimate.")] = None,
+    speed: Annotated[
+        float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
+    ] = 1.0,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")] = False,
     json_: JsonFlag = False,
     lever_mm: Annotated[
         float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = 12.0,
     any_instrument: Annotated[
-        bool, typer.Option("--any-instrument", help="Let a model estimate another instrument too.")
+        bool, typer.Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of LOG; guessed if not given.")
+        str | None, typer.Option("--format", help="Format of LOG; detected by default.")
     ] = None,
 ) -> int:
-    """Show a recording as it looked live, with the estimate of any model.
+    """Play back a recording in the live display, with the estimate of any model.
 
     Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 arm_studies = typer.Typer(rich_markup_mode=None)
 
 StateFolder = Annotated[
-    Path | None, typer.Option("--state", help="Folder of what is done; a cache folder by default.")
+    Path | None,
+    typer.Option("--state", help="Folder of finished parts; a cache folder by default."),
 ]
 
 Arms = Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")]
@@ -73,7 +74,7 @@ def resumable(
             task = bar.add_task(what, total=total)
             yield kept, lambda: bar.advance(task)
     except KeyboardInterrupt:
-        sys.stderr.write(f"What is done is kept in {kept}: the same command goes on from there.\n")
+        sys.stderr.write(f"Finished parts are kept in {kept}: the same command resumes.\n")
         raise
 
 

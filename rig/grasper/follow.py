@@ -36,7 +36,7 @@ def setpoints(
         chief: What their counts mean.
         here: Where yaw, jaw 1 and jaw 2 stand, closing positive, rad.
         duration_s: Time to follow, s.
-        scale: Angle of a joint for an angle of the master.
+        scale: Joint angle per angle of the master.
 
     Yields:
         Angles of yaw, jaw 1 and jaw 2, rad, each of shape (n,).

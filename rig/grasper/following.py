@@ -68,7 +68,7 @@ def follow_master(
         config: Of a grasper.
         url: URL of the master; from the configuration if None.
         duration_s: Duration.
-        scale: Angle of a joint for an angle of the master.
+        scale: Joint angle per angle of the master.
         folder: Folder of the logs.
         on_time: Told how long it has followed, s.
 

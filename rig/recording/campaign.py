@@ -181,7 +181,7 @@ def record_campaign(
         session: An open session.
         plans: The runs.
         folder: Folder of the logs.
-        notes: Operator's notes, kept in every log.
+        notes: Operator's notes, stored in every log.
         on_progress: Told of the samples as they come.
     """
     for _ in session.rest(REST_S):

@@ -13,7 +13,7 @@ def lead(study: LoopStudy) -> str:
         for row in study.rows
     ]
     return (
-        f"On {len(study.sealed.confirm)} runs kept back, errors in mN m before and after: "
+        f"On {len(study.sealed.confirm)} held-out test runs, errors in mN m before and after: "
         + "; ".join(parts)
         + "."
     )

@@ -1,4 +1,4 @@
-"""The loop closed on measured data: from a linear model to named effects, proved on runs kept back.
+"""The loop closed on measured data: from a linear model to effects confirmed on held-out test runs.
 
 Each row starts from the paper's linear model of one torque, lets the search add effects of the
 catalogue on two thirds of the runs while all acceptance criteria are met, and uses the others once,
