@@ -101,7 +101,7 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     on_stage("recording a campaign through the board's frames and the driver")
     runs, firmware = _record(config, logs, on_progress)
     declared = model_file.read(Path(MODEL))
-    on_stage(f"fitting the declared model {MODEL!r} on the runs that may be looked at")
+    on_stage(f"fitting the declared model {MODEL!r} on the training runs")
     campaign = open_campaign(logs)
     # the others are the diagnosis' proof; whoever looks at them first proves nothing with them
     campaign = campaign.select(split(evidence(campaign), seed).discover)
