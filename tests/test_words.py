@@ -48,7 +48,6 @@ BANNED: dict[str, tuple[str, str]] = {
     r"[Ss]ay (whether|why|which)": ("functions do not speak", "Whether X; Return why X"),
     r"Return what": ("it hides the noun", "Return the X of Y"),
     r"borne out": ("old-fashioned", "confirmed"),
-    r"nobody": ("it hides the subject", "no reader, unknown, missing"),
 }
 """Pattern of a word -> the reason against it, and what to write."""
 
