@@ -18,7 +18,7 @@ of such a seed must not judge a version that was changed afterwards with it."""
 
 
 def use_of(seed: int) -> str:
-    """Return what a seed is for.
+    """Return the purpose of a seed.
 
     Raises:
         ValueError: It is for nothing.

@@ -92,7 +92,7 @@ class TorqueSession:
         return steps
 
     def reading(self, measured: Sequence[Measurement], lines: CalibrationSet) -> str:
-        """Return what the last step read, and how far it is off the line of all steps so far."""
+        """Return the reading of the last step, and its distance to the line of all steps so far."""
         field = lines.channels[SENSORS[self.sensor]].counts
         counts = _counts(measured[-1], field)
         shown = f"{counts.mean():.1f} +- {counts.std():.1f} counts"

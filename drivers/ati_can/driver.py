@@ -187,7 +187,7 @@ class AtiCan:
     def _require_calibration(self, matrix: NDArray[np.float64]) -> None:
         """Hold a row of the matrix in use against the one read at the start, each time the next.
 
-        No question tells the calibration in use: the one that chooses it also sets it.
+        The calibration in use cannot be read: the request that selects it also sets it.
 
         Raises:
             DriverError: It is another one.
@@ -206,7 +206,7 @@ class AtiCan:
             f" {self._calibration} any more.",
             f"It has restarted, after which it uses calibration {AFTER_RESTART}."
             f" Up to {CHECK_S:g} s of readings before this one are wrong.",
-            "Check its supply, then start again: the calibration is chosen anew.",
+            "Check its supply, then start again: the calibration is then selected again.",
         )
 
     def _read_gauges(self) -> NDArray[np.int16]:

@@ -178,7 +178,7 @@ class AtiNet:
         stop_and_let_go(self.stop, self._transport.close)
 
     def _ask_again(self) -> None:
-        """Request the stream anew where it is to run; its records are numbered from 1 again."""
+        """Request the stream again where it is to run; its records are numbered from 1 again."""
         if self._streams:
             self._sequence.expect_restart()
             self._transport.write(protocol.encode_command(protocol.STREAM))

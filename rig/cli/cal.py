@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 cal_app = typer.Typer(
     name="cal",
-    help="Keep calibrations, look at them, and choose the active ones.",
+    help="Store, show and choose calibrations.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,

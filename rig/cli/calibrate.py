@@ -39,7 +39,7 @@ class Keeping:
     """How a session is run and kept: the options that every command has."""
 
     operator: Annotated[
-        str, typer.Option(envvar="USER", help="Who calibrates; kept in the record.")
+        str, typer.Option(envvar="USER", help="Name of the operator, stored in the record.")
     ] = ""
     config: ConfigOption = None
     sim: SimFlag = False
@@ -48,7 +48,7 @@ class Keeping:
         typer.Option(
             "--store",
             help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; a simulated"
-            " rig has a folder of its own beside it, NAME-simulated.",
+            " rig has a separate folder, NAME-simulated.",
         ),
     ] = None
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the raw logs.")] = None

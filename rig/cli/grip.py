@@ -14,7 +14,7 @@ REACHED_RATIO = 0.1
 
 def grip(
     torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
-    duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
+    duration: Annotated[float, typer.Option(min=8, help="Duration, s.")] = 40.0,
     config: ConfigOption = None,
     sim: SimFlag = False,
     model: Annotated[

@@ -43,10 +43,10 @@ def live(
 ) -> int:
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
-    A simulated rig plays a first look unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe and exit code 130. With --json, one object
-    a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
-    q leaves.
+    A simulated rig plays a default protocol; a real rig is never moved without
+    --protocol. Ctrl-C quits, with the rig in its safe state and exit code 130. With --json, one
+    object per line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m
+    marks it, q quits.
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems

@@ -74,7 +74,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 
 def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
-    """Return the runs of a campaign's protocol that have no log; none where it is no campaign."""
+    """Return the runs of a campaign's protocol that have no log; empty if it is not a campaign."""
     from rig.recording.campaign import MANIFEST, read_manifest
 
     if not (path / MANIFEST).is_file():

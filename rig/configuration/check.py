@@ -69,7 +69,7 @@ def refuse_problems(config: Config) -> None:
 
 
 def _name_problems(config: Config) -> list[Problem]:
-    """Return what names a model or a set of calibrations that is not there."""
+    """Return the keys that name a missing model or set of calibrations."""
     found = []
     if config.model_path is not None and not config.model_path.is_file():
         known = [p.name.removesuffix(".model.toml") for p in SHIPPED.glob("*.model.toml")]

@@ -329,7 +329,7 @@ class Config(_Section):
     def default_store(self) -> CalibrationStore:
         """The store where neither the configuration nor a command names one.
 
-        What comes from a simulated rig is kept beside the real calibrations, not among them.
+        Calibrations of a simulated rig are stored separately from the real ones.
         """
         folder = default_folder()
         if self.is_simulated:

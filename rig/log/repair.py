@@ -48,7 +48,7 @@ def repaired_path(path: Path) -> Path:
 
 
 def repaired_from(log: LogFile) -> Path | None:
-    """Return the log that a repaired one was made from, beside it; None if it is no repair."""
+    """Return the original of a repaired log in the same folder; None if it is not a repair."""
     originals = [data["original"] for name, data in log.metadata if name == REPAIR_RECORD]
     return log.path.with_name(originals[-1]) if originals else None
 
