@@ -88,7 +88,7 @@ def _counts(text: str) -> dict[str, int]:
     for word in text.split(","):
         kind, _, number = word.partition("=")
         if kind not in KINDS or not number.isdigit():
-            raise argparse.ArgumentTypeError(f"{word!r} is no count; classes: {', '.join(KINDS)}")
+            raise argparse.ArgumentTypeError(f"{word!r} is not a count; one of {', '.join(KINDS)}")
         counts[kind] = int(number)
     return counts
 
