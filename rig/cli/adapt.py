@@ -31,14 +31,17 @@ def adapt(
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
     from estimation.files import write_text_atomic
+    from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.adapt import open_source, run_adaptation
+    from rig.models.origins import with_origin
     from rig.output.table import to_rich
     from rig.reports import adapt as shown
 
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)
     say_left_out(path, campaign)
+    campaign, steps = with_one_zero(campaign, estimator.target)
     with progress() as bar:
         task = bar.add_task("runs", total=len(campaign))
         result, new = run_adaptation(
@@ -52,8 +55,11 @@ def adapt(
         )
     screen = results(json)
     screen.print(to_rich(shown.table(result)))
+    for line in sentence(steps):
+        screen.print(line)
     if out is not None:
-        new.save(out)
+        figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
+        with_origin(new, campaign.select(result.used), figures, source).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_out is not None:
         write_text_atomic(json_out, to_json(result))

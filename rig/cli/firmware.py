@@ -55,11 +55,20 @@ def build(board: BoardOption = "", json: JsonFlag = False) -> None:
 
 
 @firmware_app.command()
-def flash(board: BoardOption = "teensy41", json: JsonFlag = False) -> None:
-    """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
+def flash(
+    board: BoardOption = "teensy41",
+    serial: Annotated[str, typer.Option(help="Serial number the board must have.")] = "",
+    json: JsonFlag = False,
+) -> None:
+    """Build for a Teensy and write it to the only one that is plugged in.
+
+    A second Teensy on this computer is refused, for the loader takes the first it finds, and so is
+    an armed board or one that another program has.
+    """
     from rig.bench.firmware import flash as write
 
-    write(board)
-    results(json).print("Flashed. Next: rig firmware version", markup=False)
+    found = write(board, serial)
+    text = f"Flashed {board} to the board {found.serial}. Next: rig firmware version"
+    results(json).print(text, markup=False)
     if json:
-        emit_json({"flashed": board})
+        emit_json({"flashed": board, "serial": found.serial, "port": found.port})

@@ -12,11 +12,13 @@ from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
+from rig.cli.clear import clear
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.effects import effects
+from rig.cli.estimator import estimator_app
 from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
@@ -55,6 +57,7 @@ app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
 app.command()(export)
+app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
@@ -68,6 +71,7 @@ app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
 app.command()(stop)
+app.command()(clear)
 app.command()(udev)
 app.add_typer(firmware_app, name="firmware")
 

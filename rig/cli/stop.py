@@ -3,16 +3,19 @@
 from pathlib import Path
 from typing import Any
 
+from rig.bench.holding import Ending
 from rig.cli.rig_options import ConfigOption, SimFlag, announced
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Disarm the rig and read back that it is disarmed; without options, every configured rig.
 
-    Configured are RIG_CONFIG, ./rig.toml and all of ~/.config/rig/*.toml. Exit code 0 only when
-    every rig itself has confirmed it; 4 when the state of one is unknown; 2 when none is
-    configured.
+    A session of this program that has the rig is first asked to disarm and end (SIGTERM), and is
+    killed when it does not: the board then misses it and stops by itself. Programs of other makers
+    are left alone and named. Configured are RIG_CONFIG, ./rig.toml and all of ~/.config/rig/*.toml.
+    Exit code 0 only when every rig itself has confirmed it; 4 when the state of one is unknown: cut
+    its motor supply; 2 when none is configured.
     """
     from rig.configuration.chosen import ONE_OF, choose_config, configured_rigs
     from rig.configuration.config import load_config
@@ -44,17 +47,52 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
     from rig.errors import RigError
     from rig.machines.choose import machine_of
 
-    name = str(path)
+    name, ending = str(path), None
     try:
         settings = announced(load_config(path))
         name = settings.name
+        ending = _released(settings.logger.url)
         with TeensyLogger(open_logger(settings), machine_of(settings).profile) as logger:
             logger.disarm()
     except (DriverError, RigError) as error:
         screen = remarks()
         screen.print(f"{name}: UNKNOWN. Treat the motors as live; cut their supply by hand.")
-        for word, text in (("why", f"{error.what} {error.why}"), ("fix", error.fix)):
+        why = f"{_ended(ending)} {error.what} {error.why}".strip()
+        for word, text in (("why", why), ("fix", error.fix)):
             screen.print(f"  {word}: {text}", markup=False)
-        return {"name": name, "config": path, "state": "unknown", "why": str(error)}
-    results(json).print(f"{name}: disarmed, confirmed by the rig.", markup=False)
-    return {"name": name, "config": path, "state": "disarmed"}
+        return {
+            "name": name,
+            "config": path,
+            "state": "unknown",
+            "why": str(error),
+            "holder": plain(ending),
+        }
+    said = f"{name}: disarmed, confirmed by the rig. {_ended(ending)}"
+    results(json).print(said.strip(), markup=False)
+    return {"name": name, "config": path, "state": "disarmed", "holder": plain(ending)}
+
+
+def _released(url: str) -> Ending | None:
+    """Let the session that has the rig, if any, disarm and end.
+
+    Raises:
+        PortBusyError: It is another user's.
+    """
+    from drivers.errors import PortBusyError
+    from rig.bench.holding import holder, let_go
+
+    try:
+        return let_go(url)
+    except PermissionError as error:
+        raise PortBusyError(
+            f"{url} is in use.",
+            f"It is held by PID {holder(url)}, a session of another user.",
+            "Ask that user to end it, or run this command as that user.",
+        ) from error
+
+
+def _ended(ending: Ending | None) -> str:
+    if ending is None:
+        return ""
+    how = "did not end when asked and was killed" if ending.was_killed else "was asked to end"
+    return f"The session that had the rig (PID {ending.pid}) {how}."

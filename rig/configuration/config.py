@@ -22,6 +22,7 @@ from calibration.linear import CalibrationSet, load_calibration_set, shipped_cal
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
 from calibration.store import CalibrationStore, active_lines, compose, default_folder
 from estimation.recording import Instrument
+from rig.configuration.plausibility import PlausibilitySection
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
@@ -161,9 +162,10 @@ class SafetySection(_Section):
         stall_current_a: Current above which a motor that stands still is stalled.
         stall_motor_angle_rad: Motor shaft angle within which it stands still.
         stall_s: How long it may be stalled.
-        motor_speed_rad_s: Fastest motor shaft.
-        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; none if unset.
-        jaw_open_rad: Jaw angle below which it must not open; none if unset.
+        motor_speed_rad_s: Fastest motor shaft. The shipped protocols need up to 260.
+        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; if unset it
+            follows from the spindle's limit and [plausibility].
+        jaw_open_rad: Jaw angle below which it must not open; likewise.
         saturated_s: How long a torque or current sensor may be at the end of its range.
         stale_s: How long its reading may not change at all.
         watchdog_s: How long this computer may be silent.
@@ -176,7 +178,7 @@ class SafetySection(_Section):
     stall_current_a: Current = 0.55
     stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
     stall_s: float = Field(default=1.0, ge=0, le=600)
-    motor_speed_rad_s: float = Field(default=900.0, gt=0, le=20000)
+    motor_speed_rad_s: float = Field(default=400.0, gt=0, le=20000)
     jaw_closed_rad: Number | None = None
     jaw_open_rad: Number | None = None
     saturated_s: float = Field(default=0.02, ge=0, le=60)
@@ -265,6 +267,7 @@ class Config(_Section):
     controller: ControllerSection
     limits: AnyLimits
     safety: SafetySection = SafetySection()
+    plausibility: PlausibilitySection = PlausibilitySection()
     drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()

@@ -1,15 +1,21 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
 An importer is an object in the entry point group `rig.importers`. It says whether a path looks like
-its format without reading the samples, and opens it as a campaign of run handles.
+its format without reading the samples, and opens it as a campaign of run handles. Whatever the
+format, a run that is read is checked for channels that contradict their derivatives.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from estimation.campaign import Campaign
+from estimation.recording import Recording
 from rig.errors import DataError, UsageError
+from rig.importers.derivatives import checked
 from rig.importers.one_rig import of_one_rig
 
 
@@ -74,8 +80,20 @@ def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
 
     Raises:
         UsageError: The path does not exist, or the format is not known.
-        DataError: No importer recognises the path, or the one that does finds damage.
+        DataError: No importer recognises the path, or the one that does finds damage. Reading a
+            run raises it where a channel and its derivative differ by a factor, a sign or a shift.
     """
+    campaign = _opened(path, format_name)
+    return replace(
+        campaign, runs=tuple(replace(run, load=partial(_read, run.load)) for run in campaign.runs)
+    )
+
+
+def _read(load: Callable[[], Recording]) -> Recording:
+    return checked(load())
+
+
+def _opened(path: Path, format_name: str | None) -> Campaign:
     if not path.exists():
         raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
     known = importers()
