@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.left_out import say_left_out
+from rig.cli.shipped import complete_model, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
@@ -117,8 +119,9 @@ def fit(
         typer.Option(
             "--model",
             "-m",
-            help="Declared model: a file, a shipped one by name, `states` for products of"
-            " physical states, or `network` for a network with some of them as inputs.",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
+            " products of physical states, `network` for a network with some of them as inputs.",
+            autocompletion=complete_model,
         ),
     ] = "grip",
     out: Annotated[
@@ -154,6 +157,7 @@ def fit(
 
     screen = results(json_)
     campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
         return

@@ -16,6 +16,7 @@ from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
+from rig.importers.one_rig import of_one_rig
 
 
 @runtime_checkable
@@ -71,6 +72,8 @@ def _loaded(entry: EntryPoint) -> Importer:
 def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
     """Open recordings of any known format.
 
+    The runs are of one rig and one instrument: reading one that is not raises MixedRunsError.
+
     Args:
         path: File, folder or archive.
         format_name: Importer to use; guessed from the path when None.
@@ -99,10 +102,10 @@ def _opened(path: Path, format_name: str | None) -> Campaign:
             raise UsageError(
                 f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
             )
-        return known[format_name].open(path)
+        return of_one_rig(known[format_name].open(path))
     for importer in known.values():
         if importer.recognises(path):
-            return importer.open(path)
+            return of_one_rig(importer.open(path))
     raise DataError(
         f"No importer recognises {path}.",
         f"Tried: {', '.join(known)}.",
