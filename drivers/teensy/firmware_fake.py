@@ -53,12 +53,12 @@ class FirmwareBoard:
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         library: The shared library; the built one when None.
-        profile: What the board samples and moves.
+        profile: Samples and motors of the board.
         boot: Number of this start of the board.
-        referenced: Whether its counts have their zeros, as those of a simulated rig do.
+        referenced: True when the encoder counts already have their zeros, as on a simulated rig.
 
     Raises:
-        FirmwareMissingError: There is no library.
+        FirmwareMissingError: The library is missing.
     """
 
     def __init__(
