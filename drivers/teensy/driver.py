@@ -38,7 +38,7 @@ _REASONS: dict[int, tuple[str, str]] = {
         "Read samples, then queue on.",
     ),
     Result.NOT_REFERENCED: (
-        "Its counts have no zeros: it was started since, or an encoder failed.",
+        "Its counts have no zeros: it was restarted, or an encoder was doubted.",
         "Run: rig reference",
     ),
     Result.NOT_AT_REST: (
@@ -176,13 +176,13 @@ class TeensyLogger:
             )
 
     def reference(self, counts: Sequence[int]) -> None:
-        """Say which counts the encoders have where they stand now; the board must be at rest.
+        """Give the encoders their counts at the present place; the board must be at rest.
 
         Args:
             counts: Of each encoder, in the order of a sample.
 
         Raises:
-            CommandRefusedError: It is armed, or a shaft is turning.
+            CommandRefusedError: The board is armed, or a shaft is turning.
         """
         self._require_identity()
         payload = protocol.encode_reference(self._number(), counts)

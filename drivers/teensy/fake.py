@@ -7,7 +7,7 @@ tick; a test compares the two byte for byte.
 
 For simulation only, where there is no compiler. The guards that hold encoders and current against
 one another (trips 15 to 19) are in the compiled core alone: this board takes their limits and does
-not hold them. Its counts have their zeros from the start, and it knows no REFERENCE.
+not hold them. Its counts have their zeros from the start, and it refuses REFERENCE.
 
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
@@ -278,7 +278,7 @@ class PythonBoard:
 
     @property
     def _status(self) -> int:
-        """The state as the host gets it: a simulated rig's encoders know where they are."""
+        """The state as the host gets it: a simulated rig's counters are absolute."""
         return self._state | STATUS_REFERENCED
 
     @property

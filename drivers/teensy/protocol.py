@@ -157,7 +157,7 @@ CHOICE_NAMES = (
 """How the limits of every profile end: how long each watch lasts, and what a tripped board does."""
 PING_DTYPE = layout(*HEADER_FIELDS, "token u8")
 REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4")
-"""Counts that the present place of each encoder is given, in the order of a sample."""
+"""Counts of each encoder at the present place, in the order of a sample."""
 TRIP_REPORT_DTYPE = layout(
     *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
@@ -201,7 +201,7 @@ class Identity:
     build_hash: int = 0
     """CRC-32 of the sources the firmware was built from; 0 where it was not built."""
     boot: int = 0
-    """Number of this start of the board; another after every reset."""
+    """Number of this start of the board; it changes with every reset."""
     referenced: bool = False
     """Whether its counts have their zeros."""
 
@@ -241,7 +241,7 @@ def encode_ping(sequence: int, token: int) -> bytes:
 
 
 def encode_reference(sequence: int, counts: Sequence[int]) -> bytes:
-    """Return the payload of the command that says which counts the present place has."""
+    """Return the payload of the command that gives the encoders their present counts."""
     return np.array((VERSION, Kind.REFERENCE, sequence, *counts), REFERENCE_DTYPE).tobytes()
 
 

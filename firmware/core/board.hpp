@@ -33,8 +33,8 @@ class Board {
         }
     }
 
-    // Which start of the board this is, so that a host notices another; and whether the encoders know
-    // where they are without being told, as those of a simulated rig do.
+    // The number of this start, by which a host detects a restart; and whether the counts already have
+    // their zeros, as those of a simulated rig do.
     void booted(std::uint32_t boot, bool referenced) {
         boot_ = boot;
         status_ = referenced ? kReferenced : 0;

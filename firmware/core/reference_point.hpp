@@ -1,5 +1,5 @@
 // Where the encoders' zeros are. Incremental counters begin at 0 wherever the shafts stand when the board is
-// started; travel limits mean nothing until the host has said which counts the present place has.
+// started; travel limits mean nothing until the host has sent the counts of the present place.
 #pragma once
 
 #include <cstddef>

@@ -86,7 +86,7 @@ void* rig_board_create(const char* profile, const char* serial) {
 
 void rig_board_destroy(void* board) { delete board_of(board); }
 
-// Which start of the board this is, and whether its encoders know where they are (1) or not (0).
+// The number of this start, and whether the counts already have their zeros (1) or not (0).
 void rig_board_booted(void* board, std::uint32_t boot, std::int32_t referenced) {
     board_of(board)->booted(boot, referenced != 0);
 }

@@ -21,6 +21,7 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.transport import Transport
+from rig.bench.board_start import require_same_start
 from rig.bench.companions import Companion, open_companions
 from rig.bench.holding import holding
 from rig.bench.interrupts import leaving_safely
@@ -53,10 +54,6 @@ STALL_S = 1.0
 
 class LoggerStalledError(RigError):
     """The logger sends nothing although it should stream."""
-
-
-class BoardResetError(LoggerStalledError):
-    """The board was started anew while the session ran."""
 
 
 class Session:
@@ -254,10 +251,10 @@ class Session:
             if len(batch.samples):
                 break
             if self._transport.now_s > give_up_s:
-                self._require_same_boot()
+                require_same_start(self._logger, self.identity.boot)
                 raise LoggerStalledError(
                     f"The logger has sent nothing for {STALL_S:g} s.",
-                    "Its cable was pulled, or its program stopped.",
+                    "Its cable was pulled, it was reset, or its program stopped.",
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
         self._follow_clock()
@@ -289,29 +286,10 @@ class Session:
         except CommandRefusedError as error:
             report = self._logger.trip()
             if report.code is Trip.NONE:
-                self._require_same_boot()
+                require_same_start(self._logger, self.identity.boot)
                 raise
             state = "It is in its safe state, until armed again."
             raise self._tripped(report, state) from error
-
-    def _require_same_boot(self) -> None:
-        """Ask which start of the board this is.
-
-        Raises:
-            BoardResetError: It is another than the session's.
-        """
-        try:
-            boot = self._logger.identify().boot
-        except DriverError:
-            return  # nobody answers: what called this says so
-        if boot != self.identity.boot:
-            raise BoardResetError(
-                "The board was started anew while it was in use.",
-                f"This is its start number {boot}, the session began in number"
-                f" {self.identity.boot}: a reset, its watchdog, or its supply.",
-                "It is disarmed and its counts have lost their zeros. Find out why it was reset,"
-                " then run: rig reference",
-            )
 
     def _require_no_trip(self, reading: Reading) -> None:
         """Look for what the board itself tripped over.

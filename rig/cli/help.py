@@ -6,7 +6,17 @@ from typer.core import TyperGroup
 
 GROUPS = {
     "Begin": ("demo", "config", "doctor", "devices", "selftest", "udev", "firmware"),
-    "At the rig": ("live", "record", "grip", "stop", "clear", "calibrate", "cal", "grasper"),
+    "At the rig": (
+        "live",
+        "record",
+        "grip",
+        "stop",
+        "clear",
+        "reference",
+        "calibrate",
+        "cal",
+        "grasper",
+    ),
     "Recordings": ("log", "replay"),
     "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),

@@ -1,71 +1,49 @@
-"""`rig reference`: give the encoders of a board that was started their zeros."""
+"""`rig reference`: give the encoders of a restarted board their zeros."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rig.cli.doctor import ConfigOption
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
-
-if TYPE_CHECKING:
-    from drivers.teensy.driver import TeensyLogger
 
 AtOption = Annotated[
     list[float] | None,
-    typer.Option("--at", help="Angle it stands at, rad; once for each setpoint. Default 0."),
+    typer.Option("--at", help="Angle of the mark, rad; once for each setpoint. If none: 0."),
 ]
-YesFlag = Annotated[bool, typer.Option("--yes", help="Do not ask; it stands there already.")]
-
-
-REST_SAMPLES = 300
-"""Samples after which the board has seen whether a shaft turns."""
-SILENT_READS = 5
+YesFlag = Annotated[bool, typer.Option("--yes", help="The rig stands at its mark; do not ask.")]
 
 
 def reference(
-    config: ConfigOption = None, at: AtOption = None, yes: YesFlag = False, json: JsonFlag = False
+    config: ConfigOption = None,
+    sim: SimFlag = False,
+    at: AtOption = None,
+    yes: YesFlag = False,
+    json: JsonFlag = False,
 ) -> int:
-    """Say where the rig stands: after every start of the board, before anything moves.
+    """Give the encoders their zeros, after every restart of the board.
 
-    Turn it by hand to its mark first. The board refuses while it is armed or a shaft turns.
+    Turn the rig by hand to its mark first. The board refuses while it is armed or a shaft turns.
     """
-    from drivers.teensy.driver import TeensyLogger
-    from rig.bench.logger import open_logger
-    from rig.configuration.config import load_config
-    from rig.errors import UsageError
+    from rig.bench.referencing import reference_board, require_place
     from rig.machines.choose import machine_of
 
-    settings = load_config(config)
-    machine = machine_of(settings)
-    axes = len(machine.here_channels)
-    here = at or [0.0] * axes
-    if len(here) != axes:
-        raise UsageError(
-            f"{settings.name} is referenced by {axes} angles, {len(here)} were given.",
-            fix=f"Give --at {axes} times: {', '.join(machine.here_channels)}.",
-        )
-    where = ", ".join(f"{n} = {a:g}" for n, a in zip(machine.here_channels, here, strict=True))
-    screen = results(json)
+    settings = chosen_rig(config, sim)
+    names = machine_of(settings).here_channels
+    here_rad = at or [0.0] * len(names)
+    require_place(settings, here_rad)
+    place = ", ".join(f"{name} = {angle:g}" for name, angle in zip(names, here_rad, strict=True))
     if not yes:
-        typer.confirm(f"Turn it by hand to {where} and let go. Does it stand there?", abort=True)
-    with TeensyLogger(open_logger(settings), machine.profile) as logger:
-        logger.identify()
-        logger.start()
-        _watch_at_rest(logger)
-        logger.reference(machine.reference_counts(settings, settings.calibration_set(), here))
-        logger.stop()
-        identity = logger.identify()
-    text = f"{settings.name}: referenced at {where}, in start {identity.boot} of {identity.serial}."
-    screen.print(text, markup=False)
+        typer.confirm(
+            f"Turn the rig by hand to {place} and let go. Does it stand there?",
+            abort=True,
+            err=True,
+        )
+    identity = reference_board(settings, here_rad)
+    results(json).print(
+        f"{settings.name}: referenced at {place}; board {identity.serial}, start {identity.boot}.",
+        markup=False,
+    )
     if json:
-        emit_json({"referenced": identity.referenced, "boot": identity.boot, "at_rad": here})
+        emit_json({"referenced": identity.referenced, "boot": identity.boot, "at_rad": here_rad})
     return 0
-
-
-def _watch_at_rest(logger: "TeensyLogger") -> None:
-    """Let the board see for a while that nothing turns; it refuses where something does."""
-    seen = silent = 0
-    while seen < REST_SAMPLES and silent < SILENT_READS:
-        samples = len(logger.read(0.2).samples)
-        seen += samples
-        silent += not samples

@@ -83,7 +83,7 @@ def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) ->
     logger.disarm()
     logger.read(0.0)
     after = joined(read_for(logger, 50))
-    assert not after["status"].any()
+    assert (after["status"] == protocol.STATUS_REFERENCED).all()
     assert not after["command_e4"].any()
     assert not after["load_ma"].any()
     logger.stop()

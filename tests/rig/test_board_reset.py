@@ -6,7 +6,8 @@ import pytest
 
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
-from rig.bench.session import BoardResetError, Session
+from rig.bench.board_start import BoardResetError
+from rig.bench.session import Session
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
 
@@ -41,4 +42,4 @@ def test_a_session_notices_that_its_board_was_reset_and_says_what_to_do(library:
         readings = session.rest(5.0)
         with pytest.raises(BoardResetError, match="rig reference") as caught:
             list(readings)
-    assert "start number 5" in caught.value.why
+    assert "is 5 and was 4" in caught.value.why

@@ -32,6 +32,7 @@ NEED_A_RIG = [
     "doctor",
     "stop",
     "clear",
+    "reference",
     "config show",
     "config check",
     "cal check",

@@ -1,0 +1,75 @@
+"""Reference a board: give the encoders their counts at the place where the rig stands."""
+
+from collections.abc import Sequence
+
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Identity
+from rig.bench.holding import holding
+from rig.bench.logger import open_logger
+from rig.configuration.config import Config
+from rig.errors import UsageError
+from rig.machines.choose import machine_of
+
+REST_SAMPLES = 300
+"""Samples that are read first, so that the board has seen whether a shaft turns."""
+SILENT_READS = 5
+READ_S = 0.2
+
+
+def require_place(config: Config, here_rad: Sequence[float]) -> None:
+    """Refuse a place that the configured rig cannot be referenced at.
+
+    Raises:
+        UsageError: The rig's encoders need no reference, or the number of angles is wrong.
+    """
+    names = machine_of(config).here_channels
+    if config.logger.driver == "epos4":
+        raise UsageError(
+            f"{config.name} has no board to reference.",
+            "The drive of an EPOS4 rig counts its own encoder.",
+            "Give a configuration of a rig with a logger board.",
+        )
+    if len(here_rad) != len(names):
+        raise UsageError(
+            f"{config.name} is referenced by {len(names)} angles; {len(here_rad)} were given.",
+            fix=f"Give --at {len(names)} times: {', '.join(names)}.",
+        )
+
+
+def reference_board(config: Config, here_rad: Sequence[float]) -> Identity:
+    """Reference the board of the configured rig, which stands still and disarmed.
+
+    Args:
+        config: The rig.
+        here_rad: Where it stands: the machine's `here_channels`, rad.
+
+    Returns:
+        The identity of the referenced board.
+
+    Raises:
+        UsageError: See `require_place`.
+        CommandRefusedError: The board is armed, or a shaft turns.
+        DriverError: The board cannot be reached.
+    """
+    require_place(config, here_rad)
+    machine = machine_of(config)
+    counts = machine.reference_counts(config, config.calibration_set(), here_rad)
+    with (
+        holding(config.logger.url),
+        TeensyLogger(open_logger(config), machine.profile) as logger,
+    ):
+        logger.identify()
+        logger.start()
+        _read_at_rest(logger)
+        logger.reference(counts)
+        logger.stop()
+        return logger.identify()
+
+
+def _read_at_rest(logger: TeensyLogger) -> None:
+    """Read until the board has seen enough samples to decide whether a shaft turns."""
+    seen = silent = 0
+    while seen < REST_SAMPLES and silent < SILENT_READS:
+        samples = len(logger.read(READ_S).samples)
+        seen += samples
+        silent += not samples
