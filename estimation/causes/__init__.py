@@ -1,0 +1,1 @@
+"""Which physical cause explains what the declared equations do not: hypotheses and their probability."""
