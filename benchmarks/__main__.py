@@ -16,7 +16,7 @@ from pathlib import Path
 import benchmarks
 from benchmarks.ratio import Ratio
 from estimation.files import write_text_atomic
-from rig.reports.provenance import Provenance
+from rig.output.provenance import Provenance
 
 PREFIX = "bench_"
 

@@ -31,7 +31,7 @@ def _regressor() -> Ratio:
     from benchmarks.symbolic_arm import compiled
     from estimation.arm.regressor import regressor
     from estimation.arm.tables import PSM
-    from rig.simulation.arm import excitation
+    from rig.arm.simulated import excitation
 
     motion = excitation(np.random.default_rng(0), SAMPLES / 100)
     symbolic = compiled(PSM)
@@ -57,8 +57,8 @@ def _regressor() -> Ratio:
 
 def _identification() -> Ratio:
     from estimation.recording import Recording
-    from rig.simulation.arm import RATE_HZ, excitation
-    from rig.studies.arm_search import prepare
+    from rig.arm.search import prepare
+    from rig.arm.simulated import RATE_HZ, excitation
 
     rng = np.random.default_rng(1)
     motion = excitation(rng, PATH_S)
@@ -92,7 +92,7 @@ def _live() -> Ratio:
     from estimation.arm.regressor import names
     from estimation.arm.tables import PSM
     from estimation.arm.wrench import LiveWrench
-    from rig.simulation.arm import excitation
+    from rig.arm.simulated import excitation
 
     motion = excitation(np.random.default_rng(2), 20.0)
     values = 0.1 * np.random.default_rng(3).normal(size=len(names(PSM)))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.campaign import Campaign
+from estimation.closing import is_closing, processed
 from estimation.derived import settled_places
 from estimation.estimator import Estimator, Recipe
 from estimation.fitting import fit
 from estimation.model import Model, balance_channels, estimate
-from estimation.oneill import is_closing, processed
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
 

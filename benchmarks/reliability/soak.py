@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config import load_config
-from rig.logger import is_real_time, open_logger
-from rig.session import Session
+from rig.bench.logger import is_real_time, open_logger
+from rig.bench.session import Session
+from rig.configuration.config import load_config
 
 PERIOD_S = 4.0
 BLOCK_S = 60.0

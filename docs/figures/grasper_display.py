@@ -13,7 +13,8 @@ from pathlib import Path
 from rich.console import Console
 
 from estimation.files import write_text_atomic
-from rig.config import SHIPPED, load_config
+from rig.bench.logger import open_logger
+from rig.configuration.config import SHIPPED, load_config
 from rig.live.estimator import estimators_of, half_widths_of
 from rig.live.joint_forces import JOINTS, with_joint_forces
 from rig.live.keys import HELP
@@ -21,9 +22,8 @@ from rig.live.model_status import with_model_status
 from rig.live.session_blocks import session_blocks
 from rig.live.state import LiveState
 from rig.live.view import View
-from rig.logger import open_logger
 from rig.machines.choose import machine_of
-from rig.protocol import load_protocol
+from rig.protocols.protocol import load_protocol
 
 TARGET = Path(__file__).with_name("grasper.svg")
 MODEL = SHIPPED / "simulated_grasper.model.toml"

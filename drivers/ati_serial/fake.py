@@ -19,7 +19,7 @@ from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
 if TYPE_CHECKING:
-    from drivers.ati_serial.modbus_server import ModbusServer
+    from drivers.ati_serial.fake_modbus import ModbusServer
 
 FRAMES_A_TICK = 7
 
@@ -80,7 +80,7 @@ def _server(block: bytes) -> "ModbusServer":
         LinkError: It is not installed.
     """
     try:
-        from drivers.ati_serial.modbus_server import ModbusServer
+        from drivers.ati_serial.fake_modbus import ModbusServer
     except ModuleNotFoundError as error:
         raise LinkError(
             "The simulated digital F/T needs the pymodbus library.",

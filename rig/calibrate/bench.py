@@ -15,11 +15,11 @@ from drivers.device import Batch, Device
 from drivers.errors import DriverError
 from drivers.transport import Transport
 from estimation.recording import Recording
-from rig.config import Config
-from rig.motion import motion_of
-from rig.protocol import RunPlan
-from rig.reading import Reading
-from rig.session import Session
+from rig.bench.session import Session
+from rig.configuration.config import Config
+from rig.machines.reading import Reading
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan
 
 ZERO_S = 0.5
 START_TIMEOUT_S = 2.0

@@ -9,10 +9,10 @@ from calibration.procedure import Step
 from calibration.torque import weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.guard import COLUMNS, Drive
 from drivers.transport.simulated import SimulatedTransport
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench
 from rig.simulation.logger import plant_and_sensors
 from rig.simulation.press import PressedFsr, press_force_n
@@ -111,7 +111,7 @@ class SimulatedHands:
 
     def __init__(self, config: Config) -> None:
         self.bench = HandledBench(config)
-        self._board = TeensyFake(self.bench)
+        self._board = PythonBoard(self.bench)
         self._rdt = LoadedRdt(config.simulation.seed)
         self._seed = config.simulation.seed
 

@@ -11,7 +11,7 @@ from calibration.record import CalibrationRecord, RawFile, Validity
 from calibration.store import CalibrationStore
 from rig import __version__
 from rig.calibrate.raw import whole_folder, write_raw
-from rig.reports.figures import scattered
+from rig.output.figures import scattered
 
 
 @dataclass(frozen=True, kw_only=True)

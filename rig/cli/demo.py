@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
-    from rig.demo import Demo
+    from rig.cli.demonstration import Demo
 
 
 def demo(
@@ -20,8 +20,8 @@ def demo(
     json: JsonFlag = False,
 ) -> None:
     """Record the simulated rig with an effect its model lacks, find that effect, and prove it."""
-    from rig.demo import PROTOCOL, run_demo
-    from rig.protocol import load_protocol
+    from rig.cli.demonstration import PROTOCOL, run_demo
+    from rig.protocols.protocol import load_protocol
 
     now = datetime.now()
     chosen = seed if seed is not None else int(now.timestamp()) % 1000
@@ -48,7 +48,7 @@ def demo(
 
 def _told(result: "Demo") -> list[str]:
     """Return what was found, where it lies, and what to type next."""
-    from rig.demo import MODEL
+    from rig.cli.demonstration import MODEL
     from rig.reports.diagnosis_words import sentences
 
     lines = [f"{len(result.runs)} runs, {sum(r.samples for r in result.runs)} samples."]

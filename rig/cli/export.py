@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, results
 
 
 def export(

@@ -5,11 +5,14 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 grasper_app = typer.Typer(
     name="grasper",
     help="The 3-DOF grasper: possible designs, its master, recordings of the simulated one.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -20,7 +23,7 @@ def designs(json: JsonFlag = False) -> None:
     """List every combination of Table 1 of Zhao and Nelson 2016, the most compact one marked."""
     from rig.grasper.wrist import designs as every
     from rig.grasper.wrist import most_compact
-    from rig.reports.table import TextTable, to_rich
+    from rig.output.table import TextTable, to_rich
 
     found = every()
     best = most_compact(found)
@@ -57,8 +60,8 @@ def record(
     All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
     the simulated grasper, with its board in the loop.
     """
+    from rig.grasper.wrist_plant import Wrist, wrist_campaign
     from rig.log.convert import write_recording
-    from rig.simulation.wrist_plant import Wrist, wrist_campaign
 
     out.mkdir(parents=True, exist_ok=True)
     logs = []
@@ -74,10 +77,8 @@ def record(
 
 @grasper_app.command()
 def follow(
-    config: Annotated[
-        Path | None,
-        typer.Option("--config", "-c", help="Configuration; simulated grasper if none."),
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     master: Annotated[
         str | None,
         typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
@@ -94,11 +95,11 @@ def follow(
     The grasper moves. It starts where it stands, however the master is held. Ctrl-C leaves, with
     the motors out of force.
     """
-    from rig.config import load_config
-    from rig.config_check import refuse_problems
+    from rig.configuration.check import refuse_problems
     from rig.grasper.following import follow_master
 
-    settings = load_config(config or Path("grasper"))
+    # the simulated rig of this command is the simulated grasper
+    settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)
     refuse_problems(settings)
     screen = results(json)
     with progress() as bar:

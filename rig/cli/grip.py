@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, results
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, emit_json, results
 
 REACHED_RATIO = 0.1
 """The mean estimate of the second half is this near to the torque, as a share of it."""
@@ -14,9 +15,8 @@ REACHED_RATIO = 0.1
 def grip(
     torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
     duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     model: Annotated[
         Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
     ] = None,
@@ -30,15 +30,14 @@ def grip(
     """
     import numpy as np
 
-    from rig.config import load_config
+    from rig.bench.logger import open_logger
+    from rig.bench.session import Session
     from rig.errors import UsageError
-    from rig.grip import SHARE, hold_grip
     from rig.live.estimator import ModelEstimator
-    from rig.logger import open_logger
-    from rig.session import Session
-    from rig.trajectory import SAMPLE_RATE_HZ
+    from rig.live.grip import SHARE, hold_grip
+    from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     most_a = SHARE * settings.reference_limits.load_command_a
     path = model or settings.model_path
     if path is None:

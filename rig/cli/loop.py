@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 
 def loop(
@@ -36,16 +36,16 @@ def loop(
 
     Ends when every name is unique, when nothing is missing, or when the budget is spent.
     """
-    from rig.config import load_config
+    from rig.configuration.config import load_config
     from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
     from rig.errors import UsageError
-    from rig.protocol import load_protocol
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
+    from rig.protocols.protocol import load_protocol
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import next_sentence, sentences
-    from rig.reports.provenance import Provenance
-    from rig.reports.render import write_report
     from rig.simulation.hidden import chosen
 
     if not sim:

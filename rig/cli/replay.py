@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, remarks, results
+from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign

@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, results, show_result
+from rig.cli.help import GroupedHelp
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
+from rig.output.console import JsonFlag, emit_json, progress, results, show_result
 
 if TYPE_CHECKING:
-    from rig.studies.oneill import Source
-    from rig.studies.oneill_kinds import KindRow
-    from rig.studies.oneill_networks import NetworkStudy
-    from rig.studies.oneill_states import StateStudy
+    from rig.studies.oneill.kinds import KindRow
+    from rig.studies.oneill.networks import NetworkStudy
+    from rig.studies.oneill.states import StateStudy
+    from rig.studies.oneill.study import Source
 
 study_app = typer.Typer(
     name="study",
     help="Make a paper's results again, on measured or simulated data.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -69,9 +71,9 @@ def oneill(
     Alone it fits Table I's straight lines, in seconds. --networks trains the paper's networks, and
     is long: it can be interrupted, and goes on where it was. --states and --kinds take minutes.
     """
-    from rig.reports import oneill as shown
-    from rig.reports.render import write_report
-    from rig.studies.oneill import open_reference, run_study
+    from rig.output.render import write_report
+    from rig.studies.oneill import page as shown
+    from rig.studies.oneill.study import open_reference, run_study
 
     source = _simulated(seed) if data is None else open_reference(data)
     with progress() as bar:
@@ -125,8 +127,8 @@ class Training:
 def _train(
     source: "Source", left_out: dict[str, str], data: Path | None, training: Training, seed: int
 ) -> "NetworkStudy":
-    from rig.studies.oneill_data import network_tables
-    from rig.studies.oneill_networks import run_networks
+    from rig.studies.oneill.data import network_tables
+    from rig.studies.oneill.networks import run_networks
 
     with progress() as bar:
         task = bar.add_task("closing samples", total=None)
@@ -153,9 +155,9 @@ def _fit_states(
     seed: int,
     figures: Path | None,
 ) -> tuple["StateStudy", list[tuple[str, Path]]]:
-    from rig.reports.oneill_figures import write
-    from rig.studies.oneill_shown import Shown
-    from rig.studies.oneill_states import run_states
+    from rig.studies.oneill.figures import write
+    from rig.studies.oneill.shown import Shown
+    from rig.studies.oneill.states import run_states
 
     kept: list[Shown] = []
 
@@ -175,7 +177,7 @@ def _fit_states(
 
 
 def _fit_kinds(source: "Source", left_out: dict[str, str], seed: int) -> "tuple[KindRow, ...]":
-    from rig.studies.oneill_kinds import run_kinds
+    from rig.studies.oneill.kinds import run_kinds
 
     with progress() as bar:
         task = bar.add_task("kinds of estimators", total=None)
@@ -202,10 +204,10 @@ def zhao(
 ) -> None:
     """Make Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016 again, simulated."""
     from rig.errors import UsageError
-    from rig.reports import zhao as shown
-    from rig.simulation.grasper_plant import PROTOTYPES
-    from rig.studies.haptics import haptics_of
-    from rig.studies.zhao import run_study
+    from rig.grasper.plant import PROTOTYPES
+    from rig.studies.zhao import page as shown
+    from rig.studies.zhao.haptics import haptics_of
+    from rig.studies.zhao.study import run_study
 
     if prototype not in PROTOTYPES:
         raise UsageError(
@@ -242,8 +244,8 @@ def loop(
 ) -> None:
     """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
     from rig.errors import UsageError
-    from rig.reports import loop as shown
-    from rig.studies.loop import TASKS, run_study
+    from rig.studies.loop import page as shown
+    from rig.studies.loop.study import TASKS, run_study
 
     if any(not 1 <= number <= len(TASKS) for number in task or []):
         raise UsageError(f"There are {len(TASKS)} rows.", fix="Write for example --task 1.")
@@ -273,9 +275,9 @@ def instruments(
 ) -> None:
     """Adapt one instrument's estimators to others, with one run or three."""
     from rig.importers.registry import open_campaign
-    from rig.reports import instruments as shown
-    from rig.studies.instruments import run_instruments
-    from rig.studies.oneill import part_of
+    from rig.studies.instruments import page as shown
+    from rig.studies.instruments.study import run_instruments
+    from rig.studies.oneill.study import part_of
 
     others = other or ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
     with progress() as bar:
@@ -295,7 +297,7 @@ def instruments(
 
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
-    from rig.studies.oneill import Source
+    from rig.studies.oneill.study import Source
 
     return Source(
         simulate_reference_campaign(seed),

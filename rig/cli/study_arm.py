@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.output import JsonFlag, emit_json, progress, show_result
+from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
-    from rig.reports.table import TextTable
+    from rig.output.table import TextTable
 
 arm_studies = typer.Typer(rich_markup_mode=None)
 
@@ -94,9 +94,9 @@ def pique(
     json: JsonFlag = False,
 ) -> None:
     """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
-    from rig.reports import pique as shown
-    from rig.studies.arm_search import open_paths
-    from rig.studies.pique import run_study
+    from rig.arm.search import open_paths
+    from rig.studies.pique import page as shown
+    from rig.studies.pique.study import run_study
 
     with progress() as bar:
         task = bar.add_task("paths", total=None)
@@ -123,8 +123,8 @@ def excitation(
     json: JsonFlag = False,
 ) -> None:
     """Design an arm's excitation within its limits at every instant, beside the thesis' search."""
-    from rig.reports.table import to_markdown
-    from rig.studies.excitation import run_excitation, table, write_trajectory
+    from rig.arm.excitation import run_excitation, table, write_trajectory
+    from rig.output.table import to_markdown
 
     with progress() as bar:
         task = bar.add_task("starts", total=starts)
@@ -151,8 +151,8 @@ def wrench(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
-    from rig.reports import pique_wrench as shown
-    from rig.studies.pique_wrench import run_wrench_study
+    from rig.studies.pique import wrench_page as shown
+    from rig.studies.pique.wrench import run_wrench_study
 
     with resumable(state, "wrench", seeds) as (kept, on_arm):
         study = run_wrench_study(seeds, kept, workers, on_arm)
@@ -172,8 +172,8 @@ def delsol(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
-    from rig.reports import delsol as shown
-    from rig.studies.delsol import run_delsol
+    from rig.studies.delsol import page as shown
+    from rig.studies.delsol.study import run_delsol
 
     with resumable(state, "delsol", seeds) as (kept, on_arm):
         study = run_delsol(seeds, kept, workers, on_arm)
@@ -193,9 +193,9 @@ def zhang(
     json: JsonFlag = False,
 ) -> None:
     """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
-    from rig.reports import zhang as shown
-    from rig.reports.zhang_figures import write_figures
-    from rig.studies.zhang import run_zhang
+    from rig.studies.zhang import page as shown
+    from rig.studies.zhang.figures import write_figures
+    from rig.studies.zhang.study import run_zhang
 
     with resumable(state, "zhang", seeds) as (kept, on_arm):
         study = run_zhang(seeds, kept, workers, on_arm)
@@ -222,9 +222,9 @@ def payload(
     json: JsonFlag = False,
 ) -> None:
     """Find a mass added to an arm's insertion axis from its joints' torque."""
-    from rig.reports.table import to_markdown
-    from rig.studies.arm_search import open_paths
-    from rig.studies.payload import find_payload, table
+    from rig.arm.payload import find_payload, table
+    from rig.arm.search import open_paths
+    from rig.output.table import to_markdown
 
     with progress() as bar:
         task = bar.add_task("paths", total=None)

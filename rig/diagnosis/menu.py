@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.recording import Recording
-from rig.config import ReferenceLimits
-from rig.protocol import Protocol
+from rig.configuration.config import ReferenceLimits
+from rig.protocols.protocol import Protocol
 
 LOADS_A = (0.15, 0.5, 0.9)
 MARGIN = 0.8

@@ -15,9 +15,9 @@ from estimation.diagnosis.twin import coarse
 from estimation.diagnosis.variables import PROJECTED, projection
 from estimation.files import write_text_atomic
 from estimation.recording import Recording, shared_columns
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
-from rig.protocol import Protocol, protocol_toml
+from rig.protocols.protocol import Protocol, protocol_toml
 from rig.simulation.twin import Twin
 
 CAMPAIGN_TIME = "campaign_time_s"

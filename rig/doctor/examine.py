@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from rig.config import Config
-from rig.config_check import problems
-from rig.devices import openers
+from rig.bench.devices import openers
+from rig.configuration.check import problems
+from rig.configuration.config import Config
 from rig.doctor.finding import Finding, Level
 from rig.doctor.ports import ROOT, port_findings, serial_ports
 from rig.doctor.stream import device_findings

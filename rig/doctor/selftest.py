@@ -14,11 +14,12 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Trip
-from rig.config import Config
-from rig.devices import openers
+from rig.bench.devices import openers
+from rig.bench.holding import holding
+from rig.bench.logger import open_logger
+from rig.configuration.config import Config
 from rig.doctor.finding import Level
 from rig.doctor.stream import device_findings
-from rig.logger import open_logger
 from rig.machines.choose import machine_of
 
 ZERO_S = 1.0
@@ -60,7 +61,10 @@ def _on_the_board(
     name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
 ) -> Check:
     try:
-        with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
+        with (
+            holding(config.logger.url),
+            TeensyLogger(open_logger(config), machine_of(config).profile) as logger,
+        ):
             logger.identify()
             logger.start()
             passed, detail = check(logger, config)

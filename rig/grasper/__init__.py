@@ -1,1 +1,1 @@
-"""Kinematics and statics of surgical graspers: three decoupled degrees of freedom, and coupled."""
+"""The 3-DOF grasper: kinematics and statics, its machine and master, and its simulated bench."""

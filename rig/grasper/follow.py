@@ -8,9 +8,9 @@ from drivers.device import Device
 from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from estimation.recording import FloatArray
+from rig.grasper.machine import axes_of_joints
 from rig.grasper.master import Master
 from rig.grasper.three_dof import JOINTS
-from rig.machines.grasper import axes_of_joints
 
 READ_S = 0.02
 LEAD_S = 0.05
@@ -25,7 +25,7 @@ def setpoints(
     duration_s: float,
     scale: float = 1.0,
 ) -> Iterator[tuple[FloatArray, ...]]:
-    """Yield what `rig.session.Session.follow` plays, so that the grasper follows its master.
+    """Yield what `rig.bench.session.Session.follow` plays, so that the grasper follows its master.
 
     However the master is held at first, the motors start where they stand and go as far as it goes
     from there. Each sample of the master is one setpoint: both run at 2 kHz. A master that is ahead

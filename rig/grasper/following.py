@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config import Config, DeviceSection, is_simulated
-from rig.devices import open_section
+from rig.bench.devices import open_section
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.configuration.config import Config, DeviceSection, is_simulated
 from rig.errors import UsageError
 from rig.grasper.follow import LEAD_S, setpoints
+from rig.grasper.machine import AXES
 from rig.grasper.master import master_of
-from rig.live.recorder import LiveRecorder
-from rig.logger import open_logger
-from rig.machines.grasper import AXES
-from rig.reading import Reading
-from rig.session import Session
+from rig.machines.reading import Reading
+from rig.recording.recorder import LiveRecorder
 
 DRIVER = "teensy-master"
 SIMULATED_URL = "sim://"

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.recording import FloatArray
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.grasper.coupling import GrasperError
 
 TOP_COUNT = 4095

@@ -15,8 +15,8 @@ from pydantic import (
 )
 
 from estimation.channels import UnknownUnitError, unit_of
+from rig.configuration.validation import explain
 from rig.errors import DataError
-from rig.validation import explain
 
 TIME = "time_s"
 

@@ -6,9 +6,9 @@ from datetime import UTC, datetime, timedelta
 from calibration.record import CalibrationRecord
 from calibration.rules import judge_range
 from calibration.store import active_lines
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.live.block import DeviceStatus
-from rig.reading import Reading
+from rig.machines.reading import Reading
 
 NAME = "calibration"
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from drivers.transport import Transport
 from estimation.channels import unit_of
-from rig.config import Config
+from rig.bench.session import Session
+from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.calibration_status import CalibrationStatus
 from rig.live.keys import LEAVE, MARK, RECORD, TARE, Keys, no_keys
-from rig.live.recorder import LiveRecorder
 from rig.live.replay import EstimateStream
 from rig.machines.machine import MachinePlan
-from rig.reading import Reading
-from rig.session import Session
+from rig.machines.reading import Reading
+from rig.recording.recorder import LiveRecorder
 
 ZERO_S = 0.5
 

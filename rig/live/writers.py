@@ -10,12 +10,12 @@ from rich.live import Live
 from rich.segment import Segment
 
 from estimation.channels import unit_of
-from rig.cli.output import emit_json
 from rig.live.options import ShowOptions
 from rig.live.plain import json_frame, plain_line
 from rig.live.state import Snapshot, Summary
 from rig.live.text import summary_lines
 from rig.live.view import View
+from rig.output.console import emit_json
 
 
 def _sequence(code: str) -> Control:

@@ -1,1 +1,1 @@
-"""What a session moves: the reference rig's spindle, or the motors of the 3-DOF grasper."""
+"""What a session moves, what is read of it, and within which limits."""

@@ -10,7 +10,7 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.logic import BoardDrive
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Trip
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.log.schema import Stream
 
 FloatArray = NDArray[np.float64]

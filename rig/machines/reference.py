@@ -10,13 +10,13 @@ from drivers.teensy.guard import Drive, first_crossing
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, Trip
 from drivers.teensy.reference import REFERENCE, Limits
-from rig.config import Config
+from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.log.streams import COUNTS_STREAM
 from rig.machines.machine import FloatArray, MachinePlan
-from rig.motion import Motion, motion_of, settling
-from rig.protocol import RunPlan
-from rig.safety import board_limits, check_setpoints
+from rig.machines.safety import board_limits, check_setpoints
+from rig.protocols.motion import Motion, motion_of, settling
+from rig.protocols.protocol import RunPlan
 
 
 class ReferenceMachine:

@@ -1,1 +1,1 @@
-"""Reports: tables for a terminal, for Markdown and for a page of HTML that needs nothing else."""
+"""Pages on a campaign: its first look, its diagnosis, its adaptation."""

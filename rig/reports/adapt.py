@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rig.reports.table import TextTable
-from rig.studies.adapt import Adaptation
+from rig.models.adapt import Adaptation
+from rig.output.table import TextTable
 
 
 def table(result: Adaptation) -> TextTable:

@@ -14,15 +14,16 @@ from estimation.diagnosis.story import Story
 from estimation.diagnosis.variables import channels_of
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
-from rig.reports import figures
+from rig.output import figures
+from rig.output.provenance import Provenance
+from rig.output.render import render
+from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display, next_sentence, other_sentences, sentences
-from rig.reports.provenance import Provenance
-from rig.reports.render import render
-from rig.reports.table import TextTable
 
 CONFIDENCE = (
     "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
-    " gain is real and general; on known cases it was too sure (docs/results/blind.md)."
+    " gain is real and general; on known cases it was too sure:"
+    " docs/results/diagnosis-versions.md."
 )
 
 FUNCTIONS = (

@@ -8,10 +8,10 @@ from markupsafe import Markup
 from estimation.campaign import Campaign
 from estimation.model import Estimate, Model, balance_channels, estimate
 from estimation.residual import RunResidual, Structure, profile, residuals
-from rig.reports import figures
-from rig.reports.provenance import Provenance
-from rig.reports.render import render
-from rig.reports.table import TextTable
+from rig.output import figures
+from rig.output.provenance import Provenance
+from rig.output.render import render
+from rig.output.table import TextTable
 
 LIMITS = (
     "Screening only: maps of one variable at a time, fitted on the other runs, each run's mean"

@@ -10,11 +10,11 @@ import numpy as np
 
 from estimation.campaign import Campaign, Run
 from estimation.recording import Instrument, Recording
-from rig.motion import motion_of
-from rig.protocol import RunPlan, load_protocol
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan, load_protocol
+from rig.protocols.trajectory import SAMPLE_RATE_HZ
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.play import play
-from rig.trajectory import SAMPLE_RATE_HZ
 
 
 def simulate_reference_campaign(seed: int = 0, protocol: str = "reference") -> Campaign:

@@ -1,13 +1,11 @@
 """Open the simulated logger: plant, board and a transport in virtual time."""
 
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
-from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import GRASPER_LOGIC
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
-from rig.config import SimulationSection
-from rig.errors import UsageError
+from rig.configuration.config import SimulationSection
+from rig.machines.choose import SIMULATED_BOARDS, installed
 from rig.simulation import hidden, parameters
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
@@ -29,48 +27,28 @@ def open_simulated_logger(
     Args:
         simulation: Seed, spread, hidden effects, and whether the compiled firmware is in the loop.
         url: Name for messages.
-        profile: What is behind the board: `reference` or `grasper`.
+        profile: What is behind the board, a name in the entry point group `rig.simulated_boards`.
         pace: Virtual seconds a real second, None for as fast as possible.
         watchdog_s: Patience of the board with a silent host; time moves in smaller steps than that.
         step_s: Longest virtual time between looks at the board; a choice of its own if None.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
+        UsageError: No simulated board is installed for the profile.
     """
-    board, tick_s = _BOARDS[profile](simulation)
+    board, tick_s = installed(SIMULATED_BOARDS, profile)(simulation)
     # nobody watches a rig that is faster than real time, so it may move in larger steps
     usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
     step_s = min(step_s or usual_s, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace, tick_s=tick_s)
 
 
-def _reference_board(simulation: SimulationSection) -> tuple[Board, float]:
+def reference_board(simulation: SimulationSection) -> tuple[Board, float]:
+    """Return the simulated board of the reference rig, and its tick, s."""
     plant, sensors, effects = plant_and_sensors(simulation)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     firmware = uses_firmware(simulation)
-    return FirmwareBoard(bench) if firmware else TeensyFake(bench), REFERENCE.tick_us * 1e-6
-
-
-def _grasper_board(simulation: SimulationSection) -> tuple[Board, float]:
-    # compiled code that the reference rig does not need
-    from rig.simulation.grasper_bench import GrasperBench
-    from rig.simulation.grasper_plant import PROTOTYPES
-
-    if simulation.hidden or simulation.draw_hidden is not None:
-        raise UsageError(
-            "The simulated grasper has no hidden effects.",
-            "They are of the reference rig's drive, cable and sensors.",
-            "Leave out [simulation] hidden and draw_hidden; spread makes graspers differ.",
-        )
-    prototype = PROTOTYPES[simulation.grasper]
-    bench = GrasperBench(prototype, simulation.seed, simulation.spread)
-    tick_s = GRASPER.tick_us * 1e-6
-    if uses_firmware(simulation):
-        return FirmwareBoard(bench, profile=GRASPER), tick_s
-    return TeensyFake(bench, logic=GRASPER_LOGIC), tick_s
-
-
-_BOARDS = {"reference": _reference_board, "grasper": _grasper_board}
+    return FirmwareBoard(bench) if firmware else PythonBoard(bench), REFERENCE.tick_us * 1e-6
 
 
 def plant_and_sensors(

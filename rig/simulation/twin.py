@@ -16,14 +16,14 @@ from estimation.campaign import Campaign
 from estimation.model import Model
 from estimation.recording import FloatArray, Instrument, Recording
 from rig.errors import DataError
-from rig.motion import motion_of
-from rig.protocol import RunPlan
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan
+from rig.protocols.trajectory import SAMPLE_RATE_HZ
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import noise_std, plant_of, sensors_of, with_load_unit, with_quanta
 from rig.simulation.parameters import PlantParameters, SensorParameters
 from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
-from rig.trajectory import SAMPLE_RATE_HZ
 
 NEEDED = (
     "target_angle_rad",

@@ -1,1 +1,1 @@
-"""Studies: what a paper reports, made again on data, one file a paper."""
+"""Studies: what a paper reports, made again on data, one folder a paper."""

@@ -7,9 +7,9 @@ import pytest
 
 from drivers.errors import DriverError
 from drivers.registry import UnknownDriverError, drivers, open_device
-from rig.config import Config, load_config
-from rig.config_check import problems
-from rig.devices import open_section
+from rig.bench.devices import open_section
+from rig.configuration.check import problems
+from rig.configuration.config import Config, load_config
 
 MODULE = '''
 """A scale on a serial line."""

@@ -14,7 +14,7 @@ from estimation.diagnosis.candidate import pool
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
-from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
+from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 

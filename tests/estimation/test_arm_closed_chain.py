@@ -14,7 +14,7 @@ from estimation.arm.closed_chain import (
 from estimation.arm.identification import damped_around
 from estimation.arm.kinematics import ArmError
 from estimation.arm.periodic import periodic_motion
-from rig.simulation.hydraulic_arm import HYDRAULIC
+from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 

@@ -12,7 +12,7 @@ from estimation.arm.motion import Motion
 from estimation.arm.recursion import LINK
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM, PSM_CLOSED, Arm
-from rig.simulation.arm import excitation
+from rig.arm.simulated import excitation
 
 pytest.importorskip("clarabel", reason="Clarabel is not installed (rig[arm])")
 

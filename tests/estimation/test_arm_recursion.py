@@ -12,7 +12,7 @@ from estimation.arm.kinematics import built
 from estimation.arm.motion import Motion
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM, Arm
-from rig.simulation.hydraulic_arm import HYDRAULIC
+from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 

@@ -8,6 +8,7 @@ import pytest
 
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.closing import closing_samples, processed
 from estimation.cross_validation import closing_score
 from estimation.derived import TRAVEL_WINDOW_S, causal_channels, zero_phase_channels
 from estimation.estimator import Estimator, Recipe, load
@@ -18,7 +19,6 @@ from estimation.estimators.residual import ResidualEstimator, ResidualRecipe
 from estimation.model_file import read
 from estimation.networks.network import NetworkError
 from estimation.networks.training import Settings, has_torch
-from estimation.oneill import closing_samples, processed
 from estimation.recording import MissingChannelError, Recording
 from tests.estimation.synthetic import campaign
 

@@ -7,7 +7,7 @@ import numpy as np
 from estimation import model_file
 from estimation.recording import Recording
 from rig.diagnosis.subject import REFERENCE_RIG
-from rig.protocol import load_protocol
+from rig.protocols.protocol import load_protocol
 from rig.simulation.parameters import PlantParameters, SensorParameters
 from rig.simulation.twin import reference_of, simulate
 

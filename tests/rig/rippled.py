@@ -8,8 +8,8 @@ from estimation import model_file
 from estimation.diagnosis import candidate
 from estimation.diagnosis.gates import Gates
 from estimation.recording import Recording
-from rig.motion import motion_of
-from rig.protocol import Protocol
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import Protocol
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect

@@ -8,8 +8,8 @@ from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_ARMED
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
-from rig.config import Config, load_config
-from rig.protocol import Protocol
+from rig.configuration.config import Config, load_config
+from rig.protocols.protocol import Protocol
 from rig.simulation.logger import open_simulated_logger
 
 

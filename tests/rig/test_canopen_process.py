@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from drivers.errors import LinkLostError
-from rig.canopen_process import CanopenProcess
-from rig.config import Config, load_config
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.canopen.process import CanopenProcess
+from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
-from rig.logger import open_logger
-from rig.session import Session
 
 
 def config(**changes: object) -> Config:
@@ -69,9 +69,9 @@ HOST = """
 import sys
 import numpy as np
 from pathlib import Path
-from rig.config import load_config
-from rig.logger import open_logger
-from rig.session import Session
+from rig.configuration.config import load_config
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
 
 config = load_config(Path("canopen_virtual")).changed(devices={}, safety={"watchdog_s": 1.0})
 link = open_logger(config)

@@ -10,11 +10,11 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.diagnosis.paths import path_of, split_paths
 from estimation.recording import Recording
+from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 from rig.cli.main import main
 from rig.diagnosis import subject
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.schema import DiagnosisSchema
-from rig.simulation.arm import RATE_HZ, draw_arm, excitation, recorded, simulate
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
 
@@ -36,7 +36,7 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     campaign = runs()
     monkeypatch.setattr(subject, "open_campaign", lambda *_: campaign)
     out, report = tmp_path / "diagnosis.json", tmp_path / "report"
-    words = ["diagnose", str(tmp_path), "--balance", "joint.2", "--quick", "--json", str(out)]
+    words = ["diagnose", str(tmp_path), "--balance", "joint.2", "--quick", "--json-out", str(out)]
     words += ["--report", str(report), "--ledger", str(tmp_path / "looks.jsonl")]
     assert main(words) == 0
     found = json.loads(out.read_text())

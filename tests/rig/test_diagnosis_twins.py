@@ -10,12 +10,12 @@ from estimation.diagnosis import diagnose as diagnosing
 from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.propose import propose, write_protocol
 from rig.diagnosis.twins import REMEMBERED, Remembered, twins_of
-from rig.protocol import load_protocol, protocol_toml
+from rig.protocols.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import HiddenEffect
 from tests.rig.rippled import MOTOR, QUICK, few, record
 

@@ -10,13 +10,13 @@ import pytest
 from drivers.device import Batch, Device, SampleFlag
 from drivers.registry import fakes
 from drivers.teensy.device import TeensyDevice
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.faulty import Fault, Faults
 from drivers.transport.simulated import SimulatedTransport
-from rig import firmware
+from rig.bench import firmware
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.doctor.examine import examine
 from rig.doctor.finding import Finding, Level, worst
 from rig.doctor.ports import Port, can_interfaces, port_findings
@@ -50,7 +50,7 @@ def test_a_bad_cable_is_a_warning_with_numbers() -> None:
 
 
 def test_another_firmware_is_told_with_the_command_that_fixes_it() -> None:
-    board = TeensyFake(HandMovedBench(), protocol_hash=0xDEADBEEF)
+    board = PythonBoard(HandMovedBench(), protocol_hash=0xDEADBEEF)
     (finding,) = device_findings("logger", lambda: TeensyDevice(SimulatedTransport(board)))
     assert (finding.check, finding.level) == ("firmware", Level.ERROR)
     assert finding.fix == "Run: rig firmware flash"
@@ -205,9 +205,7 @@ def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(
 ) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(
-        (Path(firmware.__file__).parent / "configs" / "reference.toml")
-        .read_text()
-        .replace("usb:16c0:0483", "/dev/nonesuch")
+        (SHIPPED / "reference.toml").read_text().replace("usb:16c0:0483", "/dev/nonesuch")
     )
     code, result = told(capsys, ["doctor", "-c", str(path)])
     assert code == ExitCode.FAILED

@@ -14,10 +14,10 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.firmware_fake import FirmwareMissingError
 from drivers.teensy.protocol import STATUS_ARMED, Trip
 from drivers.transport import open_transport
-from rig.config import load_config
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.configuration.config import load_config
 from rig.errors import SafetyTripError
-from rig.logger import open_logger
-from rig.session import Session
 from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
 
 HOST = """
@@ -25,8 +25,8 @@ import sys
 import numpy as np
 from pathlib import Path
 from drivers.transport import open_transport
-from rig.config import load_config
-from rig.session import Session
+from rig.configuration.config import load_config
+from rig.bench.session import Session
 
 config = load_config(Path("pty")).changed(safety={"watchdog_s": 0.05, "safe_state": sys.argv[2]})
 with Session(config, open_transport(sys.argv[1])) as session:
@@ -105,9 +105,9 @@ def test_a_missing_program_says_what_to_type(tmp_path: Path) -> None:
 
 WATCHER = """
 from pathlib import Path
-from rig.config import load_config
-from rig.logger import open_logger
-from rig.session import Session
+from rig.configuration.config import load_config
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
 
 config = load_config(Path("pty"))
 try:

@@ -10,16 +10,16 @@ import pytest
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import Trip
 from drivers.transport.simulated import SimulatedTransport
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
 from rig.cli.main import main
-from rig.config import Config, load_config
+from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError, UsageError
+from rig.grasper.machine import axes_of_joints
 from rig.log.check import check_log
 from rig.log.reader import read_log
-from rig.logger import open_logger
-from rig.machines.grasper import axes_of_joints
-from rig.protocol import Protocol, load_protocol
-from rig.record import open_campaign_folder, record_campaign
-from rig.session import Session
+from rig.protocols.protocol import Protocol, load_protocol
+from rig.recording.campaign import open_campaign_folder, record_campaign
 
 STILL = np.zeros(2000)
 
@@ -146,7 +146,7 @@ def refused(tmp_path: Path, text: str, change: Callable[[str], str]) -> str:
 
 
 def test_a_wrong_limit_of_the_grasper_is_named_with_the_nearest(tmp_path: Path) -> None:
-    shipped = (Path(__file__).parents[2] / "rig/configs/grasper.toml").read_text()
+    shipped = (Path(__file__).parents[2] / "rig/configuration/shipped/grasper.toml").read_text()
     told = refused(tmp_path, shipped, lambda t: t.replace("jaw_2_force_n =", "jaw_2_forc_n ="))
     assert "limits.jaw_2_forc_n" in told
     assert "'jaw_2_force_n'" in told

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from rig.bench.session import Session
 from rig.cli.main import main
 from rig.errors import SafetyTripError
-from rig.grip import hold_grip
-from rig.session import Session
+from rig.live.grip import hold_grip
 from tests.rig.simulated import is_armed, simulated, transport
 
 

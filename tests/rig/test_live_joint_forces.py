@@ -13,7 +13,7 @@ from estimation.effects.roles import MOTORS
 from estimation.model_table import ModelFileError
 from estimation.recording import Recording
 from rig.cli.main import main
-from rig.config import SHIPPED, load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.diagnosis.subject import subject
 from rig.live.block import LimitStatus
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints

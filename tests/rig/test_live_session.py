@@ -8,11 +8,11 @@ import pytest
 from estimation import model_file
 from estimation.rest import in_motion
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.live.estimator import ModelEstimator
 from rig.live.session_blocks import session_blocks
 from rig.live.until import until
-from rig.protocol import load_protocol
+from rig.protocols.protocol import load_protocol
 from tests.rig.simulated import is_armed, short_protocol, simulated, transport
 
 

@@ -9,12 +9,12 @@ import pytest
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.diagnosis import loop as looping
 from rig.diagnosis.loop import NO_RIVALS, NOTHING, SPENT, UNIQUE, Budget, run_loop
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
-from rig.protocol import load_protocol
+from rig.protocols.protocol import load_protocol
 from rig.simulation.hidden import NAMES, UnknownHiddenEffectError, chosen
 from tests.rig.simulated import short_protocol, simulated
 
@@ -46,6 +46,7 @@ def diagnosed(monkeypatch):
         return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1])
 
     monkeypatch.setattr(looping, "run_diagnosis", stand_in)
+    monkeypatch.setattr(looping, "remember", lambda *_: None)
     return told
 
 
@@ -132,7 +133,7 @@ def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr(diagnosing, "pool", few)
     protocol = tmp_path / "first.toml"
-    from rig.protocol import protocol_toml
+    from rig.protocols.protocol import protocol_toml
 
     protocol.write_text(protocol_toml(PROTOCOL))
     words = ["loop", "--sim", "--hide", "motor_ripple=0.5", "--balance", "motor", "--quick"]

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from drivers.teensy.protocol import STATUS_ARMED, Trip, TripReport
 from drivers.teensy.reference import REFERENCE, Limits
+from rig.bench.session import Session
+from rig.bench.trips import HostWatch
+from rig.machines.reading import Reading
 from rig.machines.reference import ReferenceMachine
-from rig.reading import Reading
-from rig.session import Session
-from rig.trips import HostWatch
 from tests.rig.simulated import simulated, transport
 
 MAX_STEP = 100

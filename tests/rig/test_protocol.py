@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig import trajectory
 from rig.errors import UsageError
-from rig.protocol import load_protocol
+from rig.protocols import trajectory
+from rig.protocols.protocol import load_protocol
 
 
 def test_the_reference_protocol_is_fifty_runs_of_twenty_seconds():

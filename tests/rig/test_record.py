@@ -8,14 +8,14 @@ import pytest
 
 from drivers.teensy.firmware_fake import firmware_library
 from drivers.transport.simulated import SimulatedTransport
+from rig.bench.session import Session
 from rig.cli.main import main
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
 from rig.log.streams import COUNTS, SAMPLE
-from rig.record import open_campaign_folder, record_campaign
-from rig.session import Session
+from rig.recording.campaign import open_campaign_folder, record_campaign
 from tests.rig.simulated import Wrapped, short_protocol, simulated, transport
 
 

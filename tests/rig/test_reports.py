@@ -15,14 +15,14 @@ from estimation.effects import catalogue
 from estimation.fitting import fit
 from estimation.model_file import read, shipped
 from estimation.residual import largest_structure
-from rig.reports import figures
+from rig.output import figures
+from rig.output.provenance import Provenance, commit
+from rig.output.render import render, write_report
+from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports.diagnosis_words import meaning, sizes_of
 from rig.reports.first_look import first_look
-from rig.reports.oneill import page
-from rig.reports.provenance import Provenance, commit
-from rig.reports.render import render, write_report
-from rig.reports.table import TextTable, to_markdown, to_rich
-from rig.studies.oneill import Source, run_study
+from rig.studies.oneill.page import page
+from rig.studies.oneill.study import Source, run_study
 from tests.estimation.synthetic import campaign
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}

@@ -10,8 +10,8 @@ from drivers.framing import encode_frame
 from drivers.teensy.protocol import encode_ping
 from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
-from rig.config import Config, load_config
-from rig.config_check import refuse_problems
+from rig.configuration.check import refuse_problems
+from rig.configuration.config import Config, load_config
 from rig.doctor.selftest import selftest
 from tests.rig.simulated import Wrapped, simulated, transport
 
@@ -48,7 +48,7 @@ def failing(config: Config, monkeypatch: pytest.MonkeyPatch, change: object) -> 
         return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))  # type: ignore[operator]
 
     monkeypatch.setattr("rig.doctor.selftest.open_logger", opened)
-    monkeypatch.setattr("rig.devices.open_logger", opened)
+    monkeypatch.setattr("rig.bench.devices.open_logger", opened)
     return [check.name for check in selftest(config) if not check.passed]
 
 

@@ -3,9 +3,9 @@
 import pytest
 
 from drivers.clock import ClockError
-from rig.config import load_config
-from rig.logger import open_logger
-from rig.session import Session
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.configuration.config import load_config
 
 
 def test_a_session_states_the_residual_of_its_clock() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from estimation.recording import Recording
-from rig import trajectory
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
+from rig.protocols import trajectory
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.compare import CHANNELS, compare, draw_figure
 from rig.simulation.play import play

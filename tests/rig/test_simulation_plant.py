@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.teensy.guard import Drive
-from rig import trajectory
+from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import HiddenEffect

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.teensy.guard import Drive
-from rig import trajectory
+from rig.protocols import trajectory
 from rig.simulation import sensors
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import REFERENCE_GAINS, SensorParameters

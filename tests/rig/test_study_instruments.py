@@ -6,8 +6,8 @@ import pytest
 
 from estimation.campaign import Campaign
 from estimation.recording import Recording
-from rig.reports import instruments as shown
-from rig.studies.instruments import run_instruments
+from rig.studies.instruments import page as shown
+from rig.studies.instruments.study import run_instruments
 from tests.estimation.synthetic import campaign
 
 TARGET = "proximal_torque_n_m"

@@ -11,7 +11,7 @@ from estimation.effects import effect
 from estimation.recording import Instrument, Recording
 from rig.cli.main import main
 from rig.errors import DataError
-from rig.studies import loop
+from rig.studies.loop import study as loop
 
 STICKING = effect("friction.position.sticking")
 FEW = ("friction.position", "friction.viscous", "inertia.missing", "spring.position")

@@ -13,9 +13,9 @@ from estimation.campaign import Campaign
 from estimation.recording import Flag, Stretch
 from rig.cli.study import study_app
 from rig.errors import DataError
-from rig.reports import oneill as shown
-from rig.studies import oneill as study
-from rig.studies.oneill import Result, Source, open_reference, run_study
+from rig.studies.oneill import page as shown
+from rig.studies.oneill import study
+from rig.studies.oneill.study import Result, Source, open_reference, run_study
 from tests.estimation.synthetic import campaign
 
 

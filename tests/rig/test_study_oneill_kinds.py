@@ -3,9 +3,9 @@
 import pytest
 
 from estimation.campaign import Campaign
-from rig.reports import oneill as shown
-from rig.studies import oneill_kinds
-from rig.studies.oneill_kinds import FILTERS, recipes, run_kinds
+from rig.studies.oneill import kinds as oneill_kinds
+from rig.studies.oneill import page as shown
+from rig.studies.oneill.kinds import FILTERS, recipes, run_kinds
 from tests.estimation.synthetic import campaign
 
 

@@ -13,15 +13,15 @@ from estimation.networks.training import Settings, has_torch, train
 from estimation.scores import rmse
 from rig.cli.study import study_app
 from rig.errors import DataError, UsageError
-from rig.reports import oneill_networks as shown
-from rig.reports.oneill_tables import tables as paper_tables
-from rig.studies import oneill as linear
-from rig.studies import oneill_networks as study
-from rig.studies.closing import CAUSAL, closing_table, held_out_masks
-from rig.studies.oneill import Source, run_study
-from rig.studies.oneill_data import network_tables
-from rig.studies.oneill_networks import CHANNELS, NetworkStudy, jobs, run_networks
-from rig.studies.oneill_paper import DISTAL, JAW, PAPER, PROXIMAL
+from rig.studies.oneill import networks as study
+from rig.studies.oneill import networks_page as shown
+from rig.studies.oneill import study as linear
+from rig.studies.oneill.closing_table import CAUSAL, closing_table, held_out_masks
+from rig.studies.oneill.data import network_tables
+from rig.studies.oneill.networks import CHANNELS, NetworkStudy, jobs, run_networks
+from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
+from rig.studies.oneill.study import Source, run_study
+from rig.studies.oneill.tables import tables as paper_tables
 from tests.estimation.synthetic import campaign
 
 torch_only = pytest.mark.skipif(

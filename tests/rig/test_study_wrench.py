@@ -13,8 +13,8 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install
 
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
-from rig.simulation.arm import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
-from rig.studies.pique_wrench import BODY, TWISTED, ati, in_tip_frame
+from rig.arm.simulated import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
+from rig.studies.pique.wrench import BODY, TWISTED, ati, in_tip_frame
 
 
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
@@ -83,6 +83,6 @@ def test_an_interrupted_study_says_how_to_go_on(tmp_path, monkeypatch, capsys):
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("rig.studies.pique_wrench.run_wrench_study", stopped)
+    monkeypatch.setattr("rig.studies.pique.wrench.run_wrench_study", stopped)
     assert main(["study", "wrench", "--state", str(tmp_path)]) == 130
     assert f"kept in {tmp_path}" in capsys.readouterr().err

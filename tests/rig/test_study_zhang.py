@@ -8,14 +8,17 @@ from typer.testing import CliRunner
 
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
+from rig.arm.simulated import dahl, draw_arm
 from rig.cli.study import study_app
-from rig.simulation.arm import dahl, draw_arm
-from rig.simulation.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, with_instrument
-from rig.simulation.psm_grasp import configurations, grasp_and_release
-from rig.simulation.psm_instruments import KINDS
-from rig.simulation.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies import zhang_free, zhang_networks, zhang_physics, zhang_rest
-from rig.studies.zhang import PAPER, run_zhang
+from rig.studies.zhang import free as zhang_free
+from rig.studies.zhang import networks as zhang_networks
+from rig.studies.zhang import physics as zhang_physics
+from rig.studies.zhang import rest as zhang_rest
+from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, with_instrument
+from rig.studies.zhang.psm_grasp import configurations, grasp_and_release
+from rig.studies.zhang.psm_instruments import KINDS
+from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
+from rig.studies.zhang.study import PAPER, run_zhang
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
 torch_only = pytest.mark.skipif(

@@ -11,13 +11,13 @@ from estimation.model import Estimate, Term
 from rig.cli.main import main
 from rig.grasper.angle_led import angle_led
 from rig.grasper.current_force import CurrentForce
-from rig.reports.zhao import markdown
-from rig.simulation.grasper_inputs import end_of_hold, hold, periodic
-from rig.simulation.grasper_plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis, vary
-from rig.studies import zhao
-from rig.studies.haptics import run_haptics
-from rig.studies.zhao_methods import Lacking, axes_of, lacking
-from rig.studies.zhao_paper import DOFS, PAPER_ERRORS_N
+from rig.grasper.inputs import end_of_hold, hold, periodic
+from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis, vary
+from rig.studies.zhao import study as zhao
+from rig.studies.zhao.haptics import run_haptics
+from rig.studies.zhao.methods import Lacking, axes_of, lacking
+from rig.studies.zhao.page import markdown
+from rig.studies.zhao.paper import DOFS, PAPER_ERRORS_N
 
 IDEAL = AxisParameters(
     coulomb_n_m=0.0, load_friction_ratio=0.0, viscous_n_m_s_rad=0.0, current_noise_a=0.0

@@ -11,15 +11,15 @@ from estimation.campaign import Campaign
 from estimation.fitting import fit
 from estimation.model import NotFittedError
 from estimation.recording import Recording
+from rig.bench.session import Session
 from rig.cli.main import main
 from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
 from rig.live.estimator import ModelEstimator
 from rig.live.replay import replay_blocks
 from rig.live.watching import watched
-from rig.record import open_campaign_folder, record_campaign
-from rig.session import Session
-from rig.watching import watch_runs
+from rig.recording.campaign import open_campaign_folder, record_campaign
+from rig.recording.watch import watch_runs
 from tests.estimation import synthetic
 from tests.rig.simulated import short_protocol, simulated, transport
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rig.cli.main import main
-from rig.config import load_config
+from rig.configuration.config import load_config
 from rig.log.reader import LogFile, read_log
 
 WAYS = {
@@ -43,7 +43,7 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> str:
 def configured(way: str, folder: Path) -> str:
     """The shipped configuration, patient with a machine that does other things too."""
     name, simulation = WAYS[way]
-    text = (Path(__file__).parents[2] / f"rig/configs/{name}.toml").read_text()
+    text = (Path(__file__).parents[2] / f"rig/configuration/shipped/{name}.toml").read_text()
     assert text.count("[simulation]") <= 1
     if simulation:
         text = text.replace("[simulation]", f"[simulation]\n{simulation}")

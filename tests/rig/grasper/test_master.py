@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.config import SHIPPED, load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.errors import UsageError
 from rig.grasper.coupling import GrasperError
 from rig.grasper.master import Master, master_of

@@ -1,0 +1,1 @@
+"""Arms: simulated, identified, excited and carrying a payload, on the recordings of any arm."""

@@ -1,0 +1,161 @@
+"""Excitations of an arm: the thesis' active-set search and ours, from the same starts."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimation.arm.design import by_active_set, improved
+from estimation.arm.excitation import (
+    FUNDAMENTAL_HZ,
+    Excitation,
+    condition,
+    fitted,
+    numbers_of,
+    reached,
+    start,
+)
+from estimation.arm.tables import PSM
+from estimation.files import write_text_atomic
+from rig.output.provenance import Provenance
+from rig.output.table import TextTable
+
+RATE_HZ = 200.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one search made of one start.
+
+    Attributes:
+        condition: Condition number of the base regressor, columns of unit length.
+        limits_share: Largest share of any limit that is used, by a bound for every instant.
+        seconds: Time of a core it took.
+    """
+
+    condition: float
+    limits_share: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start and what the searches made of it.
+
+    Attributes:
+        seed: Its seed.
+        condition: Condition number there.
+        thesis: By the thesis' search.
+        shrunk: Condition number of the thesis' result once it is scaled into the limits.
+        ours: By our search, which goes on from the thesis' result; the time of both.
+    """
+
+    seed: int
+    condition: float
+    thesis: Outcome
+    shrunk: float
+    ours: Outcome
+
+
+@dataclass(frozen=True)
+class ExcitationStudy:
+    """Results of the comparison.
+
+    Attributes:
+        schema: Name of this layout.
+        arm: The arm.
+        evaluations: Condition numbers each search may take of each start.
+        starts: Each start.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    arm: str
+    evaluations: int
+    starts: tuple[Start, ...]
+    provenance: Provenance
+
+
+def run_excitation(
+    starts: int, evaluations: int, on_start: Callable[[], None] = lambda: None
+) -> tuple[ExcitationStudy, Excitation]:
+    """Search from several starts by both ways.
+
+    Args:
+        starts: How many; from seed 0.
+        evaluations: Condition numbers each search may take of each start.
+        on_start: Called after each start.
+
+    Returns:
+        The comparison, and our excitation of the lowest condition number.
+    """
+    rows, made = [], []
+    for seed in range(starts):
+        begin = fitted(PSM, start(PSM, seed))
+        clock = time.process_time()
+        sampled = by_active_set(PSM, begin, evaluations)
+        thesis_s = time.process_time() - clock
+        found = improved(PSM, sampled, evaluations)
+        ours_s = time.process_time() - clock
+        shrunk = condition(PSM, fitted(PSM, numbers_of(PSM, sampled)))
+        thesis, ours = _outcome(sampled, thesis_s), _outcome(found, ours_s)
+        rows.append(Start(seed, condition(PSM, begin), thesis, shrunk, ours))
+        made.append(found)
+        on_start()
+    study = ExcitationStudy(
+        "rig.study.excitation/1", PSM.name, evaluations, tuple(rows), Provenance.now(0)
+    )
+    return study, min(made, key=lambda each: condition(PSM, each))
+
+
+def _outcome(found: Excitation, seconds: float) -> Outcome:
+    return Outcome(condition(PSM, found), reached(PSM, found), seconds)
+
+
+def table(study: ExcitationStudy) -> TextTable:
+    """Return the comparison as a table."""
+    rows = [
+        [
+            str(each.seed),
+            f"{each.condition:.0f}",
+            *_cells(each.thesis),
+            f"{each.shrunk:.1f}",
+            *_cells(each.ours),
+        ]
+        for each in study.starts
+    ]
+    thesis, ours = (
+        [f"{way}: {what}" for what in ("condition", "limits used, %", "core time, s")]
+        for way in ("active set", "ours")
+    )
+    return TextTable(
+        f"Condition number of the base regressor, {study.evaluations} evaluations a search",
+        ["start", "condition there", *thesis, "scaled into limits", *ours],
+        rows,
+        "Five harmonics of 0.1 Hz. Limits used: of position, velocity and acceleration, a bound"
+        " for every instant (sampled values and half a step of the series' largest slope); up to"
+        " 100 % nothing is passed. The thesis' limits are those within which its arm collides with"
+        " nothing; its acceleration is not stated, four times the speed limit a second is assumed.",
+    )
+
+
+def _cells(found: Outcome) -> tuple[str, str, str]:
+    return f"{found.condition:.1f}", f"{100 * found.limits_share:.1f}", f"{found.seconds:.1f}"
+
+
+def write_trajectory(excitation: Excitation, path: Path) -> None:
+    """Write one period of an excitation as text: time, s, and positions, rad or m, at 200 Hz.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    instants = np.arange(round(RATE_HZ / FUNDAMENTAL_HZ)) / RATE_HZ
+    position = excitation.motion(instants).position
+    units = ["position_m" if j.kind == "prismatic" else "angle_rad" for j in PSM.joints]
+    head = ",".join(["time_s", *(f"joint_{k}_{unit}" for k, unit in enumerate(units, start=1))])
+    lines = [
+        ",".join(f"{value:.9g}" for value in row) for row in np.column_stack([instants, position])
+    ]
+    write_text_atomic(path, "\n".join([head, *lines]) + "\n")

@@ -1,0 +1,54 @@
+"""Effects of an arm chosen on one path alone, so that another path is untouched by the choice.
+
+The path is cut into stretches, at the same places of every period: what fits one period fits the
+next by heart. Every other stretch is fitted and the rest tested on, and back.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arm.effects import ArmEffect
+from estimation.arm.motion import LOW_PASS
+from estimation.diagnosis.paths import period_samples
+from estimation.diagnosis.split import SplitError
+from estimation.recording import Recording
+from rig.arm.search import RATE_SHARE, Prepared, search
+
+STRETCHES = 8
+"""Of a period: each longer than the filter remembers, and half of them see most of the range."""
+
+
+def period_of(run: Recording) -> float | None:
+    """Return the period of a run's motion in samples of a prepared path; None if it has none."""
+    try:
+        seconds = period_samples(run) / run.sample_rate_hz
+    except SplitError:
+        return None
+    return seconds * RATE_SHARE * LOW_PASS.cutoff_hz
+
+
+def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) -> list[str]:
+    """Return the effects that help from some stretches of a path to the others and back.
+
+    Args:
+        path: The path, prepared with these effects.
+        run: What it was prepared from.
+        tried: The candidates.
+    """
+    samples = np.arange(len(path.torque))
+    period = period_of(run) or len(samples)
+    first = np.floor(samples / period * STRETCHES) % 2 == 0
+    one, other = (
+        replace(
+            path,
+            position=path.position[kept],
+            torque=path.torque[kept],
+            thesis=path.thesis[kept],
+            closed=path.closed[kept],
+            table=path.table[kept],
+        )
+        for kept in (first, ~first)
+    )
+    return search((one, other), (other, one), tried)[1]

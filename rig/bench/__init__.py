@@ -1,0 +1,1 @@
+"""The connected rig: its logger and further devices, opened, and the session that uses them."""

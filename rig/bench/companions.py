@@ -1,0 +1,173 @@
+"""The further devices of a rig, read beside the logger and put on its time.
+
+A device that only streams tells no clock: its samples are numbered, and the line from their numbers
+to the host's clock is fitted through the earliest arrivals. The logger's clock is a line of the
+host's too, so both are on one time base, each with the residual of its fit.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import ClockLine, arrival_fit
+from drivers.device import Batch, Device
+from rig.bench.devices import open_section
+from rig.configuration.config import Config, is_simulated
+from rig.log.schema import Field, Stream
+
+REFIT_S = 0.5
+ARRIVALS_KEPT = 2000
+BATCHES_KEPT = 20_000
+"""Kept while nobody asks; older ones are let go."""
+MOST_READS = 64
+"""Most reads of one device a turn; a device that has more waits for the next."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beside:
+    """Samples of one device since it was last asked.
+
+    Attributes:
+        host_s: When each was taken, by the host's clock, shape (n,).
+        columns: Values by channel, each of shape (n,).
+        sequence: Number of each sample since the stream began, shape (n,).
+        flags: `SampleFlag` bits, shape (n,).
+    """
+
+    host_s: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.float64]]
+    sequence: NDArray[np.int64]
+    flags: NDArray[np.uint8]
+
+
+class Companion:
+    """One device beside the logger.
+
+    Args:
+        name: Its name in the configuration.
+        device: The device, open.
+        in_step: It is a fake with a clock of its own, which is to keep step with the logger's.
+    """
+
+    def __init__(self, name: str, device: Device, in_step: bool) -> None:
+        self.name = name
+        self.device = device
+        self._in_step = in_step
+        self._began_s = 0.0
+        self._newest = -1
+        self._batches: deque[Batch] = deque(maxlen=BATCHES_KEPT)
+        self._arrivals: list[tuple[int, float]] = []
+        self._refit_at_s = 0.0
+        self.line: ClockLine | None = None
+        """From sequence over rate to the host's clock, once there are arrivals enough."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Its nominal rate."""
+        return self.device.channels[0].rate_hz
+
+    def begin(self, now_s: float) -> None:
+        """Identify it and let its samples come.
+
+        Raises:
+            DriverError: It does not answer.
+        """
+        self.device.identify()
+        self.device.start()
+        self._began_s = now_s
+
+    def poll(self, now_s: float) -> None:
+        """Take in what has come by now, without waiting for it.
+
+        Raises:
+            DriverError: It is gone, or says that something is wrong.
+        """
+        due = (now_s - self._began_s) * self.rate_hz
+        for _ in range(MOST_READS):
+            if self._in_step and self._newest >= due:
+                return
+            batch = self.device.read(0.05 if self._in_step else 0.0)
+            if len(batch):
+                self._take(batch, now_s)
+            elif not self._in_step:
+                return
+
+    def take(self) -> Beside:
+        """Return the samples since the last call, on the host's clock."""
+        batches = list(self._batches)
+        self._batches.clear()
+        names = [channel.name for channel in self.device.channels]
+        sequence = _joined([batch.sequence for batch in batches], np.int64)
+        time_s = _joined([batch.time_s for batch in batches], np.float64)
+        return Beside(
+            self._on_host(sequence, time_s),
+            {n: _joined([batch.columns[n] for batch in batches], np.float64) for n in names},
+            sequence,
+            _joined([batch.flags for batch in batches], np.uint8),
+        )
+
+    def stream(self) -> Stream:
+        """Return its stream in a log."""
+        return Stream(
+            topic(self.name),
+            f"rig_msgs/msg/{''.join(part.title() for part in self.name.split('_'))}",
+            (
+                Field("time_s", "float64", "s", "time of the run, by the logger's clock"),
+                *(
+                    Field(c.name, "float64", "" if c.unit == "count" else c.unit, c.description)
+                    for c in self.device.channels
+                ),
+                Field("sequence", "uint32", "", "number of the sample since the stream began"),
+                Field("flags", "uint32", "", "1 saturated, 2 stale, 4 missing, 8 suspect"),
+            ),
+            None,
+        )
+
+    def _take(self, batch: Batch, now_s: float) -> None:
+        self._newest = int(batch.sequence[-1])
+        self._batches.append(batch)
+        if self._in_step:
+            return
+        self._arrivals = [*self._arrivals[-ARRIVALS_KEPT:], (self._newest, float(now_s))]
+        if now_s >= self._refit_at_s and len(self._arrivals) > 2:
+            numbers, arrived_s = (np.array(column) for column in zip(*self._arrivals, strict=True))
+            self.line = arrival_fit(numbers, arrived_s, self.rate_hz)
+            self._refit_at_s = now_s + REFIT_S
+
+    def _on_host(
+        self, sequence: NDArray[np.int64], time_s: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        if self._in_step:
+            host_s: NDArray[np.float64] = self._began_s + sequence / self.rate_hz
+            return host_s
+        return time_s if self.line is None else self.line.to_host(sequence / self.rate_hz)
+
+
+def topic(name: str) -> str:
+    """Return the topic of a device's stream in a log."""
+    return f"/rig/device/{name}"
+
+
+def open_companions(config: Config) -> list[Companion]:
+    """Open every further device of a configuration; when one fails, the others are closed.
+
+    Raises:
+        DriverError: One cannot be opened.
+    """
+    opened: list[Companion] = []
+    try:
+        for name, section in config.devices.items():
+            device = open_section(section)
+            opened.append(Companion(name, device, in_step=is_simulated(section.url)))
+    except BaseException:
+        for companion in opened:
+            companion.device.close()
+        raise
+    return opened
+
+
+def _joined(parts: list[NDArray], dtype: type) -> NDArray:  # type: ignore[type-arg]
+    return np.concatenate(parts).astype(dtype) if parts else np.empty(0, dtype)

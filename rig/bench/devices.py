@@ -1,0 +1,42 @@
+"""The configured devices, opened: the real ones by URL, their fakes behind `sim:`."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from drivers.device import Device
+from drivers.registry import open_device, open_fake
+from drivers.teensy.channels import raw_channels
+from drivers.teensy.device import TeensyDevice
+from rig.bench.logger import open_logger
+from rig.configuration.check import LOGGER
+from rig.configuration.config import Config, DeviceSection, is_simulated
+from rig.machines.choose import machine_of
+
+SIMULATED_STEP_S = 0.02
+"""A simulated device delivers as often as a real one may; its silences are counted."""
+
+
+def open_section(section: DeviceSection) -> Device:
+    """Open one configured device, or its driver's fake where its URL is `sim:`.
+
+    Raises:
+        DriverError: It cannot be opened.
+    """
+    if is_simulated(section.url):
+        return open_fake(section.driver)
+    return open_device(section.driver, section.url, **section.options)
+
+
+def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
+    """Yield name and a function that opens it, of the logger and of each further device."""
+    counts = {line.counts for line in config.calibration_set().channels.values()}
+    if config.logger.driver == "epos4":
+        counts -= {"current"}  # a drive that is switched off tells no current at all
+    profile = machine_of(config).profile
+    wired = [channel for channel in raw_channels(profile) if channel.field in counts]
+    yield (
+        LOGGER,
+        lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired, profile),
+    )
+    for name, section in config.devices.items():
+        yield name, partial(open_section, section)

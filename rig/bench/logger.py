@@ -1,0 +1,64 @@
+"""Open the logger a configuration names: the real one, or the simulated one behind `sim://`."""
+
+from drivers.transport import Transport, open_transport
+from rig.configuration.config import Config
+
+PTY_URL = "sim://pty"
+"""The firmware as a process, in real time."""
+VIRTUAL_CAN_URL = "sim://virtual-can"
+"""The fake of an EPOS4 on a virtual bus of python-can, in real time."""
+
+
+def is_real_time(config: Config) -> bool:
+    """Say whether the logger samples by itself, as time passes."""
+    return not config.is_simulated or config.logger.url in (PTY_URL, VIRTUAL_CAN_URL)
+
+
+def open_logger(
+    config: Config, pace: float | None = None, step_s: float | None = None
+) -> Transport:
+    """Return an open transport to the configured logger.
+
+    Args:
+        config: The configuration.
+        pace: Simulated seconds a real second, None for as fast as possible; a real logger has its
+            own pace.
+        step_s: Longest simulated time between looks at the logger's output; its own choice if None.
+
+    Raises:
+        DriverError: The logger cannot be reached.
+    """
+    if config.logger.url == PTY_URL:
+        from rig.simulation.firmware_process import FirmwareProcess
+
+        return FirmwareProcess(config.logger.profile)
+    if config.logger.driver == "epos4":
+        return _open_canopen_logger(config)
+    if config.is_simulated:
+        # the plant is compiled code that a session with a real rig does not need
+        from rig.simulation.logger import open_simulated_logger
+
+        return open_simulated_logger(
+            config.simulation,
+            config.logger.url,
+            config.logger.profile,
+            pace,
+            config.safety.watchdog_s,
+            step_s,
+        )
+    if config.logger.driver == "teensy-can":
+        from drivers.teensy.can_device import open_can_transport
+
+        return open_can_transport(config.logger.url, **config.logger.options)
+    return open_transport(config.logger.url)
+
+
+def _open_canopen_logger(config: Config) -> Transport:
+    """Return the link to a logger's logic on an EPOS4."""
+    if config.is_simulated and config.logger.url != VIRTUAL_CAN_URL:
+        from rig.canopen.simulated import open_simulated_canopen
+
+        return open_simulated_canopen(config)
+    from rig.canopen.process import CanopenProcess
+
+    return CanopenProcess(config)

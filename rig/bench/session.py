@@ -1,0 +1,327 @@
+"""A session with the rig: connected devices, limits checked at every sample, safe on every way out.
+
+The session streams from start to end. `rest` reads the disarmed rig; `play` arms it and plays a
+trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM, a lost terminal), the
+logger is disarmed first, and the disarming is confirmed by the logger itself.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, suppress
+from time import sleep
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.linear import CalibrationSet
+from calibration.zero import SensorZero, measure_zeros
+from drivers.clock import ClockFit
+from drivers.errors import CommandRefusedError, DriverError
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Identity, Trip, TripReport
+from drivers.transport.transport import Transport
+from rig.bench.companions import Companion, open_companions
+from rig.bench.holding import holding
+from rig.bench.interrupts import leaving_safely
+from rig.bench.logger import is_real_time
+from rig.bench.trips import HostWatch, trip_error, tripped
+from rig.configuration.config import Config
+from rig.errors import RigError, SafetyTripError, UsageError
+from rig.machines.choose import machine_of
+from rig.machines.reading import Reading, reading_of, with_setpoints
+from rig.machines.safety import check_samples
+
+LEAD_S = 0.3
+"""Setpoints are kept this far ahead of the rig, s: longer than any pause of the host."""
+
+UNENDING = 2**62
+"""Number of setpoints while it is not known how many there will be."""
+
+READ_TIMEOUT_S = 0.2
+"""Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
+
+GATHER_S = 0.008
+"""In real time samples gather this long between two readings, s: a block costs as much as one."""
+
+CLOCK_EVERY_S = 0.25
+"""How often a reading follows the one before at once, so that the clock's answer is not kept, s."""
+
+STALL_S = 1.0
+"""With no sample for this long, the logger is taken for dead, s."""
+
+
+class LoggerStalledError(RigError):
+    """The logger sends nothing although it should stream."""
+
+
+class Session:
+    """A connected rig.
+
+    Use as a context manager. Reading is driven by the caller: nothing runs in the background, so
+    on a simulated transport a session is exactly repeatable.
+    """
+
+    def __init__(self, config: Config, transport: Transport) -> None:
+        self.config = config
+        self.calibrations: CalibrationSet = config.calibration_set()
+        self.zeros: dict[str, float] = {}
+        self.identity: Identity
+        self.machine = machine_of(config)
+        self._logger = TeensyLogger(transport, self.machine.profile)
+        self._transport = transport
+        self._ways_out = ExitStack()
+        self._first_tick_us: int | None = None
+        self.here: tuple[float, ...] = ()
+        """Where it stood in the newest sample: what its setpoints ask for, rad."""
+        self._watch: HostWatch | None = None
+        self._gathers = is_real_time(config)
+        self._read_s = self._clock_due_s = -np.inf
+        self.newest_tick_us = 0
+        self.companions: list[Companion] = []
+        self.clock = ClockFit()
+        """The logger's clock against this computer's; its line states the residual of the fit."""
+
+    def __enter__(self) -> Self:
+        with ExitStack() as ways_out:
+            ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
+            ways_out.enter_context(holding(self.config.logger.url))
+            ways_out.callback(self._close)
+            self.identity = self._logger.identify()
+            self.companions = open_companions(self.config)
+            for companion in self.companions:
+                ways_out.callback(companion.device.close)
+            ways_out.callback(self._stop_streaming)
+            for companion in self.companions:
+                companion.begin(self._transport.now_s)
+            self._logger.start()
+            self._ways_out = ways_out.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ways_out.__exit__(kind, error, trace)
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """The link's counters: frames, CRC errors, gaps, lost samples, discarded bytes, retries."""
+        return self._logger.counters.as_dict()
+
+    @property
+    def board(self) -> dict[str, str]:
+        """Who the board is, as a log and a calibration keep it."""
+        return {
+            "logger_serial": self.identity.serial,
+            "firmware_version": self.identity.firmware_version,
+            "firmware_build": f"{self.identity.build_hash:08x}",
+        }
+
+    @property
+    def spindle_angle_rad(self) -> float:
+        """Where the spindle stood in the newest sample, rad."""
+        return self.here[0]
+
+    def safe(self) -> None:
+        """Disarm: command 0, load 0, confirmed by the logger.
+
+        Raises:
+            DriverError: The logger did not confirm; cut the power by hand.
+        """
+        self._watch = None
+        self._logger.disarm()
+
+    def rest(self, duration_s: float) -> Iterator[Reading]:
+        """Read the disarmed rig for a while."""
+        self.safe()
+        remaining = round(duration_s * self.machine.profile.rate_hz)
+        while remaining > 0:
+            reading = self._read()
+            remaining -= len(reading.time_s)
+            yield reading
+
+    def take_zeros(self, duration_s: float) -> dict[str, SensorZero]:
+        """Measure the zeros of the disarmed rig and use them from now on.
+
+        Raises:
+            CalibrationError: Too few samples came.
+        """
+        counts = np.concatenate([reading.counts for reading in self.rest(duration_s)])
+        zeros = measure_zeros(counts, self.calibrations)
+        self.zeros = {name: zero.mean_counts for name, zero in zeros.items()}
+        return zeros
+
+    def watch(self) -> Iterator[Reading]:
+        """Read the rig as it is, without arming or moving it, until the caller stops."""
+        while True:
+            yield self._read()
+
+    def play(self, *setpoints: NDArray[np.float64]) -> Iterator[Reading]:
+        """Arm the rig and play a trajectory; each sample says which setpoint it played.
+
+        Args:
+            setpoints: What is asked for at the board's rate, closing-positive, each of shape (n,):
+                the spindle's angle, rad, and the load motor's current, A; of a grasper the angles
+                of yaw, jaw 1 and jaw 2, rad.
+
+        Raises:
+            UsageError: The motion is for another kind of rig.
+            SafetyTripError: A limit was crossed; the rig is disarmed.
+            LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
+        """
+        if len(setpoints) != len(self.machine.setpoint_channels):
+            raise UsageError(
+                f"{self.config.name} takes {', '.join(self.machine.setpoint_channels)}.",
+                f"The motion has {len(setpoints)} of them: it is for another kind of rig.",
+                "Choose a configuration with another [logger] profile.",
+            )
+        self.machine.check_setpoints(self.config, setpoints)
+        most = self.machine.profile.max_setpoints
+        blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]
+        yield from self.follow(tuple(column[b] for column in setpoints) for b in blocks)
+
+    def follow(
+        self, setpoints: Iterator[tuple[NDArray[np.float64], ...]], lead_s: float = LEAD_S
+    ) -> Iterator[Reading]:
+        """Arm the rig and play setpoints that are decided while it goes, until there are no more.
+
+        A piece is asked for `lead_s` before it is played, so what a reading tells can change what
+        comes so much later.
+
+        Args:
+            setpoints: Pieces of what `play` takes, each of shape (n,), n from 1 to the profile's
+                `max_setpoints`.
+            lead_s: Time between asking and playing; shorter pauses of this computer do no harm.
+
+        Raises:
+            SafetyTripError: A setpoint or a sample is beyond a limit; the rig is disarmed.
+            LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
+        """
+        lead = round(lead_s * self.machine.profile.rate_hz)
+        board = self.machine.board_limits(self.config, self.calibrations)
+        self._watch = HostWatch(board, self.machine)
+        self._watch.prepare()
+        self._logger.arm(self.machine.gains(self.config), board)
+        queued = played = 0
+        is_over = False
+        newest_sequence: int | None = None
+        while not is_over or played < queued:
+            while not is_over and queued < played + lead:
+                piece = next(setpoints, None)
+                if piece is None:
+                    is_over = True
+                    break
+                self.machine.check_setpoints(self.config, piece)
+                names = self.machine.setpoint_channels
+                self._queue(*(self._to_counts(n, v) for n, v in zip(names, piece, strict=True)))
+                queued += piece[0].size
+            reading = self._read()
+            # until the end is known, a queue that ran dry is a setpoint that is missing
+            planned = queued if is_over else UNENDING
+            reading = with_setpoints(reading, played, planned, newest_sequence)
+            played = max(played, int(reading.setpoint.max()) + 1)
+            newest_sequence = int(reading.counts["sequence"][-1]) if played else None
+            yield reading
+
+    def settle(self) -> None:
+        """Move the unloaded rig a little, so that friction gives up the torque it holds."""
+        for _ in self.play(*self.machine.settling(self.here).setpoints):
+            pass
+
+    def _gather(self) -> None:
+        """Let samples gather where time is real and the board runs by itself."""
+        now_s = self._transport.now_s
+        if now_s >= self._clock_due_s:
+            self._clock_due_s = now_s + CLOCK_EVERY_S
+        elif self._gathers:
+            sleep(max(0.0, self._read_s + GATHER_S - now_s))
+        self._read_s = self._transport.now_s
+
+    def _read(self) -> Reading:
+        self._gather()
+        self._logger.heartbeat()
+        give_up_s = self._transport.now_s + STALL_S
+        while True:
+            batch = self._logger.read(READ_TIMEOUT_S)
+            if len(batch.samples):
+                break
+            if self._transport.now_s > give_up_s:
+                raise LoggerStalledError(
+                    f"The logger has sent nothing for {STALL_S:g} s.",
+                    "Its cable was pulled, it was reset, or its program stopped.",
+                    "Check the cable and its supply, then start again; nothing recorded is lost.",
+                )
+        self._follow_clock()
+        for companion in self.companions:
+            companion.poll(self._transport.now_s)
+        if self._first_tick_us is None:
+            self._first_tick_us = int(batch.tick_us[0])
+        reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
+        self.newest_tick_us = int(reading.tick_us[-1])
+        self.here = self.machine.here(reading.columns)
+        try:
+            self._require_no_trip(reading)
+            check_samples(self.config.limits, reading)
+            crossing = self._watch.check(reading) if self._watch else None
+            if crossing is not None:
+                raise self._tripped(crossing, "This computer is disarming the rig.")
+        except SafetyTripError:
+            self.safe()
+            raise
+        return reading
+
+    def _tripped(self, report: TripReport, state: str) -> SafetyTripError:
+        return trip_error(report, self.calibrations, state, self.machine)
+
+    def _queue(self, *columns: NDArray[np.int32]) -> None:
+        """Queue setpoints; a board that has tripped since it was read says over what."""
+        try:
+            self._logger.queue(*columns)
+        except CommandRefusedError as error:
+            report = self._logger.trip()
+            if report.code is Trip.NONE:
+                raise
+            state = "It is in its safe state, until armed again."
+            raise self._tripped(report, state) from error
+
+    def _require_no_trip(self, reading: Reading) -> None:
+        """Look for what the board itself tripped over.
+
+        Raises:
+            SafetyTripError: It did and is in its safe state; says over what, and how late.
+        """
+        trip = tripped(reading)
+        if self._watch is not None and trip is not None:
+            state = "It holds the spindle with a low command" if trip[1] else "It is released"
+            raise self._tripped(self._logger.trip(), f"{state}, until armed again.")
+
+    def _follow_clock(self) -> None:
+        exchange = self._logger.last_exchange
+        if exchange is not None:
+            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
+
+    def _to_counts(self, channel: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
+        line = self.calibrations.channels[channel]
+        return np.round(values / line.slope + line.zero_counts).astype(np.int32)
+
+    def _stop_streaming(self) -> None:
+        try:
+            self.safe()
+        except DriverError as error:
+            raise SafetyTripError(
+                "The rig did not confirm that it is disarmed.",
+                error.what,
+                "Cut the motor supply by hand and look at the rig.",
+            ) from error
+        finally:
+            # a logger that did not confirm will not answer this either; the first error counts
+            with suppress(DriverError):
+                self._logger.stop()
+
+    def _close(self) -> None:
+        """Let go of the link; whether the rig was disarmed has been settled before."""
+        with suppress(DriverError):
+            self._logger.close()

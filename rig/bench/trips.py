@@ -1,0 +1,184 @@
+"""What tripped, in words: what happened, how late, how to clear it; and the host's own watch."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.linear import CalibrationSet
+from drivers.teensy.profile import ArmLimits
+from drivers.teensy.protocol import (
+    STATUS_ARMED,
+    STATUS_HOLDING,
+    STATUS_LIMIT_TRIPPED,
+    STATUS_WATCHDOG_TRIPPED,
+    TRIP_SHIFT,
+    Trip,
+    TripReport,
+)
+from estimation.channels import unit_of
+from rig.errors import SafetyTripError
+from rig.machines.machine import Machine
+from rig.machines.reading import Reading, has_status
+
+WORDS: dict[Trip, tuple[str, str]] = {
+    Trip.HOST_SILENT: (
+        "The board heard nothing from this computer for too long",
+        "Look for what kept this computer busy; [safety] watchdog_s says how long it may be.",
+    ),
+    Trip.OVER_CURRENT: (
+        "The motor current crossed its limit",
+        "Find out what the motor works against; the limit is [limits] motor_current_a.",
+    ),
+    Trip.PROXIMAL_TORQUE: (
+        "The torque at the spindle crossed its limit",
+        "Find out what the jaw met; the limit is [limits] proximal_torque_n_m.",
+    ),
+    Trip.DISTAL_TORQUE: (
+        "The torque at the jaw crossed its limit",
+        "Find out what the jaw met; the limit is [limits] distal_torque_n_m.",
+    ),
+    Trip.SPINDLE_TRAVEL: (
+        "The spindle went beyond its travel",
+        "Turn it back by hand; the limit is [limits] spindle_angle_rad.",
+    ),
+    Trip.JAW_TRAVEL: (
+        "The jaw went beyond its travel",
+        "Move it back by hand; the limits are [safety] jaw_open_rad and jaw_closed_rad.",
+    ),
+    Trip.OVER_SPEED: (
+        "The motor turned too fast",
+        "Look for a broken cable or a load that let go; the limit is [safety] motor_speed_rad_s.",
+    ),
+    Trip.OVERHEATED: (
+        "The motor current was too high for too long",
+        "Let the motor cool; see [safety] continuous_current_a and heat_a2_s.",
+    ),
+    Trip.STALLED: (
+        "The motor had current and did not move",
+        "Look for what blocks the drive; see [safety] stall_current_a and stall_s.",
+    ),
+    Trip.SENSOR_SATURATED: (
+        "A sensor stayed at the end of its range",
+        "Check its wiring and amplifier, and that the load fits it; see [safety] saturated_s.",
+    ),
+    Trip.SENSOR_STALE: (
+        "A sensor's reading stopped changing",
+        "Check its wiring and supply; see [safety] stale_s.",
+    ),
+    Trip.MOTOR_TRAVEL: (
+        "A motor went beyond its travel",
+        "Turn it back by hand; the limits are [limits] ..._angle_rad.",
+    ),
+    Trip.OVER_FORCE: (
+        "A force crossed its limit",
+        "Find out what the jaw met; the limits are [limits] ..._force_n.",
+    ),
+    Trip.ENCODERS_DISAGREE: (
+        "Two encoders on one drive train disagree by more than backlash and twist",
+        "Check the encoder cables and couplings; see [plausibility] twist_window_rad and"
+        " stretch_window_rad.",
+    ),
+    Trip.FOLLOWING_ERROR: (
+        "The motion stayed too far behind its target",
+        "Look for what blocks the drive or lets it slip; see [plausibility] following_rad.",
+    ),
+    Trip.CURRENT_MISMATCH: (
+        "The measured current is not the commanded one",
+        "Check the read-back's wiring and the motor controller's scaling; see [plausibility]"
+        " current_window_a.",
+    ),
+    Trip.ENCODER_JUMP: (
+        "An encoder's count jumped farther than the shaft can turn",
+        "Check its cable and shielding, then reference the rig again.",
+    ),
+    Trip.ENCODER_FROZEN: (
+        "The current changed and the motor's encoder did not move",
+        "Check the encoder's cable and supply; see [plausibility] frozen_current_a.",
+    ),
+    Trip.SENSOR_MISSING: (
+        "A sensor gave no reading",
+        "Check its wiring and supply.",
+    ),
+}
+"""What each trip is, and what to do before arming again."""
+
+_IN_UNITS = (
+    *(Trip.OVER_CURRENT, Trip.PROXIMAL_TORQUE, Trip.DISTAL_TORQUE),
+    *(Trip.SPINDLE_TRAVEL, Trip.JAW_TRAVEL, Trip.MOTOR_TRAVEL, Trip.OVER_FORCE),
+)
+"""Trips whose value and limit are counts of their channel."""
+
+
+def trip_error(
+    report: TripReport, calibrations: CalibrationSet, state: str, machine: Machine
+) -> SafetyTripError:
+    """Return the error of a trip: what, how far and how late, and how to clear it."""
+    what, fix = WORDS[report.code]
+    details = [f"code {int(report.code)}"]
+    if report.channel:
+        details.append(_numbers(report, calibrations, machine))
+    details.append(f"{report.late_us / 1000:g} ms after it began")
+    return SafetyTripError(f"{what} ({', '.join(details)}).", state, f"{fix} Arming clears it.")
+
+
+def _numbers(report: TripReport, calibrations: CalibrationSet, machine: Machine) -> str:
+    name = machine.channels_of_inputs[report.channel]
+    line = calibrations.channels.get(name)
+    if line is None or report.code not in _IN_UNITS:
+        return f"{report.channel} at {report.value} counts"
+    unit = unit_of(name)
+    zero = line.zero_counts if report.code is Trip.OVER_FORCE else 0.0
+    value, limit = (abs((count - zero) * line.slope) for count in (report.value, report.limit))
+    return f"{name} = {value:.3g} {unit}, limit {limit:.3g} {unit}"
+
+
+def tripped(reading: Reading) -> tuple[Trip, bool] | None:
+    """Return what the board tripped over and whether it holds, None where it did not."""
+    newest = int(reading.counts["status"][-1])
+    if not newest & (STATUS_LIMIT_TRIPPED | STATUS_WATCHDOG_TRIPPED):
+        return None
+    return Trip(newest >> TRIP_SHIFT), bool(newest & STATUS_HOLDING)
+
+
+class HostWatch:
+    """The board's limits held once more, on the samples as they arrived.
+
+    Args:
+        limits: What the board was armed with.
+        machine: What it moves.
+    """
+
+    def __init__(self, limits: ArmLimits, machine: Machine) -> None:
+        self._limits = limits.as_array()
+        self._machine = machine
+        self._guard = machine.guard().guard
+        self._newest_us: int | None = None
+
+    def prepare(self) -> None:
+        """Compile what `check` runs: the first time that takes longer than a board waits."""
+        no_rows = np.empty((0, len(self._machine.profile.input_names)), np.int32)
+        self._machine.first_crossing(no_rows, np.empty(0), self._guard, self._limits)
+
+    def check(self, reading: Reading) -> TripReport | None:
+        """Return the first crossing in the armed samples, None when there is none."""
+        armed = has_status(reading.counts["status"], STATUS_ARMED)
+        if not armed.any():
+            return None
+        samples = reading.counts[armed]
+        names = self._machine.profile.input_names
+        rows = np.stack([samples[name].astype(np.int32) for name in names], axis=1)
+        row, code, channel, value, limit, late_us = self._machine.first_crossing(
+            rows, self._ticks(samples["tick_us"]), self._guard, self._limits
+        )
+        if code == Trip.NONE:
+            return None
+        tick_us = int(samples["tick_us"][row])
+        return TripReport(Trip(code), names[channel], value, limit, tick_us, late_us)
+
+    def _ticks(self, tick_us: NDArray[np.uint32]) -> NDArray[np.float64]:
+        """Return the ticks between each sample and the one before it, by the board's clock."""
+        before = int(tick_us[0]) if self._newest_us is None else self._newest_us
+        self._newest_us = int(tick_us[-1])
+        clock = np.concatenate(([before], tick_us)).astype(np.uint32)
+        steps = (clock[1:] - clock[:-1]).astype(np.float64)  # it wraps
+        ticks: NDArray[np.float64] = steps / self._machine.profile.tick_us
+        return ticks

@@ -1,0 +1,236 @@
+"""The logger of a rig that has none: its logic in this computer, behind it a drive on CANopen.
+
+The drive knows torque and position; guards, position loop, queue of setpoints and watchdog are the
+logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to a
+logger like any other. What a board does better: a pause of this computer is a pause of the position
+loop; the drive then keeps its last torque until its own watch on this computer's heartbeat ends it.
+
+In virtual time a tick is run whenever somebody reads. In real time the ticks have a process of
+their own (`rig.canopen.process`), so that they wait for nobody.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.epos4.drive import Epos4
+from drivers.errors import LinkLostError
+from drivers.teensy.control import PREVIOUS_MOTOR_COUNT
+from drivers.teensy.fake import PythonBoard
+from drivers.teensy.guard import (
+    COLUMNS,
+    COMMAND_E4,
+    CURRENT,
+    MOTOR,
+    MOTOR_WATCH,
+    SPINDLE,
+    Drive,
+    drive_tick,
+)
+from drivers.teensy.protocol import MISSING
+from drivers.teensy.reference import TICK_US
+from drivers.teensy.watches import LAST_MOTOR, PRIMED, STATE, is_in_force, judge_by_time
+from drivers.transport.can_bus import CanBus
+
+SERIAL_PREFIX = "EPOS4-"
+TICKS_A_READ = 20
+"""Most ticks between looks at what the host has to say; shorter than any patience of the board."""
+ANSWER_S = 0.005
+MOST_MISSED = 3
+"""SYNCs on end without an answer after which the motor's position is missing."""
+
+
+class Epos4Bench:
+    """The drive as `drivers.teensy.fake.Bench`: inputs from it, torque to it.
+
+    The spindle is the motor's encoder; current is told by torque, 1 mA a count; what the drive does
+    not measure is 0.
+
+    Args:
+        device: The drive, started.
+    """
+
+    def __init__(self, device: Epos4) -> None:
+        self._device = device
+        self._rated_torque_n_m = device.ratings.rated_torque_n_m
+        self._position_count = 0
+        self._current_ma = 0
+        self._missed = 0
+        self._powered = False
+        self._lost = 0
+        self._measured_s: float | None = None
+        self._ticks_since = 1.0
+
+    def advance(
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        drive: Drive,
+    ) -> NDArray[np.int32]:
+        """Run ticks, one a SYNC; see `drivers.teensy.fake.Bench.advance`."""
+        rows = np.zeros((ticks, COLUMNS), np.int32)
+        for k, row in enumerate(rows):
+            self._measure()
+            missing = self._missed >= MOST_MISSED
+            row[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
+            row[CURRENT] = self._current_ma
+            if not missing:
+                self._judge_by_time(drive)
+            drive_tick(row, target[k], load_ma[k], *drive.arrays)
+            self._command(int(row[COMMAND_E4]), is_in_force(drive.guard[STATE]))
+        return rows
+
+    def follow(self, in_force: bool) -> None:
+        """Put the power stage in force, or take it out, and return when the drive has said so.
+
+        Raises:
+            DriverError: It has not said so.
+        """
+        if in_force and not self._powered:
+            self._powered = True  # a drive that failed half-way is to be disarmed
+            self._device.arm()
+        elif not in_force and self._powered:
+            self._device.disarm()
+            self._powered = False
+
+    def release(self) -> None:
+        """Disarm whatever is believed, and read it back."""
+        self._device.disarm()
+        self._powered = False
+
+    def _judge_by_time(self, drive: Drive) -> None:
+        """Let guard and controller see the way of one tick where more time than that has passed."""
+        if drive.guard[PRIMED]:
+            watch = drive.guard[MOTOR_WATCH:]
+            judge_by_time(watch, self._position_count, self._ticks_since)
+            drive.control_state[PREVIOUS_MOTOR_COUNT] = watch[LAST_MOTOR]
+
+    def _measure(self) -> None:
+        """Wait for the next SYNC and take the drive's answer, if there is one."""
+        batch = self._device.read(ANSWER_S)
+        while not len(batch) and batch.lost == self._lost:
+            batch = self._device.read(ANSWER_S)
+        self._lost = batch.lost
+        if len(batch):
+            self._missed = 0
+            self._position_count = int(batch.columns["position_count"][-1])
+            self._current_ma = round(1000 * float(batch.columns["motor_current_a"][-1]))
+            now_s = float(batch.time_s[-1])
+            since_s = 0.0 if self._measured_s is None else now_s - self._measured_s
+            self._measured_s = now_s
+            self._ticks_since = since_s * 1e6 / TICK_US
+        else:
+            self._missed += 1
+
+    def _command(self, command_e4: int, in_force: bool) -> None:
+        if not in_force:
+            self.follow(False)
+        elif self._powered:
+            self._device.set_torque(1e-4 * command_e4 * self._rated_torque_n_m)
+
+
+class CanopenLogger:
+    """A link to the logic of a logger, with the interface of `drivers.transport.Transport`.
+
+    Args:
+        device: The drive; identified and started here, closed with this.
+        bus: The bus it is on, for its clock.
+        late_s: How late a tick may be and still be run, as its drive's `late_s`.
+    """
+
+    def __init__(self, device: Epos4, bus: CanBus, late_s: float = 0.0) -> None:
+        self._device = device
+        self._bus = bus
+        self._closed = False
+        identity = device.identify()
+        device.start()
+        self.bench = Epos4Bench(device)
+        self.bench.release()  # an earlier program may have left it in force
+        self._board = PythonBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self._began_s = bus.now_s
+        self._late = round(late_s * 1e6) // TICK_US
+        self._ticks = 0
+        self._newest_us = 0
+
+    @property
+    def url(self) -> str:
+        """The bus's URL."""
+        return self._bus.url
+
+    @property
+    def now_s(self) -> float:
+        """The bus's clock, seconds."""
+        return self._bus.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        """Run ticks until there are samples or `timeout_s` has passed.
+
+        Raises:
+            DriverError: The drive has a fault, is silent, or its bus is gone.
+        """
+        self._require_link()
+        give_up_s = self._bus.now_s + timeout_s
+        data = self._board.transmit()
+        ticks = 0
+        while timeout_s > 0 and ticks < TICKS_A_READ and self._bus.now_s < give_up_s:
+            self._tick()
+            ticks += 1
+            data += self._board.transmit()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand bytes to the logic; the drive follows it before anything is acknowledged."""
+        self._require_link()
+        before = self._board.in_force
+        self._board.receive(data)
+        after = self._board.in_force
+        if after != before:
+            self.bench.follow(after)
+            self._missed_while_busy()
+
+    def take(self) -> bytes:
+        """Give the bytes that wait for the host."""
+        return self._board.transmit()
+
+    def run(self, duration_s: float) -> None:
+        """Run the ticks that are due in this time.
+
+        Raises:
+            DriverError: The drive has a fault, is silent, or its bus is gone.
+        """
+        self._require_link()
+        end_s = self._bus.now_s + duration_s
+        while self._bus.now_s < end_s:
+            self._tick()
+
+    def close(self) -> None:
+        """Disarm where the drive may be armed, and let go of the bus.
+
+        Raises:
+            DisarmUnconfirmedError: The bus is closed, but the drive's state is unknown.
+        """
+        if not self._closed:
+            self._closed = True
+            self._device.close()
+
+    def _tick(self) -> None:
+        self._missed_while_busy()
+        self._device.idle(self._device.wait_s)
+        # each sample has the time it was really asked for, however late that was
+        now_us = round(self._bus.now_s * 1e6)
+        self._newest_us = max(now_us, self._newest_us + 1)
+        self._board.set_clock(self._newest_us)
+        self._ticks += 1
+        self._board.advance(1)
+
+    def _missed_while_busy(self) -> None:
+        """Number the ticks that are too late to be run; they are lost."""
+        due = round((self._bus.now_s - self._began_s) * 1e6) // TICK_US
+        missed = due - self._late - self._ticks - 1
+        if missed > 0:
+            self._board.skip(missed)
+            self._ticks += missed
+
+    def _require_link(self) -> None:
+        if self._closed:
+            raise LinkLostError(f"{self.url} is closed.")

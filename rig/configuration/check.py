@@ -1,0 +1,211 @@
+"""What a configuration that is well written may still get wrong: drivers, options, CAN buses."""
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+from pydantic import ConfigDict, ValidationError, create_model
+
+from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
+from drivers.registry import CanUse, Driver, drivers, fakes
+from rig.configuration.config import SHIPPED, Config, DeviceSection, LoggerSection, is_simulated
+from rig.configuration.validation import explain
+from rig.errors import UsageError
+
+LOGGER = "logger"
+"""Name the logger goes under among the devices."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong.
+
+    Attributes:
+        key: The part of the configuration it stands in.
+        what: What is wrong.
+        fix: What to write in its place.
+    """
+
+    key: str
+    what: str
+    fix: str
+
+
+def problems(config: Config) -> list[Problem]:
+    """Return what is wrong with a configuration beyond its keys and ranges; empty when sound."""
+    known = drivers()
+    sections: dict[str, LoggerSection | DeviceSection] = {LOGGER: config.logger, **config.devices}
+    found = [
+        p for name, section in sections.items() for p in _driver_problems(name, section, known)
+    ]
+    if config.logger.profile == "grasper" and config.logger.driver != "teensy":
+        what = f"The driver {config.logger.driver} cannot carry three motors at 2 kHz."
+        found.append(Problem(LOGGER, what, 'Write driver = "teensy", and a board on USB.'))
+    if LOGGER in config.devices:
+        found.append(Problem(f"devices.{LOGGER}", "The name is the logger's.", "Choose another."))
+    found += _name_problems(config)
+    sound = {n: s for n, s in sections.items() if not any(p.key == _key(n) for p in found)}
+    return found + _bus_problems(sound, known)
+
+
+def refuse_problems(config: Config) -> None:
+    """Refuse a configuration with problems.
+
+    Raises:
+        UsageError: Names every problem and what to write.
+    """
+    found = problems(config)
+    if found:
+        raise UsageError(
+            f"The configuration of {config.name} cannot be used.",
+            "\n".join(f"{p.key}: {p.what}" for p in found),
+            "\n".join(dict.fromkeys(p.fix for p in found)),
+        )
+
+
+def _name_problems(config: Config) -> list[Problem]:
+    """Return what names a model or a set of calibrations that is not there."""
+    found = []
+    if config.model_path is not None and not config.model_path.is_file():
+        known = [p.name.removesuffix(".model.toml") for p in SHIPPED.glob("*.model.toml")]
+        found.append(_unknown("model", str(config.model), sorted(known)))
+    calibration = Path(config.calibration)
+    known = sorted(path.stem for path in SHIPPED_CALIBRATIONS.glob("*.toml"))
+    is_there = calibration.is_file() if calibration.suffix == ".toml" else str(calibration) in known
+    if not is_there:
+        found.append(_unknown("calibration", config.calibration, known))
+    return found
+
+
+def _unknown(key: str, name: str, known: list[str]) -> Problem:
+    """Return the problem of a name that is neither a file nor shipped."""
+    near = get_close_matches(name, known, n=1)
+    fix = f"Did you mean {near[0]!r}?" if near else f"Name a file, or one of: {', '.join(known)}."
+    return Problem(key, f"There is no {key} {name!r}: neither a file nor shipped.", fix)
+
+
+def _driver_problems(
+    name: str, section: LoggerSection | DeviceSection, known: Mapping[str, Driver]
+) -> list[Problem]:
+    key = _key(name)
+    driver = known.get(section.driver)
+    if driver is None:
+        return [Problem(key, f"There is no driver {section.driver!r}.", _one_of(known))]
+    found = _option_problems(key, driver, section.options)
+    if is_simulated(section.url) and driver.name not in fakes():
+        what = f"The driver {driver.name} has no fake."
+        found.append(Problem(key, what, "Write the url of the device in place of sim://."))
+    on_can = section.url.startswith("can:")
+    if not is_simulated(section.url) and on_can and driver.can is None:
+        found.append(Problem(key, f"The driver {driver.name} is on no CAN bus.", "Change its url."))
+    if not is_simulated(section.url) and driver.can is not None and not on_can:
+        found.append(
+            Problem(
+                key, f"The driver {driver.name} needs a CAN bus.", "Write e.g. can:socketcan:can0."
+            )
+        )
+    return found
+
+
+def _option_problems(key: str, driver: Driver, options: Mapping[str, Any]) -> list[Problem]:
+    """Hold options against the types and ranges of the parameters they become."""
+    parameters = list(inspect.signature(driver.open, eval_str=True).parameters.values())[1:]
+    fields: dict[str, Any] = {
+        p.name: (Any if p.annotation is p.empty else p.annotation, p.default) for p in parameters
+    }
+    rules = ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)
+    try:
+        create_model(driver.name, __config__=rules, **fields).model_validate(options)
+    except ValidationError as error:
+        what = f"Options of the driver {driver.name}: {explain(error, fields)}"
+        return [Problem(key, what, _one_of(fields))]
+    return []
+
+
+@dataclass(frozen=True, slots=True)
+class _OnBus:
+    """One device's place on a bus."""
+
+    name: str
+    identifiers: frozenset[int]
+    bit_rate: int
+
+
+def _bus_problems(
+    sections: Mapping[str, LoggerSection | DeviceSection], known: Mapping[str, Driver]
+) -> list[Problem]:
+    buses: dict[str, list[_OnBus]] = {}
+    found = []
+    for name, section in sections.items():
+        use = known[section.driver].can
+        if use is None or not section.url.startswith("can:"):
+            continue
+        bus, _, query = section.url.partition("?")
+        place = _place(name, section, use, known[section.driver].options)
+        said = dict(parse_qsl(query)).get("bitrate")
+        if said is not None and said != str(place.bit_rate):
+            found.append(
+                Problem(
+                    _key(name),
+                    f"Its url sets {said} bit/s, the device has {place.bit_rate} bit/s.",
+                    f"Write one bit rate; set `bit_rate` in [{_key(name)}] to the device's own.",
+                )
+            )
+        buses.setdefault(bus, []).append(place)
+    for bus, places in buses.items():
+        found += [p for one, other in combinations(places, 2) for p in _clash(bus, one, other)]
+        if len(places) > 1 and bus.split(":")[1] in ("slcan", "gs_usb"):
+            names = " and ".join(place.name for place in places)
+            found.append(
+                Problem(
+                    bus,
+                    f"{names} are on one adapter, which can be opened once.",
+                    "Use socketcan, or an adapter for each.",
+                )
+            )
+    return found
+
+
+def _place(
+    name: str, section: LoggerSection | DeviceSection, use: CanUse, defaults: Mapping[str, Any]
+) -> _OnBus:
+    identifiers = use.identifiers({**defaults, **section.options})
+    return _OnBus(name, identifiers, section.bit_rate or use.bit_rate)
+
+
+def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
+    """Return what keeps two devices from sharing a bus."""
+    found = []
+    shared = sorted(one.identifiers & other.identifiers)
+    if shared:
+        numbers = ", ".join(f"{number:#05x}" for number in shared[:4])
+        more = f" and {len(shared) - 4} more" if len(shared) > 4 else ""
+        found.append(
+            Problem(
+                bus,
+                f"{one.name} and {other.name} share the identifiers {numbers}{more}.",
+                "Give them two buses, or another base or node number (a NETCANOEM: base 0x68).",
+            )
+        )
+    if one.bit_rate != other.bit_rate:
+        found.append(
+            Problem(
+                bus,
+                f"{one.name} has {one.bit_rate} bit/s and {other.name} {other.bit_rate} bit/s.",
+                "Set both to one bit rate and write it as `bit_rate`, or give them two buses.",
+            )
+        )
+    return found
+
+
+def _one_of(names: Mapping[str, Any]) -> str:
+    return f"Choose from: {', '.join(names)}." if names else "It has no options."
+
+
+def _key(name: str) -> str:
+    return name if name == LOGGER else f"devices.{name}"

@@ -1,0 +1,85 @@
+"""Validation errors of TOML files in words: which key, what is wrong, what was meant."""
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+
+from pydantic import ValidationError
+
+from estimation.channels import UnknownUnitError, unit_of
+
+HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$")
+"""The line that begins a table of TOML, or one of an array of tables."""
+
+KEY = re.compile(r"\s*([\w\"'.\s-]+?)\s*=")
+"""The beginning of a line that gives a key its value."""
+
+
+def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -> str:
+    """Return one line a problem: where it stands, the message, the nearest known key.
+
+    Args:
+        error: What pydantic found.
+        known: Keys to suggest for one that does not exist.
+        text: The TOML that was read; with it each problem names its line.
+    """
+    sentences = []
+    for problem in error.errors():
+        path = ".".join(str(part) for part in _path(problem["loc"])) or "the file"
+        message = problem["msg"]
+        if problem["type"] == "extra_forbidden":
+            near = difflib.get_close_matches(str(problem["loc"][-1]), list(known), n=1)
+            message = "there is no such key" + (f"; did you mean {near[0]!r}?" if near else "")
+        elif problem["loc"] and isinstance(problem["input"], (int, float)):
+            message += f", given {problem['input']}{_unit(str(problem['loc'][-1]))}"
+        number = line_of(text, list(_path(problem["loc"])))
+        place = f"line {number}, {path}" if number else path
+        sentences.append(f"{place}: {message}" + ("" if message.endswith("?") else "."))
+    return "\n".join(sentences)
+
+
+def line_of(text: str, path: Sequence[int | str]) -> int | None:
+    """Return the line of TOML text where a key stands, from 1; of a missing key its table's.
+
+    None where neither is there.
+
+    Args:
+        text: The TOML.
+        path: Keys from the top, a number for each place in an array of tables.
+    """
+    table: list[int | str] = []
+    arrays: dict[tuple[int | str, ...], int] = {}
+    nearest, depth = None, 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := HEADER.match(line):
+            table = [part.strip(" \"'") for part in header[2].split(".")]
+            if len(header[1]) == 2:
+                arrays[tuple(table)] = arrays.get(tuple(table), -1) + 1
+                table.append(arrays[tuple(table)])
+            own = table
+            if table == list(path[: len(table)]) and len(table) > depth:
+                nearest, depth = number, len(table)
+        elif key := KEY.match(line):
+            own = [*table, *(part.strip(" \"'") for part in key[1].split("."))]
+        else:
+            continue
+        if own == list(path):
+            return number
+    return nearest
+
+
+def _path(location: tuple[int | str, ...]) -> Iterable[int | str]:
+    """Return where a key stands in the file, without the kind of limits pydantic chose there."""
+    return (
+        (part for k, part in enumerate(location) if k != 1 or location[0] != "limits")
+        if len(location) > 2
+        else location
+    )
+
+
+def _unit(key: str) -> str:
+    """Return the unit a key's name ends in, with a space before it; nothing where it has none."""
+    try:
+        return f" {unit_of(key)}"
+    except UnknownUnitError:
+        return ""

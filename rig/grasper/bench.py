@@ -1,0 +1,139 @@
+"""The simulated grasper behind its board: three axes, their sensors, and the board in one loop.
+
+Within a tick of 0.5 ms: sensors are sampled, the board computes from them, the physics moves.
+"""
+
+import hashlib
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.teensy import control, grasper_guard, watches
+from drivers.teensy.grasper import GRASPER
+from drivers.teensy.grasper_guard import COLUMNS, FORCE_MAX, INPUTS, GrasperDrive
+from rig.grasper import plant as grasper_plant
+from rig.grasper.plant import PROTOTYPES, Prototype, vary
+from rig.simulation import noise
+from rig.simulation.bench import call_board_tick
+
+MOTORS = GRASPER.motors
+COUNTS_A_TURN = 2048
+"""Of each motor's encoder."""
+FULL_SCALE_A = 2.0
+"""Current of a full command."""
+COUNTS_A_NEWTON = 4095 / 4.4
+FORCE_ZERO = 100.0
+"""Counts of a force sensor's amplifier without force, so that one that lives is seen to."""
+_COUNTS_A_RADIAN = COUNTS_A_TURN / (2 * np.pi)
+_RATIO, _ARM, _OFFSET, _CURRENT_NOISE, _FORCE_NOISE = 0, 11, 12, 13, 14
+
+
+@numba.njit(cache=True)
+def _sample(state, axes, currents, seed, tick, row):  # type: ignore[no-untyped-def]
+    for k in range(MOTORS):
+        p, angle = axes[k], state[k, grasper_plant.ANGLE]
+        row[k] = np.floor(angle * p[_RATIO] * _COUNTS_A_RADIAN)
+        current = currents[k] + p[_OFFSET] + p[_CURRENT_NOISE] * noise.normal(seed, tick, k)
+        row[MOTORS + k] = np.floor(1e3 * current + 0.5)
+        force = grasper_plant.contact_torque(p, angle) / p[_ARM]
+        force += p[_FORCE_NOISE] * noise.normal(seed, tick, MOTORS + k)
+        converted = np.floor(FORCE_ZERO + COUNTS_A_NEWTON * force + 0.5)
+        row[2 * MOTORS + k] = min(max(converted, 0), FORCE_MAX)
+
+
+def _build_loops(source: str):  # type: ignore[no-untyped-def]
+    """Return the compiled loops; `source` is part of the cache's key, see `bench`."""
+
+    @numba.njit(cache=True)
+    def with_controllers(  # type: ignore[no-untyped-def]
+        state, axes, currents, seed, first_tick, targets, guard, limits, control_state, gains, rows
+    ):
+        _ = source
+        for k in range(rows.shape[0]):
+            row = rows[k]
+            _sample(state, axes, currents, seed, first_tick + k, row)
+            grasper_guard.grasper_tick(row, targets[k], guard, limits, control_state, gains)
+            for motor in range(MOTORS):
+                command_e4 = row[grasper_guard.COMMAND_E4 + motor]
+                currents[motor] = FULL_SCALE_A * 1e-4 * command_e4
+                grasper_plant.step_axis(state[motor], axes[motor], currents[motor])
+
+    @numba.njit(cache=True)
+    def with_board(  # type: ignore[no-untyped-def]
+        state, axes, currents, seed, first_tick, ticks, period_us, function, board, tick_us
+    ):
+        _ = source
+        inputs = np.zeros(INPUTS, np.int32)
+        outputs = np.zeros(MOTORS, np.int32)
+        for k in range(ticks):
+            _sample(state, axes, currents, seed, first_tick + k, inputs)
+            now_us = np.uint32(tick_us + period_us * k)
+            call_board_tick(function, board, now_us, inputs.ctypes.data, outputs.ctypes.data)
+            for motor in range(MOTORS):
+                currents[motor] = FULL_SCALE_A * 1e-4 * outputs[motor]
+                grasper_plant.step_axis(state[motor], axes[motor], currents[motor])
+
+    return with_controllers, with_board
+
+
+def _fingerprint() -> str:
+    digest = hashlib.sha256()
+    for module in (control, grasper_guard, watches, grasper_plant, noise):
+        digest.update(Path(str(module.__file__)).read_bytes())
+    return digest.hexdigest()
+
+
+_run_with_controllers, _run_with_board = _build_loops(_fingerprint())
+
+
+class GrasperBench:
+    """A grasper in virtual time: the same seed gives the same counts however the calls are cut.
+
+    Args:
+        prototype: The grasper; its yaw and its two jaws are the three axes.
+        seed: Seed of noise and of what differs from grasper to grasper.
+        spread: Standard deviation of the logarithm of each hidden parameter.
+    """
+
+    def __init__(
+        self, prototype: Prototype = PROTOTYPES["third"], seed: int = 0, spread: float = 0.0
+    ) -> None:
+        (yaw,), (jaw_1, jaw_2) = prototype.axes["yaw"], prototype.axes["grasp"]
+        varied = [vary(axis, seed + k, spread) for k, axis in enumerate((yaw, jaw_1, jaw_2))]
+        self._axes = np.array([astuple(axis) for axis in varied], np.float64)
+        self._state = np.zeros((MOTORS, 3))
+        self._currents = np.zeros(MOTORS)
+        self._seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
+        self._ticks = 0
+
+    @property
+    def force_n(self) -> NDArray[np.float64]:
+        """The true force at each axis' tip."""
+        contact = [
+            grasper_plant.contact_torque(p, angle)
+            for p, angle in zip(self._axes, self._state[:, grasper_plant.ANGLE], strict=True)
+        ]
+        return np.array(contact) / self._axes[:, _ARM]
+
+    def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
+        """Run ticks with the controllers inside; see `drivers.teensy.fake.Bench.advance`."""
+        *targets, drive = plan
+        assert isinstance(drive, GrasperDrive)  # noqa: S101
+        rows = np.zeros((ticks, COLUMNS), np.int32)
+        wanted = np.ascontiguousarray(np.stack(targets, axis=1), np.int32)
+        shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
+        _run_with_controllers(*shared, wanted, *drive.arrays, rows)
+        self._ticks += ticks
+        return rows
+
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        """Run ticks with a board in the loop; see `drivers.teensy.firmware_fake.FirmwareBench`."""
+        shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
+        _run_with_board(*shared, ticks, GRASPER.tick_us, tick_address, board_address, tick_us)
+        self._ticks += ticks

@@ -1,0 +1,142 @@
+"""The limits of the rig: what is refused, what trips, and what the board is told to hold itself."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.linear import CalibrationSet
+from drivers.teensy.protocol import TOP, SafeState
+from drivers.teensy.reference import Limits
+from rig.configuration.config import Config, LimitsSection
+from rig.errors import SafetyTripError
+from rig.machines.plausible_counts import jaw_ends_rad, jump_limit, loop_limits, pair_limits
+from rig.machines.reading import Reading
+
+TICK_S = 1e-3
+
+
+@dataclass(frozen=True)
+class InCounts:
+    """Limits as the board holds them: in counts of a channel; one the rig has not is not limited.
+
+    Attributes:
+        calibrations: Counts to SI.
+    """
+
+    calibrations: CalibrationSet
+
+    def size(self, channel: str, value: float) -> int:
+        """Return a size in counts."""
+        line = self.calibrations.channels.get(channel)
+        return TOP if line is None else min(TOP, round(abs(value / line.slope)))
+
+    def ends(self, channel: str, low: float | None, high: float | None) -> tuple[int, int]:
+        """Return the lowest and the highest count; None for no end."""
+        line = self.calibrations.channels.get(channel)
+        if line is None:
+            return -TOP - 1, TOP
+        at = [
+            round(value / line.slope + line.zero_counts) if value is not None else None
+            for value in ((low, high) if line.slope > 0 else (high, low))
+        ]
+        return (-TOP - 1 if at[0] is None else at[0], TOP if at[1] is None else at[1])
+
+    def heat(self, channel: str, heat_a2_s: float) -> int:
+        """Return a heat in counts^2 s; 0 is no limit."""
+        line = self.calibrations.channels[channel]
+        return min(TOP, round(heat_a2_s / line.slope**2)) if heat_a2_s else TOP
+
+
+def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
+    """Return the limits the board holds against every sample itself, in its own counts.
+
+    A channel that the rig does not have is not limited.
+    """
+    limits, safety = config.reference_limits, config.safety
+    counts = InCounts(calibrations)
+    size, ends = counts.size, counts.ends
+    min_spindle, max_spindle = ends(
+        "spindle_angle_rad", -limits.spindle_angle_rad, limits.spindle_angle_rad
+    )
+    open_rad, closed_rad = jaw_ends_rad(config.plausibility, limits.spindle_angle_rad)
+    min_jaw, max_jaw = ends(
+        "jaw_angle_rad",
+        open_rad if safety.jaw_open_rad is None else safety.jaw_open_rad,
+        closed_rad if safety.jaw_closed_rad is None else safety.jaw_closed_rad,
+    )
+    max_motor_step = size("motor_angle_rad", safety.motor_speed_rad_s * TICK_S)
+    loop = {
+        "motor": "motor_angle_rad",
+        "followed": "spindle_angle_rad",
+        "current": "motor_current_a",
+        "command": "motor_command_ratio",
+    }
+    return Limits(
+        max_current=size("motor_current_a", limits.motor_current_a),
+        max_load_ma=size("load_command_a", limits.load_command_a),
+        max_proximal=size("proximal_torque_n_m", limits.proximal_torque_n_m),
+        max_distal=size("distal_torque_n_m", limits.distal_torque_n_m),
+        min_spindle=min_spindle,
+        max_spindle=max_spindle,
+        min_jaw=min_jaw,
+        max_jaw=max_jaw,
+        max_motor_step=max_motor_step,
+        max_motor_jump=jump_limit(max_motor_step),
+        continuous_current=size("motor_current_a", safety.continuous_current_a),
+        i2t=counts.heat("motor_current_a", safety.heat_a2_s),
+        stall_current=size("motor_current_a", safety.stall_current_a),
+        stall_motion=size("motor_angle_rad", safety.stall_motor_angle_rad),
+        **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, TICK_S),
+        **pair_limits(config.plausibility, calibrations),
+        stall_ticks=ticks_of(safety.stall_s, TICK_S),
+        saturated_ticks=ticks_of(safety.saturated_s, TICK_S),
+        stale_ticks=ticks_of(safety.stale_s, TICK_S),
+        watchdog_us=round(safety.watchdog_s * 1e6),
+        safe_state=SafeState[safety.safe_state.upper()],
+        hold_command_e4=round(safety.hold_command_ratio * 1e4),
+    )
+
+
+def ticks_of(duration_s: float, tick_s: float) -> int:
+    """Return how many samples may be so on end; 0 s is for ever."""
+    return max(1, round(duration_s / tick_s)) if duration_s else TOP
+
+
+def check_setpoints(asked: Iterable[tuple[str, NDArray[np.float64], float]]) -> None:
+    """Refuse setpoints that the limits forbid, before anything moves.
+
+    Args:
+        asked: Name of the limit, setpoints and the largest size allowed.
+
+    Raises:
+        SafetyTripError: A setpoint is beyond its limit or not finite.
+    """
+    for name, values, limit in asked:
+        if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > limit:
+            raise SafetyTripError(
+                f"The trajectory asks for {name} = {np.abs(values).max():.3g}.",
+                f"The configured limit is {limit:g}; nothing was moved.",
+                f"Change the protocol, or [limits] {name} if the rig can take it.",
+            )
+
+
+def check_samples(limits: LimitsSection, reading: Reading) -> None:
+    """Hold every limit against every sample, armed or not; what is not a number is beyond it.
+
+    Raises:
+        SafetyTripError: A value is beyond its limit. The caller disarms the rig.
+    """
+    for name, limit in limits.model_dump().items():
+        values = reading.columns.get(name)
+        if values is None or values.size == 0:
+            continue
+        beyond = ~(np.abs(values) <= limit)  # NaN fails too
+        if beyond.any():
+            worst = int(beyond.argmax())
+            raise SafetyTripError(
+                f"{name} reached {abs(values[worst]):.3g}, the limit is {limit:g}.",
+                f"At {reading.time_s[worst]:.3f} s of the session; the rig is being disarmed.",
+                "Find out what the jaw met before going on; limits stand under [limits].",
+            )

@@ -1,0 +1,1 @@
+"""Models and estimators of one instrument, made fit for another."""

@@ -1,0 +1,170 @@
+"""An estimator of one instrument, adapted to another one with some of its runs."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.estimator import Estimator
+from estimation.estimators.adaptation import Adaptable, Evidence, adapted, evidence, scratch
+from estimation.estimators.bank import BankEstimator
+from estimation.scores import Score, score
+from rig.errors import UsageError
+from rig.output.provenance import Provenance
+
+FOLDS = 5
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """Errors on the closing samples of the runs not used, in the target's SI unit.
+
+    Attributes:
+        schema: Name of this layout.
+        source: File of the source's estimator.
+        kind: `states` or `network`.
+        target: Channel that is estimated.
+        used: Runs adapted with.
+        unused: Runs reported on.
+        left_out: Runs with flagged closing samples or without any, not reported on.
+        as_it_is: The source's estimator as it is.
+        adapted: The source's estimator adapted with the runs used.
+        scratch: The same kind fitted on the target's other runs, in folds; None where not done.
+        covered: Share of the samples inside the adapted estimator's interval; None without one.
+        rmse_by_run: Error of the adapted estimator by run.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    source: str
+    kind: str
+    target: str
+    used: tuple[str, ...]
+    unused: tuple[str, ...]
+    left_out: tuple[str, ...]
+    as_it_is: Score
+    adapted: Score
+    scratch: Score | None
+    covered: float | None
+    rmse_by_run: dict[str, float]
+    provenance: Provenance
+
+
+def open_source(estimator: Estimator) -> Adaptable:
+    """Return an estimator that can be adapted.
+
+    Raises:
+        UsageError: It is of another kind.
+    """
+    if isinstance(estimator, Adaptable):
+        return estimator
+    raise UsageError(
+        "This model cannot be adapted.",
+        "State estimators and networks can; a physical model is as soon fitted anew.",
+        "Fit one: rig fit PATH --model states --out FILE.npz.",
+    )
+
+
+def run_adaptation(
+    source: Adaptable,
+    name: Path,
+    campaign: Campaign,
+    used: Sequence[str],
+    *,
+    from_scratch: bool = True,
+    seed: int = 0,
+    on_run: Callable[[str], None] = lambda run: None,
+) -> tuple[Adaptation, Adaptable]:
+    """Adapt, and report the errors on the runs not used.
+
+    Args:
+        source: The source's estimator.
+        name: Its file, for the report.
+        campaign: Runs of the new instrument.
+        used: Names of the runs to adapt with; the end of a name will do where it is one run's.
+        from_scratch: Whether to fit on the target's runs too.
+        seed: Seed of the folds.
+        on_run: Called with each run's name when it has been processed.
+
+    Raises:
+        UsageError: A run is not there, or none is left to report on.
+    """
+    chosen = [_named(run, campaign.names) for run in used]
+    found: dict[str, Evidence] = {}
+    left_out = []
+    for recording in campaign.evidence:
+        reduced = evidence(source, recording)
+        if reduced is not None and (reduced.flagged == 0 or recording.name in chosen):
+            found[recording.name] = reduced
+        else:
+            left_out.append(recording.name)
+        on_run(recording.name)
+    unused = [run for run in found if run not in chosen]
+    if not unused or any(run not in found for run in chosen):
+        raise UsageError(
+            "There is no run left to report on, or a chosen one has no closing sample.",
+            f"Usable are: {', '.join(found) or 'none'}.",
+        )
+    new = adapted(source, [found[run] for run in chosen])
+    scores = [_score(estimator, [found[run] for run in unused]) for estimator in (source, new)]
+    result = Adaptation(
+        schema="rig.study.adapt/1",
+        source=name.name,
+        kind="states" if isinstance(source, BankEstimator) else "network",
+        target=source.target,
+        used=tuple(chosen),
+        unused=tuple(unused),
+        left_out=tuple(left_out),
+        as_it_is=scores[0],
+        adapted=scores[1],
+        scratch=_scratch(source, found, unused, seed) if from_scratch else None,
+        covered=_covered(new, [found[run] for run in unused]),
+        rmse_by_run={run: _score(new, [found[run]]).rmse for run in unused},
+        provenance=Provenance.now(seed),
+    )
+    return result, new
+
+
+def _named(wanted: str, names: Sequence[str]) -> str:
+    fitting = [name for name in names if name == wanted or name.endswith(f"/{wanted}")]
+    if len(fitting) != 1:
+        raise UsageError(
+            f"{wanted!r} names {len(fitting)} runs.", f"There are: {', '.join(names)}."
+        )
+    return fitting[0]
+
+
+def _score(estimator: Adaptable, runs: Sequence[Evidence]) -> Score:
+    return score(
+        np.concatenate([run.estimate(estimator) for run in runs]),
+        np.concatenate([run.truth for run in runs]),
+    )
+
+
+def _covered(estimator: Adaptable, runs: Sequence[Evidence]) -> float | None:
+    parts = [part for run in runs if (part := run.covered(estimator)) is not None]
+    return float(np.mean(np.concatenate(parts))) if parts else None
+
+
+def _scratch(
+    source: Adaptable,
+    found: dict[str, Evidence],
+    unused: Sequence[str],
+    seed: int,
+) -> Score | None:
+    """Return the error of fits on the target alone, unused runs held out in folds."""
+    names = list(found)
+    if len(names) < FOLDS:
+        return None
+    order = np.random.default_rng(seed).permutation(len(names))
+    estimates, truths = [], []
+    for fold in range(FOLDS):
+        held_out = [names[k] for k in order[fold::FOLDS]]
+        fitted = scratch(source, [found[run] for run in names if run not in held_out])
+        for run in held_out:
+            if run in unused:
+                estimates.append(found[run].estimate(fitted))
+                truths.append(found[run].truth)
+    return score(np.concatenate(estimates), np.concatenate(truths))

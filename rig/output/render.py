@@ -1,0 +1,45 @@
+"""Pages of HTML that need nothing else: no script, no network, one style for paper and screen."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from estimation.files import write_text_atomic
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("rig.output"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(template: str, context: Mapping[str, Any]) -> str:
+    """Fill a template of this package.
+
+    Args:
+        template: File name in `rig/reports/templates`, such as `study.html`.
+        context: Names the template uses. Text is escaped; figures from `rig.output.figures` are
+            markup already and are not.
+
+    Raises:
+        jinja2.UndefinedError: The template uses a name that the context lacks.
+    """
+    return _environment().get_template(template).render(context)
+
+
+def write_report(path: Path, page: str) -> Path:
+    """Write a page; an existing one is replaced in one step. Returns the path.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    write_text_atomic(path, page)
+    return path

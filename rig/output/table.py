@@ -1,0 +1,53 @@
+"""One table, shown in a terminal, in Markdown and in HTML."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table of text.
+
+    Attributes:
+        title: Heading.
+        columns: Column headings; the first column is text, the others are numbers.
+        rows: Cells, one sequence a row.
+        note: What to know about it; may be empty.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+
+def to_markdown(table: TextTable) -> str:
+    """Return a table as Markdown, with its title as a heading."""
+
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    rule = "|" + "|".join(["---"] + ["---:"] * (len(table.columns) - 1)) + "|"
+    lines = [f"## {table.title}", "", line(table.columns), rule, *map(line, table.rows)]
+    return "\n".join([*lines, "", table.note] if table.note else lines) + "\n"
+
+
+def to_rich(table: TextTable) -> "RichTable":
+    """Return a table for the terminal; brackets in a cell are no markup."""
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(
+        title=Text(table.title, "table.title"),
+        caption=Text(table.note, "table.caption") if table.note else None,
+        title_justify="left",
+    )
+    for index, column in enumerate(table.columns):
+        shown.add_column(Text(column), justify="left" if index == 0 else "right")
+    for row in table.rows:
+        shown.add_row(*map(Text, row))
+    return shown

@@ -1,0 +1,1 @@
+"""Protocols: which runs a campaign has, their trajectories, and the shipped protocol files."""

@@ -1,0 +1,331 @@
+"""A protocol file: the runs of a campaign, declared in TOML and expanded into plans.
+
+Each `[[runs]]` table has a `kind` and lists of values; it expands into one run for every
+combination and repeat. Loads are the currents commanded to the load motor, angles are
+closing-positive.
+"""
+
+import itertools
+import json
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from rig.configuration.validation import explain
+from rig.errors import UsageError
+from rig.protocols import trajectory
+from rig.protocols.joints import JointHoldRuns, JointPlan, JointSineRuns
+
+SHIPPED = Path(__file__).parent
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, eq=False)
+class RunPlan:
+    """One run to be made.
+
+    Attributes:
+        name: Name of the run, unique in its protocol.
+        target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
+        load_command_a: Load motor current at 1 kHz, shape (n,).
+        conditions: What is held constant in the run.
+    """
+
+    name: str
+    target_angle_rad: NDArray[np.float64]
+    load_command_a: NDArray[np.float64]
+    conditions: dict[str, float | str] = field(default_factory=dict)
+
+    @property
+    def samples(self) -> int:
+        """Samples the run will have."""
+        return self.target_angle_rad.size
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the run, s."""
+        return self.samples / trajectory.SAMPLE_RATE_HZ
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    jaw_starts_rad: list[Number] = Field(default=[-1.0471975511965976], min_length=1)
+    repeats: int = Field(default=1, ge=1)
+
+
+class SineRuns(_Table):
+    """Sinusoidal grasps over frequency x load x jaw start."""
+
+    kind: Literal["sine"]
+    frequencies_hz: list[Positive] = Field(min_length=1)
+    loads_a: list[Number] = Field(min_length=1)
+    amplitude_rad: Positive = 0.5235987755982988
+    duration_s: Positive = 20.0
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(
+            range(self.repeats), self.jaw_starts_rad, self.frequencies_hz, self.loads_a
+        )
+        for _, start, frequency, load in grid:
+            angle = trajectory.sine(self.duration_s, start, self.amplitude_rad, frequency)
+            yield _constant_load(
+                f"sine-{frequency:g}Hz", angle, load, start, frequency_hz=frequency
+            )
+
+
+class FourierRuns(_Table):
+    """A finite Fourier series of spindle angle at each load."""
+
+    kind: Literal["fourier"]
+    base_frequency_hz: Positive
+    cosine_rad: list[Number] = Field(min_length=1)
+    sine_rad: list[Number] = Field(min_length=1)
+    loads_a: list[Number] = Field(min_length=1)
+    duration_s: Positive = 20.0
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.fourier(
+                self.duration_s, start, self.base_frequency_hz, self.cosine_rad, self.sine_rad
+            )
+            yield _constant_load("fourier", angle, load, start, frequency_hz=self.base_frequency_hz)
+
+
+class SpeedStaircaseRuns(_Table):
+    """Closing and opening at constant speeds, one after the other, at each load."""
+
+    kind: Literal["speed_staircase"]
+    speeds_rad_s: list[Positive] = Field(min_length=1)
+    travel_rad: Positive = 0.9
+    pause_s: Positive = 0.5
+    loads_a: list[Number] = Field(min_length=1)
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.speed_staircase(
+                start, self.travel_rad, self.speeds_rad_s, self.pause_s
+            )
+            yield _constant_load("speeds", angle, load, start)
+
+
+class LoadStaircaseRuns(_Table):
+    """Sinusoidal grasps while the load climbs and descends in steps within the run."""
+
+    kind: Literal["load_staircase"]
+    loads_a: list[Number] = Field(min_length=2)
+    hold_s: Positive = 4.0
+    ramp_s: Positive = 0.2
+    frequencies_hz: list[Positive] = Field(min_length=1)
+    amplitude_rad: Positive = 0.5235987755982988
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        load = trajectory.steps(self.loads_a, self.hold_s, self.ramp_s)
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.frequencies_hz)
+        for _, start, frequency in grid:
+            duration_s = load.size / trajectory.SAMPLE_RATE_HZ
+            angle = trajectory.sine(duration_s, start, self.amplitude_rad, frequency)
+            conditions: dict[str, float | str] = {
+                "trajectory": "loads",
+                "jaw_start_rad": start,
+                "frequency_hz": frequency,
+            }
+            yield RunPlan(f"loads-{frequency:g}Hz", angle, load, conditions)
+
+
+class StepHoldRuns(_Table):
+    """The spindle steps from level to level and holds each, at each load."""
+
+    kind: Literal["step_hold"]
+    levels_rad: list[Number] = Field(min_length=2)
+    hold_s: Positive = 3.0
+    ramp_s: Positive = 0.2
+    loads_a: list[Number] = Field(min_length=1)
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        rise = trajectory.steps(self.levels_rad, self.hold_s, self.ramp_s)
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            yield _constant_load("hold", start + rise, load, start)
+
+
+class ChirpRuns(_Table):
+    """Small grasps that become faster and faster, at each load."""
+
+    kind: Literal["chirp"]
+    low_hz: Positive
+    high_hz: Positive
+    loads_a: list[Number] = Field(min_length=1)
+    amplitude_rad: Positive = 0.05
+    duration_s: Positive = 12.0
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.chirp(
+                self.duration_s, start, self.amplitude_rad, self.low_hz, self.high_hz
+            )
+            yield _constant_load("chirp", angle, load, start)
+
+
+class DwellRuns(_Table):
+    """Moves to and fro after rests of different length, at each load."""
+
+    kind: Literal["dwell"]
+    dwells_s: list[Positive] = Field(min_length=2)
+    travel_rad: Positive = 0.4
+    move_s: Positive = 0.8
+    loads_a: list[Number] = Field(min_length=1)
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
+        for _, start, load in grid:
+            angle = trajectory.dwells(start, self.travel_rad, self.move_s, self.dwells_s)
+            yield _constant_load("dwell", angle, load, start)
+
+
+TABLES: tuple[type[BaseModel], ...] = (
+    SineRuns,
+    FourierRuns,
+    SpeedStaircaseRuns,
+    LoadStaircaseRuns,
+    StepHoldRuns,
+    ChirpRuns,
+    DwellRuns,
+    JointHoldRuns,
+    JointSineRuns,
+)
+"""Every kind of `[[runs]]` table."""
+
+RunTable = Annotated[
+    SineRuns
+    | FourierRuns
+    | SpeedStaircaseRuns
+    | LoadStaircaseRuns
+    | StepHoldRuns
+    | ChirpRuns
+    | DwellRuns
+    | JointHoldRuns
+    | JointSineRuns,
+    Field(discriminator="kind"),
+]
+
+
+class Protocol(BaseModel):
+    """A protocol file.
+
+    Attributes:
+        name: Name of the protocol.
+        description: What it is for.
+        runs: Tables that expand into runs.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(min_length=1)
+    description: str = ""
+    runs: list[RunTable] = Field(min_length=1)
+
+    @property
+    def moves_joints(self) -> bool:
+        """Whether its runs are of a grasper's joints, not of the reference rig's spindle."""
+        return isinstance(self.runs[0], (JointHoldRuns, JointSineRuns))
+
+    @model_validator(mode="after")
+    def _runs_are_of_one_rig(self) -> "Protocol":
+        kinds = {isinstance(table, (JointHoldRuns, JointSineRuns)) for table in self.runs}
+        if len(kinds) > 1:
+            raise ValueError("its runs are of a spindle and of a grasper's joints: no rig has both")
+        return self
+
+    def plans(self) -> list[RunPlan]:
+        """Return every run in order, numbered so that names are unique and sort by time.
+
+        Raises:
+            UsageError: The runs are of a grasper's joints.
+        """
+        if self.moves_joints:
+            raise UsageError(
+                f"The protocol {self.name!r} moves the joints of a grasper.",
+                "This rig has a spindle.",
+                "Choose a protocol for it, such as quick.",
+            )
+        return [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
+
+    def any_plans(self) -> list[RunPlan | JointPlan]:
+        """Return every run in order, of whatever rig, numbered likewise."""
+        plans: Iterator[RunPlan | JointPlan] = (p for table in self.runs for p in table.plans())
+        return [
+            replace(
+                plan,
+                name=f"{index:03d}-{plan.name}",
+                conditions={**plan.conditions, "protocol": self.name},
+            )
+            for index, plan in enumerate(plans)
+        ]
+
+
+def protocol_toml(protocol: Protocol) -> str:
+    """Return a protocol as the text of a file that `load_protocol` reads; defaults are left out."""
+    lines = [f"{key} = {json.dumps(getattr(protocol, key))}" for key in ("name", "description")]
+    for table in protocol.runs:
+        lines += ["", "[[runs]]"]
+        told = table.model_dump(exclude_unset=True)
+        # TOML writes strings, numbers and lists of numbers as JSON does
+        lines += [f"{key} = {json.dumps(value, allow_nan=False)}" for key, value in told.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _constant_load(
+    kind: str, angle_rad: NDArray[np.float64], load_a: float, start_rad: float, **more: float
+) -> RunPlan:
+    conditions: dict[str, float | str] = {
+        "trajectory": kind.split("-")[0],
+        "load_command_a": load_a,
+        "jaw_start_rad": start_rad,
+        **more,
+    }
+    return RunPlan(f"{kind}-{load_a:g}A", angle_rad, np.full(angle_rad.size, load_a), conditions)
+
+
+def load_protocol(name_or_path: str) -> Protocol:
+    """Read a protocol file, or a shipped protocol by its name.
+
+    Raises:
+        UsageError: There is no such file, or it is not a protocol; names the key that is wrong.
+    """
+    path = Path(name_or_path)
+    if not path.exists() and path.suffix == "":
+        path = SHIPPED / f"{name_or_path}.toml"
+    if not path.is_file():
+        shipped = ", ".join(sorted(p.stem for p in SHIPPED.glob("*.toml")))
+        raise UsageError(
+            f"There is no protocol {name_or_path!r}.",
+            f"It is neither a file nor a shipped protocol ({shipped}).",
+            "Name a TOML file, or one of the shipped protocols.",
+        )
+    try:
+        text = path.read_text()
+        return TypeAdapter(Protocol).validate_python(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{path} is not TOML.", str(error)) from error
+    except ValidationError as error:
+        known = {name for table in TABLES for name in table.model_fields} | {"kind", "runs"}
+        raise UsageError(f"{path} is not a protocol.", explain(error, known, text)) from error

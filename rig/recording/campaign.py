@@ -1,0 +1,370 @@
+"""Record a campaign: every run of a protocol as one log, zeros before and after, abortable.
+
+A run goes: zero at rest, approach, the run itself (the only part that is logged), release, zero at
+rest. Each run's log is complete in itself, so an aborted campaign resumes at the first run that
+has no log.
+"""
+
+import hashlib
+import itertools
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.zero import Drift, SensorZero, drift_verdicts
+from drivers.clock import ClockLine
+from estimation.files import write_text_atomic
+from rig import __version__
+from rig.bench.companions import Beside
+from rig.bench.session import Session
+from rig.configuration.config import Config
+from rig.errors import UsageError
+from rig.log.container import Attached
+from rig.log.reader import read_log
+from rig.log.run import RunEnd, RunInfo
+from rig.log.schema import Stream
+from rig.log.streams import COUNTS, SAMPLE, sample_stream
+from rig.log.writer import PART_SUFFIX, LogWriter
+from rig.machines.machine import MachineMotion, MachinePlan
+from rig.machines.reading import Reading
+from rig.protocols.protocol import Protocol
+
+MANIFEST = "campaign.json"
+
+REST_S = 0.5
+BYTES_PER_SAMPLE = 400
+"""Upper bound of a sample's room on disk, both streams, before compression."""
+
+Progress = Callable[[str, int, int], None]
+"""Told the run's name, the samples recorded of it, and how many it will have."""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What became of one run.
+
+    Attributes:
+        name: Name of the run.
+        path: Its log.
+        samples: Samples recorded.
+        expected: Samples the plan asked for.
+        lost: Samples lost on the way from the logger.
+        drift: Zero before against zero after, for each judged sensor.
+    """
+
+    name: str
+    path: Path
+    samples: int
+    expected: int
+    lost: int
+    drift: tuple[Drift, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every planned sample is there."""
+        return self.samples == self.expected
+
+    @property
+    def remark(self) -> str:
+        """What a person should know about the run; empty when it is as planned."""
+        remarks = []
+        if not self.complete:
+            remarks.append(f"{self.samples} of {self.expected} samples, {self.lost} lost")
+        remarks += [
+            f"zero of {d.channel} moved by {d.after - d.before:+.4g} {d.unit}, limit {d.limit:g}"
+            for d in self.drift
+            if not d.passes
+        ]
+        return "; ".join(remarks)
+
+    @property
+    def drifted(self) -> tuple[str, ...]:
+        """Channels whose zero moved beyond its limit."""
+        return tuple(d.channel for d in self.drift if not d.passes)
+
+
+def check_disk_space(folder: Path, plans: Iterable[MachinePlan]) -> None:
+    """Refuse to begin what the disk cannot hold.
+
+    Raises:
+        UsageError: Less is free than the campaign may need.
+    """
+    needed = sum(plan.samples for plan in plans) * BYTES_PER_SAMPLE
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise UsageError(
+            f"The campaign may need {needed / 1e6:.0f} MB, {free / 1e6:.0f} MB are free.",
+            f"It would be written to {folder}.",
+            "Free some space, or name another folder with --out.",
+        )
+
+
+def read_manifest(folder: Path) -> tuple[Protocol, Config]:
+    """Return the protocol and the configuration a campaign was begun with.
+
+    Raises:
+        UsageError: The folder holds no campaign.
+    """
+    manifest = folder / MANIFEST
+    try:
+        described = json.loads(manifest.read_text())
+        return (
+            Protocol.model_validate(described["protocol"]),
+            Config.model_validate(described["config"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"{folder} holds no campaign that could go on.",
+            f"{manifest.name}: {error}",
+            "Name the folder that `rig record` made.",
+        ) from error
+
+
+def open_campaign_folder(
+    folder: Path, protocol: Protocol, config: Config, resume: bool
+) -> list[MachinePlan]:
+    """Prepare a campaign's folder and return the runs that are still to be made.
+
+    Raises:
+        UsageError: The folder is in use and `resume` was not asked for, or what is in it was
+            recorded with another protocol or configuration.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    manifest = folder / MANIFEST
+    whole = json.dumps(config.model_dump(), sort_keys=True).encode()
+    described = {
+        "protocol": protocol.model_dump(),
+        "config": config.logged(),
+        "config_sha256": hashlib.sha256(whole).hexdigest(),
+    }
+    if manifest.exists():
+        if not resume:
+            raise UsageError(
+                f"{folder} already holds a campaign.",
+                "Nothing recorded is ever overwritten.",
+                f"Type `rig record --resume {folder}`, or name another folder with --out.",
+            )
+        if json.loads(manifest.read_text()) != json.loads(json.dumps(described)):
+            raise UsageError(
+                f"The campaign in {folder} was begun with another protocol or configuration.",
+                "Runs made in two ways are not one campaign.",
+                "Record into another folder.",
+            )
+    elif any(folder.iterdir()):
+        raise UsageError(
+            f"{folder} is not empty and holds no campaign.", fix="Name another folder."
+        )
+    else:
+        write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
+    plans = protocol.any_plans()
+    check_disk_space(folder, plans)
+    return [plan for plan in plans if not _is_recorded(_log_path(folder, plan))]
+
+
+def record_campaign(
+    session: Session,
+    plans: Iterable[MachinePlan],
+    folder: Path,
+    notes: str = "",
+    on_progress: Progress | None = None,
+) -> Iterator[RunResult]:
+    """Record runs one after the other; yields each as soon as its log is complete.
+
+    Args:
+        session: An open session.
+        plans: The runs.
+        folder: Where the logs go.
+        notes: Operator's notes, kept in every log.
+        on_progress: Told of the samples as they come.
+    """
+    for _ in session.rest(REST_S):
+        pass
+    session.settle()
+    epoch_ns = _epoch_ns(session, folder)
+    for plan in plans:
+        yield _record_run(session, plan, _log_path(folder, plan), epoch_ns, notes, on_progress)
+
+
+def _record_run(
+    session: Session,
+    plan: MachinePlan,
+    path: Path,
+    epoch_ns: int,
+    notes: str,
+    on_progress: Progress | None,
+) -> RunResult:
+    before = session.take_zeros(REST_S)
+    motion = session.machine.motion(plan, session.here)
+    expected = motion.last - motion.first
+    lost_before = session.counters["lost"]
+    samples = 0
+    readings = session.play(*motion.setpoints)
+    first = next(r for r in readings if len(_of_run(r, motion)))
+    run_start_us = int(_of_run(first, motion).tick_us[0])
+    with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
+        for reading in itertools.chain([first], readings):
+            run = _of_run(reading, motion)
+            beside = {c.stream().topic: c.take() for c in session.companions}
+            if len(run):
+                _write_reading(log, session.machine.counts, run, run_start_us, epoch_ns)
+                line = session.clock.line
+                for topic, block in beside.items():
+                    _write_beside(log, topic, block, line, run_start_us, epoch_ns)
+                samples += len(run)
+                if on_progress:
+                    on_progress(plan.name, samples, expected)
+            log.poll()
+        after = session.take_zeros(REST_S)
+        drift = drift_verdicts(
+            before,
+            after,
+            session.calibrations,
+            session.config.drift_limits,
+        )
+        lost = session.counters["lost"] - lost_before
+        result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
+        log.close(_end_of_run(result, after, session.counters))
+    return result
+
+
+def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
+    """Return the samples that belong to the run itself, not to its approach or release."""
+    return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
+
+
+def _new_log(
+    session: Session,
+    plan: MachinePlan,
+    path: Path,
+    started_at_ns: int,
+    before: Mapping[str, SensorZero],
+    notes: str,
+) -> LogWriter:
+    config, calibrations = session.config, session.calibrations
+    info = RunInfo(
+        name=plan.name,
+        rig=config.name,
+        instrument=config.instrument.identity(),
+        conditions=plan.conditions,
+        notes=notes,
+        started_at_ns=started_at_ns,
+        duration_s=plan.duration_s,
+        calibrations={calibrations.name: calibrations.content_hash},
+        zeros_before=_mean_counts(before),
+        details={
+            "rig_version": __version__,
+            **session.board,
+            **_clock_residuals(session),
+        },
+    )
+    settings = json.dumps(config.logged(), indent=1).encode()
+    attachments = [
+        Attached("config.json", "application/json", settings),
+        Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
+    ]
+    _set_aside(path)
+    raw = session.machine.counts
+    streams = [sample_stream(tuple(calibrations.channels), raw.rate_hz), raw]
+    streams += [companion.stream() for companion in session.companions]
+    return LogWriter(path, info, streams, attachments=attachments)
+
+
+def _write_reading(
+    log: LogWriter, raw: Stream, reading: Reading, run_start_us: int, epoch_ns: int
+) -> None:
+    """Write a stretch of the run to both streams, with the run's own clock in `time_s`."""
+    log_time_ns = epoch_ns + reading.tick_us * 1000
+    sequence = reading.counts["sequence"]
+    time_s = (reading.tick_us - run_start_us) * 1e-6
+    log.write(
+        SAMPLE,
+        {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags},
+        log_time_ns,
+    )
+    counts = {field.name: reading.counts[field.name] for field in raw.fields}
+    log.write(COUNTS, counts, log_time_ns)
+
+
+def _write_beside(
+    log: LogWriter, topic: str, block: Beside, line: ClockLine, run_start_us: int, epoch_ns: int
+) -> None:
+    """Write what a further device measured meanwhile, on the logger's clock."""
+    tick_s = line.to_device(block.host_s)
+    time_s = tick_s - run_start_us * 1e-6
+    of_run = time_s >= 0  # what came before the run began is not of it
+    rows: dict[str, NDArray[Any]] = dict(block.columns)
+    rows |= {"sequence": block.sequence, "flags": block.flags, "time_s": time_s}
+    log_time_ns = epoch_ns + np.round(tick_s * 1e9).astype(np.int64)
+    log.write(topic, {name: values[of_run] for name, values in rows.items()}, log_time_ns[of_run])
+
+
+def _clock_residuals(session: Session) -> dict[str, str]:
+    """Return how well each device's clock is known, as a log keeps it, s."""
+    lines = {companion.name: companion.line for companion in session.companions}
+    told = {name: f"{line.residual_s:.3g}" for name, line in lines.items() if line is not None}
+    told["logger"] = f"{session.clock.line.residual_s:.3g}"
+    return {f"clock_residual_s_{name}": text for name, text in told.items()}
+
+
+def _end_of_run(
+    result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
+) -> RunEnd:
+    return RunEnd(
+        expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
+        counters=counters,
+        zeros_after=_mean_counts(after),
+        drift={d.channel: d.after - d.before for d in result.drift},
+        drift_verdict="drifted: " + ", ".join(result.drifted) if result.drifted else "steady",
+    )
+
+
+def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
+    return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
+
+
+def _log_path(folder: Path, plan: MachinePlan) -> Path:
+    return folder / f"{plan.name}.mcap"
+
+
+def _is_recorded(path: Path) -> bool:
+    """Say whether a run went to its end; one that was aborted is made again."""
+    if not path.exists():
+        return False
+    end = read_log(path, topics=(), tolerant=True, checksums=False).end
+    return end is not None and end.clean
+
+
+def _set_aside(path: Path) -> None:
+    """Rename what an aborted attempt left: the run can be made again and nothing is lost."""
+    for ending in (".mcap", ".mcap" + PART_SUFFIX):
+        left = path.with_name(path.stem + ending)
+        attempts = itertools.count(1)
+        while left.exists():
+            aside = path.with_name(f"{path.stem}.aborted-{next(attempts)}{ending}")
+            if not aside.exists():
+                left.rename(aside)
+
+
+def _epoch_ns(session: Session, folder: Path) -> int:
+    """Return the host's time at the device's tick 0, ns since the Unix epoch.
+
+    A simulated rig is faster than real time, so a resumed campaign could begin before the last run
+    ended: it begins a second after what is there instead.
+    """
+    now_ns = time.time_ns() - session.newest_tick_us * 1000
+    return max([now_ns, *(_end_ns(path) + 1_000_000_000 for path in folder.glob("*.mcap"))])
+
+
+def _end_ns(path: Path) -> int:
+    """Return when a recorded run ended, ns since the Unix epoch; 0 when its log does not say."""
+    run = read_log(path, topics=(), checksums=False).run
+    if run is None or run.started_at_ns is None or run.duration_s is None:
+        return 0
+    return run.started_at_ns + round(run.duration_s * 1e9)

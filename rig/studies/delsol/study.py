@@ -1,0 +1,239 @@
+"""External forces of a hydraulic arm from its pressures: del Sol et al. 2014, on simulated arms.
+
+Each seed draws an arm; its joints swing one after another by single sinusoids within the paper's
+frequencies (table 1); its closed-chain model is fitted by damped least squares to motion
+differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our way beside
+it fits the same points with the effects that the diagnosis named on further runs of the same arm.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimation.arm.closed_chain import closed_jacobians, closed_regressor
+from estimation.arm.identification import damped_around
+from estimation.arm.motion import Motion
+from estimation.arm.periodic import periodic_motion
+from estimation.filters import LowPass, zero_phase
+from estimation.recording import FloatArray
+from rig.output.provenance import Provenance
+from rig.studies.delsol.diagnosis import HIGHEST_HZ, JOINTS, Named, diagnosed, found_columns
+from rig.studies.delsol.hydraulic_arm import (
+    HYDRAULIC,
+    RATE_HZ,
+    SIGN_RAD_S,
+    HydraulicArm,
+    draw,
+    measured_torque,
+)
+from rig.studies.seeds import kept_outcomes
+
+SCHEMA = "rig.study.delsol/3"
+
+TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
+TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
+TABLE_5_N = (26.096, 6.814)
+PEAK_PERCENT = 12.98
+STIFFNESS_N_M = 5000.0
+PEAK_N = 26.096 / 0.1298
+"""Peak of the impact: what table 5 and the relative error of the text give together."""
+SLIDING_N = 30.0
+"""Friction of the rough foam; assumed."""
+
+PAPER, DISCARDED = "paper's method", "the same, points above 100 discarded"
+OURS = "with what was found"
+LARGEST_CONDITION = 100.0
+"""Equation 15: points whose own part of the observation matrix has a larger condition number go."""
+
+SWINGS = 4
+POSES = 2
+DAMPING = 0.3
+WITHIN = 0.25
+LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One seed's results by one method.
+
+    Attributes:
+        residual_n_m: RMS residual of each joint on the points of the fit, N m.
+        impact_n: RMS error of the vertical force of the impact, N.
+        impact_percent: The same over the force's peak, %.
+        sliding_n: RMS error of the sliding force, N.
+    """
+
+    residual_n_m: tuple[float, ...]
+    impact_n: float
+    impact_percent: float
+    sliding_n: float
+
+
+@dataclass(frozen=True)
+class DelSolStudy:
+    """Results of the study.
+
+    Attributes:
+        schema: Name of this layout.
+        seeds: The seeds, all reported.
+        outcomes: By method, one a seed.
+        named: What the diagnosis named on each seed's arm.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    seeds: tuple[int, ...]
+    outcomes: dict[str, tuple[Outcome, ...]]
+    named: tuple[tuple[Named, ...], ...]
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class Seed:
+    """One arm's results by method, and what the diagnosis named on it."""
+
+    outcomes: dict[str, Outcome]
+    named: tuple[Named, ...]
+
+
+def run_delsol(
+    seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
+) -> DelSolStudy:
+    """Do the study on arms of several seeds, from 0.
+
+    Args:
+        seeds: How many.
+        state: Folder where the outcome of each seed is kept.
+        workers: Processes; each does one seed.
+        on_seed: Called after each seed, also after one that was kept.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
+    methods = (PAPER, DISCARDED, OURS)
+    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in methods}
+    named = tuple(seed.named for seed in done)
+    return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, named, Provenance.now(0))
+
+
+def _read(held: Any) -> Seed:
+    outcomes = {
+        method: Outcome(**{**each, "residual_n_m": tuple(each["residual_n_m"])})
+        for method, each in held["outcomes"].items()
+    }
+    named = (
+        Named(**{**each, "alternatives": tuple(each["alternatives"])}) for each in held["named"]
+    )
+    return Seed(outcomes, tuple(named))
+
+
+def one_seed(seed: int) -> Seed:
+    """Do one arm."""
+    rng = np.random.default_rng([seed, 2014])
+    arm = draw(rng)
+    runs = [(m, measured_torque(arm, m, np.zeros((len(m), 3)), rng)) for m in swings(rng)]
+    tests = {name: make(arm, rng) for name, make in (("impact", impact), ("sliding", sliding))}
+    named, effects = diagnosed(arm, rng)
+
+    def our_columns(motion: Motion) -> FloatArray:
+        return np.concatenate([paper_columns(motion), found_columns(effects, motion)], axis=2)
+
+    outcomes = {}
+    for method, columns_of in (
+        (PAPER, paper_columns),
+        (DISCARDED, paper_columns),
+        (OURS, our_columns),
+    ):
+        table = np.concatenate([columns_of(motion) for motion, _ in runs])
+        torque = np.concatenate([torque for _, torque in runs])
+        if method == DISCARDED:
+            kept = conditions(table) <= LARGEST_CONDITION
+            table, torque = table[kept], torque[kept]
+        values = damped_around(table, torque, np.zeros(table.shape[2]), DAMPING)
+        left = torque - table @ values
+        errors = {}
+        for name, (motion, seen, force) in tests.items():
+            axis = 2 if name == "impact" else 1
+            estimate = tip_force(motion, seen - columns_of(motion) @ values)[:, axis]
+            truth = zero_phase(force, RATE_HZ, LOW_PASS)[:, axis]
+            errors[name] = float(np.sqrt(np.mean((estimate - truth) ** 2)))
+        peak = float(np.abs(tests["impact"][2]).max())
+        outcomes[method] = Outcome(
+            residual_n_m=tuple(map(float, np.sqrt(np.mean(left**2, axis=0)))),
+            impact_n=errors["impact"],
+            impact_percent=100 * errors["impact"] / peak,
+            sliding_n=errors["sliding"],
+        )
+    return Seed(outcomes, named)
+
+
+def swings(rng: np.random.Generator) -> list[Motion]:
+    """Return single sinusoids of one joint after another, whole periods, within table 1."""
+    motions = []
+    for joint, (lowest, highest) in enumerate(TABLE_1_HZ):
+        for frequency in np.geomspace(lowest, highest, SWINGS):
+            for _ in range(POSES):
+                samples = round(RATE_HZ / frequency)
+                phase = 2 * np.pi * np.arange(2 * samples) / samples
+                pose = np.array(HYDRAULIC.reach) * rng.uniform(-0.6, 0.6, JOINTS)
+                position = np.tile(pose, (len(phase), 1))
+                size = min(0.8 * HYDRAULIC.reach[joint], 1.2 / (2 * np.pi * frequency))
+                position[:, joint] = size * np.sin(phase)
+                motions.append(periodic_motion(position, 1 / RATE_HZ, HIGHEST_HZ))
+    return motions
+
+
+def impact(arm: HydraulicArm, rng: np.random.Generator) -> tuple[Motion, FloatArray, FloatArray]:
+    """Return joint 2's up and down onto a spring: motion, torque shown, force on the spring."""
+    pose = np.array([0.1, -0.2, -0.1, 0.2, 0.0]) + 0.05 * rng.normal(size=JOINTS)
+    motion = _around(pose, 1, 0.12, 0.2)
+    lever = float(np.abs(closed_jacobians(HYDRAULIC, pose[None])[0, 2, 1]))
+    depth = lever * np.clip(pose[1] - motion.position[:, 1], 0, None)
+    force = np.zeros((len(motion), 3))
+    force[:, 2] = -STIFFNESS_N_M * np.clip(depth - depth.max() + PEAK_N / STIFFNESS_N_M, 0, None)
+    return motion, measured_torque(arm, motion, force, rng), force
+
+
+def sliding(arm: HydraulicArm, rng: np.random.Generator) -> tuple[Motion, FloatArray, FloatArray]:
+    """Return joint 1's sweep over rough foam: motion, torque shown, force on the foam."""
+    pose = np.array([0.0, -0.2, -0.1, 0.2, 0.0]) + 0.05 * rng.normal(size=JOINTS)
+    motion = _around(pose, 0, 0.85, 0.1)
+    force = np.zeros((len(motion), 3))
+    force[:, 1] = SLIDING_N * np.tanh(motion.velocity[:, 0] / 0.02)
+    return motion, measured_torque(arm, motion, force, rng), force
+
+
+def _around(pose: FloatArray, joint: int, size_rad: float, frequency_hz: float) -> Motion:
+    time = np.arange(round(30 * RATE_HZ)) / RATE_HZ
+    position = np.tile(pose, (len(time), 1))
+    position[:, joint] += size_rad * np.sin(2 * np.pi * frequency_hz * time)
+    return periodic_motion(position, 1 / RATE_HZ, HIGHEST_HZ)
+
+
+def paper_columns(motion: Motion) -> FloatArray:
+    """Return the 96 columns of eight links, ten parameters and two frictions each."""
+    return closed_regressor(HYDRAULIC, motion, SIGN_RAD_S)
+
+
+def conditions(table: FloatArray) -> FloatArray:
+    """Return the condition number of each point's rows, from (n, joints, parameters) to (n,)."""
+    squares = np.linalg.eigvalsh(table @ table.transpose(0, 2, 1))
+    ratio: FloatArray = squares[:, -1] / np.maximum(squares[:, 0], np.finfo(float).tiny)
+    return np.sqrt(ratio)
+
+
+def tip_force(motion: Motion, external: FloatArray) -> FloatArray:
+    """Return the force at the tip by the pseudo-inverse of the transposed Jacobian, (n, 3).
+
+    Five joints cannot tell six components: the tip is taken to push and not to twist.
+    """
+    smooth = zero_phase(external, RATE_HZ, LOW_PASS)
+    jacobians = closed_jacobians(HYDRAULIC, motion.position)[:, :3]
+    force: FloatArray = np.einsum(
+        "nij,nj->ni", np.linalg.pinv(jacobians.transpose(0, 2, 1)), smooth
+    )
+    return force

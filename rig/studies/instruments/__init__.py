@@ -1,0 +1,1 @@
+"""One estimator on many instruments: study and page."""

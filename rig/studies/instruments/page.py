@@ -1,0 +1,74 @@
+"""Estimators of one instrument on others, as a table and as a page."""
+
+from statistics import median
+
+from rig.output.table import TextTable, to_markdown
+from rig.studies.instruments.study import InstrumentStudy
+
+TITLE = "An estimator of one instrument on others"
+NOTE = (
+    "Proximal torque from the measured current, RMSE in mN m over the closing samples of the runs"
+    " not used; fitted anew: on the instrument's other runs alone, in five folds. Of a network the"
+    " output layer is adapted. The stiffness of the states' prior was chosen on the instruments of"
+    " the public data that are shown here, so that column is somewhat too good there; that of the"
+    " networks' on Tool_4_Maryland_L_2 alone."
+)
+
+
+def lead(study: InstrumentStudy) -> str:
+    """Return the result in a sentence."""
+    parts = [
+        f"{1e3 * median(row.rmse_n_m):.2f} mN m on {row.instrument} with {row.runs}"
+        f" run{'s' if row.runs > 1 else ''}"
+        for row in study.drawn
+    ]
+    reach = f", states reach {', '.join(parts)}" if parts else ""
+    return f"Fitted on {study.source} and adapted{reach}: the median over choices of these runs."
+
+
+def drawn_table(study: InstrumentStudy) -> TextTable:
+    """Return what the choice of the runs makes of the errors."""
+    cells = [
+        [
+            row.instrument,
+            str(row.runs),
+            str(len(row.rmse_n_m)),
+            *(f"{1e3 * e:.2f}" for e in (median(row.rmse_n_m), row.rmse_n_m[0], row.rmse_n_m[-1])),
+            "" if row.covered is None else f"{row.covered:.1%}",
+        ]
+        for row in study.drawn
+    ]
+    columns = ["instrument", "runs used", "choices", "median", "best", "worst"]
+    note = (
+        "Products of physical states, RMSE in mN m on the runs not used: each single run in turn,"
+        " and threes drawn at random."
+    )
+    title = "Which runs the states are adapted with"
+    return TextTable(title, [*columns, "interval of 95 % covers"], cells, note)
+
+
+def table(study: InstrumentStudy) -> TextTable:
+    """Return the errors."""
+    cells = []
+    for row in study.rows:
+        found = row.result
+        errors = [found.as_it_is, found.adapted, found.scratch]
+        cells.append([
+            row.kind,
+            row.instrument,
+            ", ".join(name.rsplit("/", 1)[-1] for name in found.used),
+            *("" if score is None else f"{1e3 * score.rmse:.2f}" for score in errors),
+            "" if found.covered is None else f"{found.covered:.1%}",
+            str(len(found.unused)),
+        ])  # fmt: skip
+    columns = ["estimator", "instrument", "runs used", "as it is", "adapted", "fitted anew"]
+    return TextTable(
+        "Other instruments", [*columns, "interval of 95 % covers", "runs not used"], cells, NOTE
+    )
+
+
+def markdown(study: InstrumentStudy) -> str:
+    """Return the study as a Markdown page."""
+    parts = [f"# {TITLE}", lead(study)]
+    parts += [to_markdown(part).rstrip() for part in (table(study), drawn_table(study))]
+    return "\n\n".join([*parts, study.provenance.line()]) + "\n"

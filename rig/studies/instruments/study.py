@@ -1,0 +1,181 @@
+"""One instrument's estimators on other instruments: as they are, adapted, and fitted anew.
+
+The runs adapted with are the ones of the tables before: one run, or three. As much depends on which
+these are, states are adapted with each single run, and with threes drawn at random, too.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimation.bank.states import Bank
+from estimation.campaign import Campaign
+from estimation.estimator import Recipe
+from estimation.estimators.adaptation import adapted_states, evidence, reduced
+from estimation.estimators.bank import BankEstimator, BankRecipe
+from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
+from estimation.estimators.run_evidence import RunEvidence
+from estimation.networks.training import Settings, has_torch
+from rig.models.adapt import Adaptation, open_source, run_adaptation
+from rig.output.provenance import Provenance
+from rig.studies.oneill.kinds import EVERY, LOAD, PAPER_INPUTS, TARGET
+
+USED = (("11",), ("22",), ("00", "11", "22"), ("03", "21", "42"))
+"""Runs adapted with."""
+
+THREE, DRAWS = 3, 40
+"""Runs of a draw, and draws."""
+
+
+@dataclass(frozen=True)
+class InstrumentRow:
+    """One kind of estimator, one instrument and the runs adapted with."""
+
+    kind: str
+    instrument: str
+    result: Adaptation
+
+
+@dataclass(frozen=True)
+class DrawnRow:
+    """States adapted with many choices of so many runs, N m.
+
+    Attributes:
+        instrument: The instrument.
+        runs: Runs adapted with at a time.
+        rmse_n_m: Error on the runs not used, by choice, rising.
+        covered: Mean over the choices of the share of samples inside their interval; None without.
+    """
+
+    instrument: str
+    runs: int
+    rmse_n_m: tuple[float, ...]
+    covered: float | None
+
+
+@dataclass(frozen=True)
+class InstrumentStudy:
+    """Results.
+
+    Attributes:
+        schema: Name of this layout.
+        source: Instrument the estimators were fitted on.
+        rows: The rows.
+        drawn: What the choice of the runs makes of them.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    source: str
+    rows: tuple[InstrumentRow, ...]
+    drawn: tuple[DrawnRow, ...]
+    provenance: Provenance
+
+
+def recipes(networks: bool) -> dict[str, Recipe]:
+    """Return what fits each kind; networks only where they are wanted and torch is installed."""
+    found: dict[str, Recipe] = {"products of physical states": BankRecipe(TARGET, Bank(LOAD))}
+    if networks and has_torch():
+        inputs = (*STATE_INPUTS, LOAD)
+        found |= {
+            "network with physical states": NetworkRecipe(
+                inputs, TARGET, Settings(nodes=12), every=EVERY
+            ),
+            "paper's network": NetworkRecipe(PAPER_INPUTS, TARGET, every=EVERY),
+        }
+    return found
+
+
+def run_instruments(
+    source: tuple[str, Campaign],
+    others: Mapping[str, Campaign],
+    used: Sequence[Sequence[str]] = USED,
+    networks: bool = True,
+    seed: int = 0,
+    on_row: Callable[[int, int], None] = lambda done, total: None,
+) -> InstrumentStudy:
+    """Fit each kind on the source and adapt it to each other instrument.
+
+    Args:
+        source: Name and runs of the instrument that estimators are fitted on.
+        others: Name and runs of the others.
+        used: Names of the runs adapted with, one row each.
+        networks: Whether to train networks too.
+        seed: Seed of the folds of fits anew.
+        on_row: Called with the number of rows done and their total.
+
+    Raises:
+        UsageError: A run is not there.
+        MissingChannelError: A run lacks a channel.
+    """
+    name, campaign = source
+    wanted = recipes(networks)
+    total = len(wanted) * len(others) * len(used)
+    rows: list[InstrumentRow] = []
+    choices: list[DrawnRow] = []
+    for kind, recipe in wanted.items():
+        estimator = open_source(recipe.fit(campaign))
+        for instrument, runs in others.items():
+            for place, chosen in enumerate(used):
+                result, _ = run_adaptation(
+                    estimator,
+                    Path(name),
+                    runs,
+                    chosen,
+                    from_scratch=place == 0,  # it hardly depends on which runs are not used
+                    seed=seed,
+                )
+                rows.append(InstrumentRow(kind, instrument, result))
+                on_row(len(rows), total)
+            if isinstance(estimator, BankEstimator):
+                choices += drawn(estimator, instrument, runs, seed)
+    return InstrumentStudy(
+        "rig.study.instruments/2", name, tuple(rows), tuple(choices), Provenance.now(seed)
+    )
+
+
+def drawn(
+    source: BankEstimator, instrument: str, campaign: Campaign, seed: int
+) -> tuple[DrawnRow, ...]:
+    """Adapt with each single run, and with threes drawn at random; flagged runs are left out.
+
+    Args:
+        source: The source's estimator.
+        instrument: Name of the other one.
+        campaign: Its runs.
+        seed: Seed of the threes.
+    """
+    whole = [evidence(source, recording) for recording in campaign.evidence]
+    runs = reduced(source, [run for run in whole if run is not None and run.flagged == 0])
+    if len(runs) <= THREE:
+        return ()
+    draw = np.random.default_rng(seed)
+    threes = [tuple(draw.choice(len(runs), THREE, replace=False)) for _ in range(DRAWS)]
+    return tuple(
+        _drawn_row(source, instrument, runs, choices)
+        for choices in ([(k,) for k in range(len(runs))], threes)
+    )
+
+
+def _drawn_row(
+    source: BankEstimator,
+    instrument: str,
+    runs: Sequence[RunEvidence],
+    choices: Sequence[tuple[int, ...]],
+) -> DrawnRow:
+    errors, shares = [], []
+    for choice in choices:
+        new = adapted_states(source, [runs[k] for k in choice])
+        rest = [run for k, run in enumerate(runs) if k not in choice]
+        design, truth = (
+            np.concatenate([run.design for run in rest]),
+            np.concatenate([run.truth for run in rest]),
+        )
+        error = design @ new.weights - truth
+        errors.append(float(np.sqrt(np.mean(error**2))))
+        if new.interval is not None:
+            shares.append(float(np.mean(np.abs(error) <= new.interval.half_width(design))))
+    covered = float(np.mean(shares)) if shares else None
+    return DrawnRow(instrument, len(choices[0]), tuple(sorted(errors)), covered)

@@ -1,0 +1,1 @@
+"""The loop closed with measured data: study and page."""

@@ -1,0 +1,100 @@
+"""The study of the closed loop as tables for any medium, and as Markdown."""
+
+from rig.output.table import TextTable, to_markdown
+from rig.studies.loop.study import TIMELESS, LoopStudy, Row
+
+TITLE = "The loop closed on measured data: from a linear model to named effects"
+
+
+def lead(study: LoopStudy) -> str:
+    """Return the study's result in one sentence."""
+    parts = [
+        f"{row.task.name} over {row.task.samples} samples {_mn_m(row.linear)} to {_mn_m(row.rmse)}"
+        for row in study.rows
+    ]
+    return (
+        f"On {len(study.sealed.confirm)} runs kept back, errors in mN m before and after: "
+        + "; ".join(parts)
+        + "."
+    )
+
+
+def notes(study: LoopStudy) -> list[str]:
+    """Return what a reader must know before comparing."""
+    sealed = study.sealed
+    found = [
+        f"Data: {study.source}. {len(sealed.discover)} runs discover, {len(sealed.confirm)} confirm"
+        f" and were opened once, after the last effect was chosen; seal {sealed.seal[:16]}.",
+        "Errors are root mean squares over the samples after the zero-phase 50 Hz filter, each"
+        " run's mean left in. No effect may read the torque it estimates, the jaw's encoder, or how"
+        f" long a run has lasted ({', '.join(TIMELESS)} are left out).",
+        "A limit of this evidence: the forms friction.position.sticking and friction.load.sticking"
+        " and the cube of friction.position joined the catalogue after all runs of"
+        " Tool_4_Maryland_L_4 had been looked at. Another campaign is the better judge of them.",
+    ]
+    found += [f"Left out: run {name}, {reason}." for name, reason in study.left_out.items()]
+    return found
+
+
+def tables(study: LoopStudy) -> list[TextTable]:
+    """Return the study's tables."""
+    return [_errors(study), *(_effects(row) for row in study.rows)]
+
+
+def markdown(study: LoopStudy) -> str:
+    """Return the study as a Markdown page."""
+    parts = [f"# {TITLE}", lead(study), *notes(study)]
+    parts += [to_markdown(table).rstrip() for table in tables(study)]
+    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+
+
+def _errors(study: LoopStudy) -> TextTable:
+    rows = [
+        [
+            row.task.name,
+            row.task.samples,
+            _mn_m(row.linear),
+            _mn_m(row.rmse),
+            _mn_m(row.rmse_without_means),
+            _mn_m(row.task.to_reach),
+            _mn_m(row.task.beyond),
+            str(row.parameters),
+            f"{row.runs_improved} of {len(row.rmse_by_run)}",
+        ]
+        for row in study.rows
+    ]
+    return TextTable(
+        "Errors on the confirm runs, mN m",
+        (
+            "estimate",
+            "samples",
+            "linear",
+            "with effects",
+            "run means removed",
+            "to reach",
+            "beyond",
+            "parameters",
+            "runs improved",
+        ),
+        rows,
+    )
+
+
+def _effects(row: Row) -> TextTable:
+    cells = [["linear model", "2", "", _mn_m(row.linear)]]
+    cells += [
+        [step.effect, str(step.parameters), f"{100 * step.gain:.1f}", _mn_m(step.rmse)]
+        for step in row.steps
+    ]
+    return TextTable(
+        f"{row.task.name}, {row.task.samples} samples: effects in the order found",
+        ("effect", "parameters", "gain %", "rmse, mN m"),
+        cells,
+        f"Tried: {row.candidates} points of {row.families} families. Gain: share of the squared"
+        " error that the model before it left, on discovery runs left out in turn; rmse on the"
+        " confirm runs.",
+    )
+
+
+def _mn_m(torque_n_m: float) -> str:
+    return f"{1e3 * torque_n_m:.2f}"

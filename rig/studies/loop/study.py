@@ -1,0 +1,291 @@
+"""The loop closed on measured data: from a linear model to named effects, proved on runs kept back.
+
+Each row starts from the paper's linear model of one torque, lets the search add effects of the
+catalogue on two thirds of the runs while every gate passes, and opens the others once, at the end.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.derived import MOTOR_LOAD
+from estimation.diagnosis.balance import lay_out
+from estimation.diagnosis.candidate import Candidate, pool
+from estimation.diagnosis.design import DesignError, Run, covered, prepare
+from estimation.diagnosis.frozen import Frozen, Part, freeze
+from estimation.diagnosis.gates import Gates
+from estimation.diagnosis.search import Search, Trial
+from estimation.diagnosis.split import Sealed, split
+from estimation.diagnosis.steps import forwards
+from estimation.effects import effect
+from estimation.fitting import fit
+from estimation.model import Model, Term
+from estimation.recording import Recording
+from estimation.rest import Samples
+from rig.errors import DataError
+from rig.importers.registry import open_campaign
+from rig.output.provenance import Provenance
+
+TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
+"""Families left out: they know how long a run has lasted, which means nothing for another load."""
+
+
+FLOOR = 0.002
+"""Least share of the linear model's squared error that an effect must remove."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One row of the study.
+
+    Attributes:
+        name: What is estimated from what.
+        balance: Balance whose effects are searched.
+        target: Channel that is estimated.
+        source: Channel of the linear model.
+        measured: Channels an effect may read, besides the device's clock.
+        instead: Channel to the one that plays its roles here.
+        samples: Which samples count.
+        parameters: Named parameters at most.
+        to_reach: Error to reach, N m.
+        beyond: A better one, N m.
+    """
+
+    name: str
+    balance: str
+    target: str
+    source: str
+    measured: tuple[str, ...]
+    instead: Mapping[str, str]
+    samples: Samples
+    parameters: int
+    to_reach: float
+    beyond: float
+
+
+_COMMAND = "motor_command_ratio"
+_PROXIMAL = "proximal_torque_n_m"
+_FROM_COMMAND = (
+    "motor",
+    _PROXIMAL,
+    _COMMAND,
+    (_COMMAND, "motor_angle_rad", "spindle_angle_rad"),
+    {"motor_current_a": _COMMAND, MOTOR_LOAD: _COMMAND, "jaw_angle_rad": "spindle_angle_rad"},
+)
+_FROM_PROXIMAL = (
+    "grasp",
+    "distal_torque_n_m",
+    _PROXIMAL,
+    (_PROXIMAL, "motor_angle_rad", "spindle_angle_rad"),
+    {
+        "motor_current_a": _PROXIMAL,
+        MOTOR_LOAD: _PROXIMAL,
+        "motor_velocity_rad_s": "spindle_velocity_rad_s",
+        "motor_acceleration_rad_s2": "spindle_acceleration_rad_s2",
+    },
+)
+
+TASKS = (
+    Task("proximal torque from command", *_FROM_COMMAND, "closing", 15, 4.0e-3, 3.0e-3),
+    Task("proximal torque from command", *_FROM_COMMAND, "all", 15, 12e-3, 7e-3),
+    Task("distal torque from proximal torque", *_FROM_PROXIMAL, "closing", 15, 2.5e-3, 1.8e-3),
+    Task("distal torque from proximal torque", *_FROM_PROXIMAL, "all", 40, 6e-3, 4e-3),
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect added.
+
+    Attributes:
+        effect: Id of its form.
+        parameters: Its parameters.
+        gain: Share of squared error it removed from discovery runs left out.
+        rmse: Error on the confirm runs with it and those before it, means left in, N m.
+    """
+
+    effect: str
+    parameters: int
+    gain: float
+    rmse: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """The answer to a task.
+
+    Attributes:
+        task: The task.
+        linear: Error of the linear model on the confirm runs, means left in, N m.
+        steps: Effects in the order they were added.
+        parameters: Named parameters of the last model.
+        rmse: Its error on the confirm runs, means left in, N m.
+        rmse_without_means: The same with each run's mean error removed.
+        runs_improved: Confirm runs whose error fell.
+        rmse_by_run: Confirm run to the error before and after, N m.
+        families: Families tried.
+        candidates: Grid points tried.
+    """
+
+    task: Task
+    linear: float
+    steps: tuple[Step, ...]
+    parameters: int
+    rmse: float
+    rmse_without_means: float
+    runs_improved: int
+    rmse_by_run: Mapping[str, tuple[float, float]]
+    families: int
+    candidates: int
+
+
+@dataclass(frozen=True)
+class LoopStudy:
+    """The whole study.
+
+    Attributes:
+        rows: One a task.
+        sealed: The split, the same for every task.
+        left_out: Runs left out of evidence, with the reason.
+        source: Where the data came from.
+        provenance: When, from which commit and seed.
+    """
+
+    rows: tuple[Row, ...]
+    sealed: Sealed
+    left_out: Mapping[str, str]
+    source: str
+    provenance: Provenance
+
+
+def run_study(
+    data: Path,
+    seed: int = 0,
+    tasks: Sequence[Task] = TASKS,
+    on_stage: Callable[[str], None] = lambda _: None,
+) -> LoopStudy:
+    """Close the loop on a folder of recordings.
+
+    Args:
+        data: File, folder or archive of recordings.
+        seed: Seed of the split and the surrogates.
+        tasks: Rows to make.
+        on_stage: Told what happens, in words.
+
+    Raises:
+        UsageError: The path does not exist.
+        DataError: It cannot be read, or lacks a channel.
+        EstimationError: The runs cannot be split or fitted.
+    """
+    on_stage("reading the recordings")
+    campaign = open_campaign(data)
+    recordings = list(campaign.evidence)
+    sealed = split(recordings, seed)
+    rows = tuple(_row(task, recordings, sealed, on_stage) for task in tasks)
+    left_out = {r.name: r.excluded for r in campaign if r.excluded is not None}
+    return LoopStudy(rows, sealed, left_out, str(data.name), Provenance.now(seed))
+
+
+def _row(
+    task: Task, recordings: Sequence[Recording], sealed: Sealed, on_stage: Callable[[str], None]
+) -> Row:
+    common = {*recordings[0].columns}.intersection(*(r.columns for r in recordings))
+    missing = {task.target, *task.measured} - common
+    if missing:
+        raise DataError(
+            f"The recordings lack {', '.join(sorted(missing))}.",
+            f"The {task.name} is studied with them.",
+        )
+    what = f"{task.name}, {task.samples} samples"
+    on_stage(f"{what}: linear model")
+    declared = _linear(task)
+    discover = [r for r in recordings if r.name in sealed.discover]
+    fitted = fit(declared, Campaign.of(discover), bootstrap=0)
+    tried = [c for c in pool(declared, task.measured, task.instead) if c.family not in TIMELESS]
+    wanted = [task.target, *declared.channels, *(ch for c in tried for _, ch in c.channels)]
+    runs = _prepared(discover, wanted, declared)
+    tried = covered(tried, runs)
+    gates = Gates(
+        most=task.parameters,
+        parameters=task.parameters,
+        akin=True,
+        surrogates=99,
+        floor=FLOOR,
+        leftover=0.0,
+    )
+    search = Search(lay_out(fitted, runs), tried, gates, sealed.seed)
+
+    def found(trial: Trial) -> None:
+        on_stage(f"{what}: {trial.family}, {100 * trial.gain:.0f} % of what was left")
+
+    made = forwards(search, found)
+    effects = made.found
+    on_stage(f"{what}: opening the confirm runs")
+    held = _prepared([r for r in recordings if r.name in sealed.confirm], wanted, declared)
+    stages = [
+        freeze(search.balance, [Part(e) for e in effects[:k]]) for k in range(len(effects) + 1)
+    ]
+    return _scored(task, stages, effects, made.trials, held, tried)
+
+
+def _scored(
+    task: Task,
+    stages: Sequence[Frozen],
+    effects: Sequence[Candidate],
+    trials: Sequence[Trial],
+    held: Sequence[Run],
+    tried: Sequence[Candidate],
+) -> Row:
+    errors = [[stage.error(run) for run in held] for stage in stages]
+    samples = sum(len(e) for e in errors[0])
+    totals = [float(np.sqrt(sum(float(e @ e) for e in es) / samples)) for es in errors]
+    centred = sum(float(np.sum((e - e.mean()) ** 2)) for e in errors[-1])
+    by_run = {
+        run.name: (float(np.sqrt(np.mean(a**2))), float(np.sqrt(np.mean(b**2))))
+        for run, a, b in zip(held, errors[0], errors[-1], strict=True)
+    }
+    steps = [
+        Step(e.id, len(e.term.parameters), trial.gain, total)
+        for e, trial, total in zip(effects, trials, totals[1:], strict=True)
+    ]
+    return Row(
+        task=task,
+        linear=totals[0],
+        steps=tuple(steps),
+        parameters=2 + sum(step.parameters for step in steps),
+        rmse=totals[-1],
+        rmse_without_means=float(np.sqrt(centred / samples)),
+        runs_improved=sum(after < before for before, after in by_run.values()),
+        rmse_by_run=by_run,
+        families=len({c.family for c in tried}),
+        candidates=len(tried),
+    )
+
+
+def _linear(task: Task) -> Model:
+    """Return the paper's linear model: torque = K source + b."""
+    source = Term(effect("motor.torque_constant"), channels={"source": task.source})
+    return Model(
+        "linear",
+        task.balance,
+        task.target,
+        (source, Term(effect("sensor.offset"))),
+        "The linear model of O'Neill et al. 2018, Table I.",
+        run_offsets=False,
+        counted=task.samples,
+    )
+
+
+def _prepared(recordings: Sequence[Recording], names: Sequence[str], model: Model) -> list[Run]:
+    runs = []
+    for recording in recordings:
+        try:
+            runs.append(prepare(recording, names, model))
+        except DesignError:
+            continue
+    if not runs:
+        raise DataError("No run has a usable sample.", f"Samples that count: {model.samples}.")
+    return runs

@@ -1,0 +1,246 @@
+"""Estimates from physical states on the data of O'Neill et al. 2018, on runs that were not fitted.
+
+Every row is of whole runs held out: in five folds, or all runs of one frequency or power level. The
+five folds are those of the network rows, so that both stand side by side.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from estimation.bank.states import EFFECTS, Bank
+from estimation.campaign import Campaign
+from estimation.closing import is_closing, processed
+from estimation.derived import causal_channels
+from estimation.estimators.bank import (
+    EVERY,
+    BankEstimator,
+    Estimates,
+    fit_runs,
+    rows_of,
+)
+from estimation.estimators.run_evidence import RunEvidence
+from estimation.recording import FloatArray, Recording
+from rig.studies.oneill.data import pose_runs
+from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
+from rig.studies.oneill.shown import Closing, Shown, shown
+from rig.studies.oneill.state_rows import CONDITIONS, LOADS, POSES, StateJob, StateRow, scored
+
+FOLDS = 5
+FILTERS = ("zero-phase", "live")
+TARGETS = (PROXIMAL, DISTAL, JAW)
+DRAWN = (Bank(LOADS["command"]), "live")
+"""What the figures show."""
+
+
+@dataclass(frozen=True)
+class StateStudy:
+    """Results.
+
+    Attributes:
+        schema: Name of this layout.
+        rows: The rows.
+        weights: Number of weights of the neutral pose's estimator.
+        notes: What a reader must know.
+    """
+
+    schema: str
+    rows: tuple[StateRow, ...]
+    weights: int
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run's closing samples: rows of channels by surrogate's channel and filters, the truth."""
+
+    name: str
+    time_s: FloatArray
+    rows: Mapping[tuple[str, str], FloatArray]
+    truth: Mapping[str, FloatArray]
+    valid: np.ndarray
+    conditions: Mapping[str, float | str]
+
+
+def jobs(poses: Sequence[str]) -> list[StateJob]:
+    """Return the rows of the study."""
+    planned = []
+    for surrogate in ("command", "current"):
+        for filters in FILTERS:
+            for protocol in ("run-wise", "lofo", "lopo"):
+                planned += [
+                    StateJob("neutral", surrogate, target, filters, protocol) for target in TARGETS
+                ]
+    planned += [StateJob("neutral", "sensor", target) for target in (DISTAL, JAW)]
+    planned += [
+        StateJob("neutral", "command", target, without=effect)
+        for effect in EFFECTS
+        for target in TARGETS
+    ]
+    planned += [
+        StateJob(pose, surrogate, target, filters, protocol)
+        for pose in ("pitch", "roll")
+        for surrogate in ("command", "current")
+        for filters in FILTERS
+        for protocol in ("run-wise", "lopo")
+        for target in (DISTAL, JAW)
+    ]
+    return [job for job in planned if job.pose in poses]
+
+
+def run_states(
+    neutral: Campaign,
+    left_out: Mapping[str, str],
+    folder: Path | None,
+    *,
+    seed: int = 0,
+    on_run: Callable[[str], None] = lambda name: None,
+    on_row: Callable[[int, int], None] = lambda done, total: None,
+    on_shown: Callable[[Shown], None] | None = None,
+) -> StateStudy:
+    """Fit and score all rows.
+
+    Args:
+        neutral: Runs of experiments 1 and 2.
+        left_out: Runs left out of them, with the reason.
+        folder: Folder that may hold the parts of experiment 3, or lie beside them.
+        seed: Seed of the folds.
+        on_run: Called with each run's name when it has been processed.
+        on_row: Called with the number of rows done and their total.
+        on_shown: Called with what figures are drawn from; nothing is made for them if None.
+
+    Raises:
+        MissingChannelError: A run lacks a channel.
+    """
+    for name, reason in left_out.items():
+        neutral = neutral.exclude(name, reason)
+    campaigns = {"neutral": neutral}
+    for pose in ("pitch", "roll"):
+        found = pose_runs(folder, pose)
+        if found is not None:
+            campaigns[pose] = found
+    planned = jobs(tuple(campaigns))
+    rows: list[StateRow] = []
+    for pose, campaign in campaigns.items():  # one at a time: a pose fills memory
+        own = [job for job in planned if job.pose == pose]
+        wanted = list(dict.fromkeys((job.surrogate, job.filters) for job in own))
+        runs = []
+        for recording in campaign.evidence:
+            run = _reduced(recording, POSES[pose], wanted)
+            runs += [run] if run.valid.any() else []
+            on_run(recording.name)
+        for kind, alike in groupby(own, key=lambda job: (job.bank, job.filters)):
+            evidence = _evidence(kind, runs)
+            rows += _rows(list(alike), runs, evidence, seed)
+            on_row(len(rows), len(planned))
+            if on_shown is not None and kind == DRAWN:
+                for target in (PROXIMAL, DISTAL):
+                    on_shown(_shown(kind, target, runs, evidence[target], seed))
+    return StateStudy(
+        "rig.study.oneill-states/1",
+        tuple(rows),
+        Bank().size,
+        tuple(f"No data of experiment 3, {p}." for p in POSES if p not in campaigns),
+    )
+
+
+def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> _Run:
+    if pose:
+        angle = float(recording.conditions[pose])
+        recording = recording.with_columns(**{pose: np.full(len(recording), angle)})
+    banks = {surrogate: Bank(LOADS[surrogate], pose) for surrogate, _ in wanted}
+    names = [*TARGETS, *(c for bank in banks.values() for c in bank.channels)]
+    run = processed(recording, names)
+    sources = {"zero-phase": run}
+    if any(filters == "live" for _, filters in wanted):
+        sources["live"] = causal_channels(recording, names, tracked=True)
+    kept = is_closing(run)
+    return _Run(
+        recording.name,
+        run.time_s[kept],
+        {
+            (LOADS[surrogate], filters): rows_of(sources[filters], banks[surrogate])[kept]
+            for surrogate, filters in wanted
+        },
+        {target: run[target][kept] for target in TARGETS},
+        run.valid[kept],
+        dict(recording.conditions),
+    )
+
+
+def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
+    """Return the indices of the runs held out together; empty when it cannot be done."""
+    if protocol == "run-wise":
+        order = np.random.default_rng(seed).permutation(len(runs))
+        return [order[k::FOLDS] for k in range(FOLDS)] if len(runs) >= FOLDS else []
+    condition = CONDITIONS[protocol]
+    if any(condition not in run.conditions for run in runs):
+        return []
+    values = np.array([float(run.conditions[condition]) for run in runs])
+    levels = np.unique(values)
+    return [np.flatnonzero(values == level) for level in levels] if len(levels) > 1 else []
+
+
+def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[RunEvidence]]:
+    """Return what is fitted by target; runs without a valid closing sample were left out before."""
+    bank, filters = kind
+    found: dict[str, list[RunEvidence]] = {target: [] for target in TARGETS}
+    for run in runs:
+        kept = np.flatnonzero(run.valid)[::EVERY]
+        truths = np.column_stack([run.truth[target][kept] for target in TARGETS])
+        rows = run.rows[bank.surrogate, filters][kept]
+        reduced = RunEvidence.of_rows(bank, rows, truths, run.conditions)
+        for target, evidence in zip(TARGETS, reduced, strict=True):
+            found[target].append(evidence)
+    return found
+
+
+def _shown(
+    kind: tuple[Bank, str],
+    target: str,
+    runs: Sequence[_Run],
+    evidence: Sequence[RunEvidence],
+    seed: int,
+) -> Shown:
+    bank, filters = kind
+    closing = [
+        Closing(r.name, r.time_s, r.rows[bank.surrogate, filters], r.truth[target]) for r in runs
+    ]
+    return shown(target, bank, closing, evidence, _splits(runs, "run-wise", seed))
+
+
+def _rows(
+    alike: Sequence[StateJob],
+    runs: Sequence[_Run],
+    evidence: Mapping[str, Sequence[RunEvidence]],
+    seed: int,
+) -> list[StateRow]:
+    """Fit and score jobs of one bank and one filter, so that each run's design is made once."""
+    bank, filters = alike[0].bank, alike[0].filters
+    fitted = {job: _fitted(job, evidence[job.target], runs, seed) for job in alike}
+    estimates: dict[StateJob, list[Estimates]] = {job: [] for job in alike if fitted[job]}
+    for k, run in enumerate(runs):
+        rows = run.rows[bank.surrogate, filters]
+        design = bank.design(rows)
+        for job, found in estimates.items():
+            found.append(fitted[job][k].of_design(design, rows))
+    conditions = [run.conditions for run in runs]
+    return [
+        scored(job, found, [run.truth[job.target] for run in runs], conditions)
+        for job, found in estimates.items()
+    ]
+
+
+def _fitted(
+    job: StateJob, evidence: Sequence[RunEvidence], runs: Sequence[_Run], seed: int
+) -> dict[int, BankEstimator]:
+    """Return the estimator that was fitted without each run; none where it cannot be done."""
+    found: dict[int, BankEstimator] = {}
+    for held_out in _splits(runs, job.protocol, seed):
+        rest = [run for k, run in enumerate(evidence) if k not in held_out]
+        estimator = fit_runs(rest, job.bank, job.target)
+        found |= dict.fromkeys(map(int, held_out), estimator)
+    return found

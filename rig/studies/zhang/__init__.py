@@ -1,0 +1,1 @@
+"""Zhang et al. 2022 made again: simulated seven-joint arms, study and page."""

@@ -1,0 +1,226 @@
+"""Our way beside the networks: an arm's model, effects found by search, a network on the rest.
+
+Everything is causal, as the networks are: friction's memory is walked along the measured path, and
+velocity and acceleration are those of a polynomial through past positions, at its end. What the
+coupling matrix gets wrong shows in joints 3 to 6 as a share of the gripper's measured torque, so
+that torque is an input of theirs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from estimation.arm.base import base_of
+from estimation.arm.effects import ArmEffect, on_joint
+from estimation.arm.elements import slip
+from estimation.arm.motion import Motion
+from estimation.arm.regressor import regressor
+from estimation.arm.signed import Block
+from estimation.arm.tables import PSM, Arm
+from estimation.arm.wrist import candidates, gripper
+from estimation.networks.network import Network
+from estimation.recording import FloatArray
+from rig.arm.search import DAMPING, Prepared, search
+from rig.studies.zhang.psm import GRIPPER, JOINTS, RATE_HZ, PsmRun
+from rig.studies.zhang.rest import rest_network, rest_rows
+
+EVERY = 5
+"""Of the samples, so many are fitted: ten a second."""
+
+SETTLE = 100
+"""Samples at the start of a run that are not fitted: slip elements have not slipped yet."""
+
+WINDOW, DEGREE = 15, 4
+"""Past samples that velocity and acceleration come from, and the degree of their polynomial. Taken
+at its end, they hardly trail: differences of past velocities do, which shows as late torque."""
+
+CLOSED_RAD = 0.03
+"""Angle below which the jaws touch."""
+
+LEAKS = (2, 3, 4, 5)
+"""Joints (from 0) that show a share of the gripper's torque."""
+
+LONG_SLIP_SHARE = (0.01, 0.03, 0.1, 0.2)
+"""Thresholds of slip, as shares of half a joint's range."""
+
+DRAG_RAD_S = (0.05, 0.2)
+"""Speeds over which the drag of the gripper's cables turns."""
+
+
+def motion_of_run(run: PsmRun) -> Motion:
+    """Return a run's motion as it is known at each sample; before its first one it stood still."""
+    before = np.repeat(run.position[:1], WINDOW, axis=0)
+    known = np.vstack([before, run.position])
+
+    def derivative(order: int) -> FloatArray:
+        last, step = WINDOW - 1, 1 / RATE_HZ
+        taps = signal.savgol_coeffs(WINDOW, DEGREE, deriv=order, delta=step, pos=last)
+        found: FloatArray = np.asarray(signal.lfilter(taps, [1.0], known, axis=0), np.float64)
+        return found[WINDOW:]
+
+    return Motion(run.position, derivative(1), derivative(2), 1 / RATE_HZ)
+
+
+def base_columns(arm: Arm, run: PsmRun, motion: Motion) -> FloatArray:
+    """Return the declared columns, shape (n, 7, k): arm, gripper, and leaks of its torque."""
+    own = regressor(PSM, motion)[:, :, base_of(PSM).columns]
+    angle, grip = run.position[:, GRIPPER], run.torque[:, [GRIPPER]]
+    return np.concatenate(
+        [
+            np.pad(own, ((0, 0), (0, 1), (0, 0))),
+            gripper(arm, motion),
+            on_joint(np.column_stack([angle, angle < CLOSED_RAD]), GRIPPER, JOINTS),
+            *(on_joint(grip, k, JOINTS) for k in LEAKS),
+        ],
+        axis=2,
+    )
+
+
+def base_block() -> Block:
+    """Return what is known of the declared columns: frictions are not negative."""
+    names = base_of(PSM).names
+    own = [name.startswith("F") and len(name) == 3 for name in names]
+    signs = np.array([*own, False, False, True, True, False, False, *(False for _ in LEAKS)])
+    return Block("base", np.arange(len(signs)), signs, DAMPING, own_length=True)
+
+
+def of_long_slips() -> list[ArmEffect]:
+    """Return slips of joints 1 to 4 over longer ways than the catalogue of arm effects holds."""
+
+    def long(k: int) -> ArmEffect:
+        half = (PSM.joints[k].upper - PSM.joints[k].lower) / 2
+
+        def columns(motion: Motion) -> FloatArray:
+            position = motion.position[:, [k]]
+            slips = [slip(position, share * half) for share in LONG_SLIP_SHARE]
+            return on_joint(np.hstack(slips), k, JOINTS)
+
+        return ArmEffect(f"long slip J{k + 1}", "elastic slip over long ways", columns, True)
+
+    return [long(k) for k in range(4)]
+
+
+def of_moving_gripper() -> list[ArmEffect]:
+    """Return drags of the moving gripper's cables on the joints they run through."""
+
+    def drag(k: int) -> ArmEffect:
+        return ArmEffect(
+            f"gripper drag on J{k + 1}",
+            "friction of the moving gripper's cables, felt in a joint they run through",
+            lambda m: on_joint(np.tanh(m.velocity[:, [GRIPPER]] / DRAG_RAD_S), k, JOINTS),
+        )
+
+    return [drag(k) for k in (*LEAKS, GRIPPER)]
+
+
+@dataclass(frozen=True)
+class Physics:
+    """A fitted arm: declared columns, the effects found, and networks on what they leave.
+
+    Attributes:
+        arm: The arm with its instrument's nominal coupling.
+        effects: What was found, in order.
+        values: Parameters of the declared columns, then of the effects.
+        rest: Of each joint, the network on what is left; None where none helps.
+    """
+
+    arm: Arm
+    effects: tuple[ArmEffect, ...]
+    values: FloatArray
+    rest: tuple[Network | None, ...]
+
+    @property
+    def leaks(self) -> FloatArray:
+        """Share of the gripper's measured torque that shows in joints 3 to 6, shape (4,)."""
+        declared = len(base_block().at)
+        return self.values[declared - len(LEAKS) : declared]
+
+    def __call__(self, run: PsmRun, network: bool = True) -> FloatArray:
+        """Return the torque of each sample in free space, shape (n, 7).
+
+        Args:
+            run: A run; of its torque only the gripper's is looked at, for the leaks.
+            network: Whether to add what the networks give.
+        """
+        torque: FloatArray = columns_of(self.arm, self.effects, run) @ self.values
+        if network:
+            motion = motion_of_run(run)
+            for k, rest in enumerate(self.rest):
+                if rest is not None:
+                    torque[:, k] += rest(rest_rows(self.arm, k, motion))[:, 0]
+        return torque
+
+
+def columns_of(arm: Arm, effects: Sequence[ArmEffect], run: PsmRun) -> FloatArray:
+    """Return declared columns and those of effects, shape (n, 7, k)."""
+    motion = motion_of_run(run)
+    parts = [base_columns(arm, run, motion), *(effect.columns(motion) for effect in effects)]
+    return np.concatenate(parts, axis=2)
+
+
+def blocks_of(effects: Sequence[ArmEffect], widths: Sequence[int]) -> tuple[Block, ...]:
+    """Return the blocks of declared columns and effects, of so many columns each."""
+    blocks = [base_block()]
+    start = len(blocks[0].at)
+    for effect, width in zip(effects, widths, strict=True):
+        signs = np.full(width, effect.dissipative)
+        at = np.arange(start, start + width)
+        blocks.append(Block(effect.name, at, signs, DAMPING * effect.damping))
+        start += width
+    return tuple(blocks)
+
+
+def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmEffect]) -> Prepared:
+    """Return runs ready for fits and for the search."""
+    tables, torques, widths = [], [], []
+    for run in runs:
+        motion = motion_of_run(run)
+        kept = slice(SETTLE, None, EVERY)
+        parts = [base_columns(arm, run, motion)[kept]]
+        parts += [effect.columns(motion)[kept] for effect in effects]
+        widths = [part.shape[2] for part in parts[1:]]
+        tables.append(np.concatenate(parts, axis=2))
+        torques.append(run.torque[kept])
+    torque, table = np.concatenate(torques), np.concatenate(tables)
+    return Prepared(
+        name=name,
+        position=np.zeros((len(torque), GRIPPER)),
+        torque=torque,
+        thesis=table[:, :, :0],
+        closed=table[:, :, :0],
+        table=table,
+        blocks=blocks_of(effects, widths),
+        independent_share=1.0,
+    )
+
+
+def find_effects(arm: Arm, first: Sequence[PsmRun], second: Sequence[PsmRun]) -> list[ArmEffect]:
+    """Return the effects that help from some runs to others and back, by the search on arms."""
+    tried = [*candidates(arm), *of_long_slips(), *of_moving_gripper()]
+    one, other = (
+        prepared(name, arm, runs, tried) for name, runs in (("first", first), ("second", second))
+    )
+    kept = search((one, other), (other, one), tried)[1]
+    named = {effect.name: effect for effect in tried}
+    return [named[name] for name in kept]
+
+
+def fitted(
+    arm: Arm, effects: Sequence[ArmEffect], runs: Sequence[PsmRun], network: bool = True
+) -> Physics:
+    """Fit an arm with given effects, then a small network on each joint's rest."""
+    path = prepared("fitted", arm, runs, effects)
+    values = path.values([effect.name for effect in effects])
+    bare = Physics(arm, tuple(effects), values, (None,) * JOINTS)
+    if not network:
+        return bare
+    left = path.torque - path.table @ values
+    motions = [motion_of_run(run) for run in runs]
+
+    def rest(k: int) -> Network | None:
+        rows = [rest_rows(arm, k, motion)[SETTLE::EVERY] for motion in motions]
+        return rest_network(np.concatenate(rows), left[:, k])
+
+    return Physics(arm, tuple(effects), values, tuple(rest(k) for k in range(JOINTS)))

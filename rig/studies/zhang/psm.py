@@ -1,0 +1,235 @@
+"""A simulated patient-side manipulator of seven degrees of freedom: six joints and the gripper.
+
+The arm's declared part is that of `rig.arm.simulated`. Its instrument's cables add what Zhang et
+al. 2022 report: a coupling matrix that is not quite the nominal one, friction that remembers, and
+vibration of the moving gripper. Joint torque is what the motors show through the nominal matrix,
+A_nominal^-T A_true^T tau (`rig.grasper.coupling` tells the erratum of the paper's equation 4).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import signal
+
+from estimation.arm.motion import Motion
+from estimation.arm.regressor import regressor
+from estimation.arm.tables import PSM, Arm
+from estimation.arm.wrench import spatial_jacobians
+from estimation.recording import FloatArray
+from rig.arm.simulated import HIDDEN_SHARE, SimulatedArm, dahl
+from rig.grasper.dvrk import dvrk_coupling
+from rig.studies.zhang.psm_instruments import KINDS, Kind
+
+RATE_HZ = 50.0
+JOINTS = 7
+GRIPPER = 6
+WRIST = slice(3, 7)
+"""Roll, pitch, yaw and gripper: what the instrument's four motors drive."""
+
+MEMORY = np.array([0.9, 1.45, 0.72, 0.0, 0.0, 0.0])
+"""Friction with memory of each joint, as a share of its declared torque's RMS."""
+
+CABLE_N_M = np.array([0.00077, 0.019, 0.0132, 0.0132])
+"""Friction with memory of the instrument's four motors and their cables."""
+
+NOISE = np.array([0.05, 0.06, 0.1, 0.03, 0.03, 0.05])
+"""Noise of the torque, white, as a share of the declared torque's RMS."""
+
+PULL = np.array([0.0, 0.0, 4.0, 0.004])
+"""Pull of the gripper's cables on joints 1 to 4: N m, N or N m a N m of the gripper."""
+
+RUB = np.array([0.0, 0.0, 0.0, 0.011])
+"""Rubbing of the moving gripper's cables in the shaft, N m or N."""
+
+RUB_RAD_S = 0.1
+
+VIBRATION = np.array([0.0, 0.0, 3.0, 0.006])
+"""Ringing of joints 1 to 4 after the gripper turns back, N m or N."""
+
+PRESS_N_M, CLOSED_RAD = 0.06, 0.02
+"""Torque by which closed jaws press on one another, and the angle below which they begin to."""
+
+RINGING_HZ, RINGING_S = 8.0, 0.03
+COUPLING_ERROR = 0.12
+"""Standard deviation of the true coupling matrix's elements, relative to the nominal ones."""
+
+SPREAD = 0.15
+"""Standard deviation of the logarithm of each strength between instruments."""
+
+SLIP_SHARE = np.array([0.05, 0.05, 0.04, 0.02, 0.02, 0.02])
+"""Motion over which a joint's friction turns, as a share of its range."""
+
+CABLE_SLIP_RAD, GRIPPER_SLIP_RAD = 0.15, 0.15
+NOISE_RAD, NOISE_RAD_S = 2e-5, 2e-3
+"""Noise of positions and velocities; in m and m/s of the insertion."""
+
+CHUNK = 8000
+"""Samples whose regressor is held at once."""
+
+
+@dataclass(frozen=True)
+class Psm:
+    """One arm with one instrument, drawn around the plausible ones.
+
+    Attributes:
+        arm: The arm; its hidden strengths are not used but scale those here.
+        kind: The instrument's gripper, as drawn.
+        memory: Friction with memory of joints 1 to 6, N m or N.
+        cable_n_m: Friction with memory of the four motors and their cables.
+        noise: Standard deviation of the noise of each joint, N m or N.
+        true_coupling: From motors to roll, pitch, yaw and gripper, shape (4, 4).
+        leak: A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4).
+    """
+
+    arm: SimulatedArm
+    kind: Kind
+    memory: FloatArray
+    cable_n_m: FloatArray
+    noise: FloatArray
+    true_coupling: FloatArray
+    leak: FloatArray
+
+    @property
+    def nominal_coupling(self) -> FloatArray:
+        """From motors to roll, pitch, yaw and gripper as the dVRK states it, shape (4, 4)."""
+        return dvrk_coupling(self.kind.model).jacobian
+
+    @property
+    def table(self) -> Arm:
+        """The arm's table with the instrument's nominal coupling."""
+        rows = self.nominal_coupling[1:, 1:]
+        return replace(PSM, wrist_coupling=tuple(tuple(map(float, row)) for row in rows))
+
+
+@dataclass(frozen=True)
+class PsmRun:
+    """What the arm's sensors tell of a run.
+
+    Attributes:
+        position: Measured positions, shape (n, 7), rad or m.
+        velocity: Measured velocities, shape (n, 7).
+        torque: Joint torques as the nominal coupling shows them, shape (n, 7), N m or N.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    torque: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def part(self, start: int, stop: int) -> "PsmRun":
+        """Return some of its samples."""
+        kept = slice(start, stop)
+        return PsmRun(self.position[kept], self.velocity[kept], self.torque[kept])
+
+
+def with_instrument(rng: np.random.Generator, arm: SimulatedArm, name: str) -> Psm:
+    """Draw an instrument of one of `KINDS` and put it on an arm."""
+    kind = KINDS[name]
+    scale = np.exp(SPREAD * rng.normal(size=8))
+    drawn = replace(
+        kind,
+        offset_n_m=kind.offset_n_m * scale[0],
+        spring_n_m_rad=kind.spring_n_m_rad * scale[1],
+        friction_n_m=kind.friction_n_m * scale[2],
+        memory_n_m=kind.memory_n_m * scale[3],
+    )
+    declared = arm.hidden[0] / HIDDEN_SHARE
+    nominal = dvrk_coupling(kind.model).jacobian
+    true = nominal * (1 + COUPLING_ERROR * rng.normal(size=(4, 4)))
+    return Psm(
+        arm=arm,
+        kind=drawn,
+        memory=MEMORY * declared,
+        cable_n_m=CABLE_N_M * scale[4:],
+        noise=np.append(NOISE * declared, 0.05 * kind.friction_n_m),
+        true_coupling=true,
+        leak=np.linalg.inv(nominal).T @ true.T,
+    )
+
+
+def simulate(
+    psm: Psm,
+    motion: Motion,
+    rng: np.random.Generator,
+    wrench: FloatArray | None = None,
+    grip_n_m: FloatArray | None = None,
+    lead: int = 0,
+) -> PsmRun:
+    """Return what the sensors tell of a motion.
+
+    Args:
+        psm: The arm.
+        motion: Its motion, shape (n, 7).
+        rng: For the noise.
+        wrench: Spatial wrench of the tip on its surroundings, shape (n, 6); None in free space.
+        grip_n_m: Torque of the gripper on what it holds, shape (n,); None where it holds nothing.
+        lead: Samples at the start that are not told: they leave the cables in their state.
+    """
+    joints = np.zeros((len(motion), JOINTS))
+    joints[:, :GRIPPER] = _declared(psm.arm.values, motion)
+    joints[:, :GRIPPER] += psm.memory * dahl(motion.position[:, :GRIPPER], _slips())
+    if wrench is not None:
+        jacobians = spatial_jacobians(PSM, motion.position[:, :GRIPPER])
+        joints[:, :GRIPPER] += np.einsum("nij,ni->nj", jacobians, wrench)
+    own = gripper_torque(psm.kind, motion.position[:, GRIPPER], motion.velocity[:, GRIPPER])
+    joints[:, GRIPPER] = own if grip_n_m is None else own + grip_n_m
+    shown = joints.copy()
+    shown[:, WRIST] = joints[:, WRIST] @ psm.leak.T + _cables(psm, motion.position[:, WRIST])
+    shown[:, :4] += np.outer(joints[:, GRIPPER], PULL)
+    shown[:, :4] += np.outer(np.tanh(motion.velocity[:, GRIPPER] / RUB_RAD_S), RUB)
+    shown[:, :4] += np.outer(ringing(motion.velocity[:, GRIPPER], rng), VIBRATION)
+    shown += psm.noise * rng.normal(size=shown.shape)
+    position = motion.position + NOISE_RAD * rng.normal(size=shown.shape)
+    velocity = motion.velocity + NOISE_RAD_S * rng.normal(size=shown.shape)
+    return PsmRun(position, velocity, shown).part(lead, len(motion))
+
+
+def gripper_torque(kind: Kind, position: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Return the torque that a gripper takes to move, N m; arrays of shape (n,).
+
+    Where it is closed its jaws press on one another.
+    """
+    torque: FloatArray = (
+        kind.offset_n_m
+        + kind.spring_n_m_rad * position
+        + kind.friction_n_m * np.tanh(velocity / RUB_RAD_S)
+        + kind.memory_n_m * dahl(position[:, None], np.array([GRIPPER_SLIP_RAD]))[:, 0]
+        - PRESS_N_M * np.clip(1 - position / CLOSED_RAD, 0, 1)
+    )
+    return torque
+
+
+def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return a ringing that starts whenever a velocity, shape (n,), changes its sign."""
+    turned = np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0
+    strength = np.where(turned, rng.uniform(-1, 1, len(velocity)) ** 5, 0.0)
+    pole = np.exp(-1 / (RINGING_S * RATE_HZ) + 2j * np.pi * RINGING_HZ / RATE_HZ)
+    answer = signal.lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], strength)
+    rung: FloatArray = np.asarray(answer, dtype=np.float64)
+    return rung
+
+
+def _cables(psm: Psm, wrist: FloatArray) -> FloatArray:
+    """Return what the friction of the instrument's motors shows as joint torque, shape (n, 4)."""
+    motors = wrist @ np.linalg.inv(psm.true_coupling).T
+    friction = psm.cable_n_m * dahl(motors, np.full(4, CABLE_SLIP_RAD))
+    shown: FloatArray = friction @ np.linalg.inv(psm.nominal_coupling)
+    return shown
+
+
+def _declared(values: FloatArray, motion: Motion) -> FloatArray:
+    parts = []
+    for start in range(0, len(motion), CHUNK):
+        kept = slice(start, start + CHUNK)
+        part = Motion(
+            motion.position[kept], motion.velocity[kept], motion.acceleration[kept], motion.period_s
+        )
+        parts.append(regressor(PSM, part) @ values)
+    return np.concatenate(parts)
+
+
+def _slips() -> FloatArray:
+    slips: FloatArray = SLIP_SHARE * np.array([joint.upper - joint.lower for joint in PSM.joints])
+    return slips

@@ -1,0 +1,159 @@
+"""Zhang et al. 2022 on simulated seven-joint arms: all seeds, kept as they are done."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimation.arm.kinematics import pinocchio
+from estimation.networks.training import has_torch
+from estimation.recording import FloatArray
+from rig.errors import UsageError
+from rig.output.provenance import Provenance
+from rig.studies.seeds import kept_outcomes
+from rig.studies.zhang.free import NETWORKS, Cells
+from rig.studies.zhang.seed import Outcome, one_seed
+
+SCHEMA = "rig.study.zhang/1"
+
+PAPER: dict[str, tuple[float | None, ...]] = {
+    "I | C on C": (5.29, 5.73, 7.72, 3.50, 3.69, 3.69),
+    "I | M on M": (6.50, 6.98, 5.72, 1.99, 3.34, 3.64),
+    "I | C on M": (None, None, 7.51, None, None, None),
+    "I | M on C": (6.14, 7.73, 10.24, 3.99, 5.06, 7.71),
+    "I | M+C on M": (None, None, 6.11, None, None, None),
+    "I | M+C on C": (6.04, 5.88, 7.20, 3.67, 3.74, 3.81),
+    "II before | CF": (26.662,),
+    "II before | LTF": (29.942,),
+    "II before | MCS": (29.087,),
+    "II before | MBF": (30.919,),
+    "II before | PF": (20.750,),
+    "II before | RF": (26.734,),
+    "II before | SCA": (38.384,),
+    "II after | CF": (6.033,),
+    "II after | LTF": (7.722,),
+    "II after | MCS": (5.039,),
+    "II after | MBF": (7.768,),
+    "II after | PF": (4.985,),
+    "II after | RF": (6.878,),
+    "II after | SCA": (5.391,),
+    "grasp | RMSE, NRMSE, scale": (0.37, 8.73, 50.0),
+}
+"""The paper's numbers; None where our copy of the paper has lost them."""
+
+PAPER_FORCE_N, PAPER_MOMENT_N_M, PAPER_GRASP_N = 1.4, (0.04, 0.06), 0.1
+"""Largest RMSE of an axis in contact; of the moment, the abstract's and section IV-D's."""
+
+WITHIN = 0.25
+
+
+@dataclass(frozen=True)
+class ZhangStudy:
+    """Results of the study.
+
+    Attributes:
+        schema: Name of this layout.
+        seeds: The seeds, all reported.
+        outcomes: Of each seed, its errors by `experiment | condition | method`.
+        traces: Forces over time of the first seed, by `experiment | what`.
+        effects: Of each effect found, on how many arms.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    seeds: tuple[int, ...]
+    outcomes: tuple[Cells, ...]
+    traces: Cells
+    effects: dict[str, int]
+    provenance: Provenance
+
+    def values(self, cell: str) -> FloatArray:
+        """Return one cell's numbers over the seeds, shape (seeds, numbers)."""
+        return np.array([outcome[cell] for outcome in self.outcomes])
+
+    def median(self, cell: str) -> FloatArray:
+        """Return the medians over the seeds, shape (numbers,)."""
+        middle: FloatArray = np.median(self.values(cell), axis=0)
+        return middle
+
+    def near(self, condition: str) -> list[bool | None]:
+        """Say of each of the paper's numbers whether its method lands near it here.
+
+        The median over the seeds counts; None where the paper's number is not known.
+        """
+        found = self.median(f"{condition} | {NETWORKS}")
+        return [
+            None if stated is None else bool(abs(here / stated - 1) <= WITHIN)
+            for here, stated in zip(found, PAPER[condition], strict=True)
+        ]
+
+    def near_in_contact(self) -> tuple[bool, bool, bool]:
+        """Say whether force, moment (by either of its numbers) and grasp land near the paper's."""
+        force, moment, grasp = worst_axes(self.median(f"contact | wrench, grasp | {NETWORKS}"))
+        return (
+            abs(force / PAPER_FORCE_N - 1) <= WITHIN,
+            any(abs(moment / stated - 1) <= WITHIN for stated in PAPER_MOMENT_N_M),
+            abs(grasp / PAPER_GRASP_N - 1) <= WITHIN,
+        )
+
+
+def worst_axes(contact: FloatArray) -> tuple[float, float, float]:
+    """Return the largest force error, the largest moment error and the grasp's of a contact."""
+    return float(contact[:3].max()), float(contact[3:6].max()), float(contact[6])
+
+
+def run_zhang(
+    seeds: int,
+    state: Path,
+    workers: int = 1,
+    on_seed: Callable[[], None] = lambda: None,
+) -> ZhangStudy:
+    """Do the study on arms of several seeds, from 0.
+
+    Args:
+        seeds: How many.
+        state: Folder where the outcome of each seed is kept.
+        workers: Processes; each does one seed on one core.
+        on_seed: Called after each seed, also after one that was kept.
+
+    Raises:
+        UsageError: torch is missing.
+        PinocchioMissingError: Pinocchio is missing.
+        OSError: The folder cannot be written.
+    """
+    if not has_torch():
+        raise UsageError(
+            "The paper's networks cannot be trained: torch is not installed.",
+            fix="Install it: pip install 'rig[learn]'.",
+        )
+    pinocchio()
+    outcomes = kept_outcomes(
+        one_seed, _read, seeds, state, SCHEMA, workers=workers, start=_one_thread, on_seed=on_seed
+    )
+    numbers = tuple(range(seeds))
+    found = Counter(name for seed in numbers for name in outcomes[seed].effects)
+    return ZhangStudy(
+        schema=SCHEMA,
+        seeds=numbers,
+        outcomes=tuple(outcomes[seed].cells for seed in numbers),
+        traces=outcomes[0].traces,
+        effects=dict(found.most_common()),
+        provenance=Provenance.now(0),
+    )
+
+
+def _read(held: Any) -> Outcome:
+    cells, traces = (
+        {name: tuple(numbers) for name, numbers in held[part].items()}
+        for part in ("cells", "traces")
+    )
+    return Outcome(cells, traces, tuple(held["effects"]))
+
+
+def _one_thread() -> None:
+    import torch
+
+    torch.set_num_threads(1)

@@ -1,0 +1,225 @@
+"""Haptic experiments of Zhao and Nelson 2016, section 4: stiffness from angle and estimated force.
+
+Three materials are told apart, and a stiff inclusion is found among seven places, three grasps
+each. Stiffness is the slope of estimated force over joint angle while the grasp closes. Friction
+adds to that slope, to all places alike, so the answer does not need it declared; its size does.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from estimation.filters import CausalFilter, LowPass
+from estimation.model import Model, Term, predict
+from estimation.recording import FloatArray, Recording
+from rig.grasper.current_force import FILTER, CurrentForce
+from rig.grasper.inputs import hold
+from rig.grasper.plant import PROTOTYPES, RATE_HZ
+from rig.studies.seeds import kept_outcomes
+from rig.studies.zhao.methods import Axes, axes_of, fitted, record
+
+MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
+"""Stiffness at the joint. Assumed; the paper gives none."""
+PLACES, GRASPS = 7, 3
+TISSUE_N_M_RAD, INCLUSION_RATIO = 0.15, 2.0
+PEAK_N = 1.5
+RISE_S = 4.0
+"""A palpating grasp is slow: the filters' lag must not pass for a slope."""
+SCHEMA = "rig.study.haptics/1"
+DOF = "grasp"
+LEVEL = 0.95
+"""Confidence from which an answer counts as sure."""
+
+Estimate = Callable[[Recording], tuple[FloatArray, FloatArray]]
+"""Gives the force and the angle of a run, N and rad, filtered alike."""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """One place or material.
+
+    Attributes:
+        name: Name.
+        true_n_rad: What it is, force at the tip over joint angle.
+        grasps_n_rad: What each grasp gave.
+    """
+
+    name: str
+    true_n_rad: float
+    grasps_n_rad: tuple[float, ...]
+
+    @property
+    def mean_n_rad(self) -> float:
+        """Mean of the grasps."""
+        return float(np.mean(self.grasps_n_rad))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one method says.
+
+    Attributes:
+        method: Name of the method.
+        materials: The three materials.
+        order_confidence: Confidence that neighbours in the found order differ, the least of them.
+        order_is_right: Whether the order is the true one.
+        places: The seven places.
+        found: Place with the inclusion, from 0.
+        true: Where it is.
+        place_confidence: Confidence that this place is stiffer than the stiffest other.
+    """
+
+    method: str
+    materials: tuple[Stiffness, ...]
+    order_confidence: float
+    order_is_right: bool
+    places: tuple[Stiffness, ...]
+    found: int
+    true: int
+    place_confidence: float
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What the methods say of one grasper, in the order of `run_haptics`."""
+
+    answers: tuple[Answer, ...]
+
+
+def haptics_of(
+    prototype: str,
+    seeds: int,
+    spread: float,
+    added: Sequence[Term],
+    state: Path,
+    *,
+    workers: int = 1,
+    on_step: Callable[[], None] = lambda: None,
+) -> list[tuple[Answer, ...]]:
+    """Return the answers on graspers of one make, one tuple a seed, in their order.
+
+    Args:
+        prototype: `third`, `journal` or `ball`.
+        seeds: Number of graspers, from seed 0.
+        spread: Spread of the hidden parameters from grasper to grasper.
+        added: Effects that ours adds to the declared model.
+        state: Folder where each is kept as it is done.
+        workers: Processes at once.
+        on_step: Called after each grasper.
+    """
+    done = kept_outcomes(
+        partial(run_haptics, prototype, spread, tuple(added)), _read, seeds, state,
+        f"{SCHEMA} {prototype} {spread:g}", workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    return [each.answers for each in done]
+
+
+def run_haptics(prototype: str, spread: float, added: Sequence[Term], seed: int) -> Answers:
+    """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
+    axes = axes_of(PROTOTYPES[prototype], DOF, seed, spread)
+    methods = {
+        "paper's method": _of_current(axes),
+        "ours": _of_model(fitted(DOF, axes, seed, added), axes),
+        "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
+    }
+    return Answers(tuple(_answer(name, way, axes, seed) for name, way in methods.items()))
+
+
+def _answer(method: str, estimate: Estimate, axes: Axes, seed: int) -> Answer:
+    random = np.random.default_rng(seed + 4711)
+    materials = tuple(
+        _grasped(name, k, axes, estimate, random) for name, k in MATERIALS_N_M_RAD.items()
+    )
+    true = int(random.integers(PLACES))
+    tissue = TISSUE_N_M_RAD * np.exp(0.08 * random.standard_normal(PLACES))
+    tissue[true] *= INCLUSION_RATIO
+    places = tuple(
+        _grasped(str(k + 1), float(stiffness), axes, estimate, random)
+        for k, stiffness in enumerate(tissue)
+    )
+    ranked = sorted(materials, key=lambda s: s.mean_n_rad, reverse=True)
+    pairs = itertools.pairwise(ranked)
+    by_stiffness = sorted(range(PLACES), key=lambda k: places[k].mean_n_rad, reverse=True)
+    first, second = by_stiffness[:2]
+    return Answer(
+        method,
+        materials,
+        min(_confidence(a.grasps_n_rad, b.grasps_n_rad) for a, b in pairs),
+        [s.name for s in ranked] == list(MATERIALS_N_M_RAD),
+        places,
+        first,
+        true,
+        _confidence(places[first].grasps_n_rad, places[second].grasps_n_rad),
+    )
+
+
+def _grasped(
+    name: str, stiffness: float, axes: Axes, estimate: Estimate, random: np.random.Generator
+) -> Stiffness:
+    slopes = []
+    for _ in range(GRASPS):
+        contact = float(random.uniform(0.08, 0.12))
+        held = tuple(replace(a, contact_n_m_rad=stiffness, contact_rad=contact) for a in axes)
+        asked = hold(held[0], PEAK_N, 0.5, RISE_S)
+        run = record(name, DOF, held, asked, int(random.integers(1_000_000)))
+        force, angle = estimate(run)
+        slopes.append(_slope(force, angle))
+    return Stiffness(name, stiffness / axes[0].arm_m, tuple(slopes))
+
+
+def _slope(force_n: FloatArray, angle_rad: FloatArray) -> float:
+    """Return the slope over the upper part of the loading, where the grasp is in contact."""
+    top = int(np.argmax(force_n))
+    rested = float(np.median(force_n[: top // 3]))
+    low = rested + 0.4 * (force_n[top] - rested)
+    high = rested + 0.9 * (force_n[top] - rested)
+    below = np.flatnonzero(force_n[:top] < low)
+    start = int(below[-1]) + 1 if below.size else 0
+    kept = slice(start, start + int(np.argmax(force_n[start:] >= high)))
+    return float(np.polyfit(angle_rad[kept], force_n[kept], 1)[0])
+
+
+def _confidence(high: Sequence[float], low: Sequence[float]) -> float:
+    """Return one less the one-sided p-value of Welch's test that the first mean is greater."""
+    found = stats.ttest_ind(high, low, equal_var=False, alternative="greater")
+    return float(1.0 - found.pvalue)
+
+
+def _of_current(axes: Axes) -> Estimate:
+    method = CurrentForce(axes[0].arm_m)
+
+    def estimate(run: Recording) -> tuple[FloatArray, FloatArray]:
+        return method.force_n(run[f"{DOF}_current_a"], RATE_HZ), _low(run, FILTER)
+
+    return estimate
+
+
+def _of_model(model: Model, axes: Axes) -> Estimate:
+    def estimate(run: Recording) -> tuple[FloatArray, FloatArray]:
+        return predict(model, run, causal=True) / axes[0].arm_m, _low(run, model.low_pass)
+
+    return estimate
+
+
+def _low(run: Recording, low_pass: LowPass) -> FloatArray:
+    angle = run[f"{DOF}_angle_rad"]
+    return CausalFilter(run.sample_rate_hz, low_pass).step(angle[:, None])[:, 0]
+
+
+def _read(held: Any) -> Answers:
+    return Answers(
+        tuple(
+            Answer(**{**one, "materials": _all(one["materials"]), "places": _all(one["places"])})
+            for one in held["answers"]
+        )
+    )
+
+
+def _all(told: list[dict[str, Any]]) -> tuple[Stiffness, ...]:
+    return tuple(Stiffness(s["name"], s["true_n_rad"], tuple(s["grasps_n_rad"])) for s in told)

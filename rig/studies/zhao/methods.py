@@ -1,0 +1,249 @@
+"""The paper's method and ours on one degree of freedom of a simulated grasper.
+
+Runs that calibrate and runs that are reported are different runs. Where ours is fitted, objects
+differ in stiffness and place from run to run: with one object the angle alone would give the force.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from estimation.campaign import Campaign
+from estimation.diagnosis.diagnose import diagnose
+from estimation.diagnosis.split import split
+from estimation.effects import effect
+from estimation.filters import LowPass
+from estimation.fitting import fit
+from estimation.model import Model, Term, predict
+from estimation.recording import FloatArray, Recording
+from rig.grasper.angle_led import angle_led
+from rig.grasper.current_force import CurrentForce
+from rig.grasper.inputs import end_of_hold, hold, periodic
+from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, vary
+from rig.studies.zhao.paper import INPUTS, LEVELS_N, LONG_S, SHORT_S
+
+FILTER = LowPass(cutoff_hz=25.0, order=2)
+EVERY = 8
+"""Samples that are averaged to one where a model is fitted or diagnosed."""
+
+Axes = tuple[AxisParameters, ...]
+ToForce = Callable[[Recording], FloatArray]
+"""Run to estimated force, N, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """What the diagnosis says a degree of freedom's model lacks.
+
+    Attributes:
+        findings: Family and verdict of each finding.
+        terms: The effects it named, with the values it found.
+    """
+
+    findings: tuple[tuple[str, str], ...]
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One method on one degree of freedom of one grasper.
+
+    Attributes:
+        errors_n: Estimate less force, mean over the levels, in the order of `INPUTS`.
+        delay_ms: Of the estimate behind the force in periodic input; negative where it leads.
+    """
+
+    errors_n: tuple[float, float, float]
+    delay_ms: float
+
+
+def axes_of(prototype: Prototype, dof: str, seed: int, spread: float) -> Axes:
+    """Return the axes of a degree of freedom of the grasper of this seed.
+
+    Pitch and grasp share the first jaw.
+    """
+    first = 10 * seed + (5 if dof == "yaw" else 0)
+    return tuple(vary(axis, first + k, spread) for k, axis in enumerate(prototype.axes[dof]))
+
+
+def record(
+    name: str, dof: str, axes: Axes, target_rad: FloatArray, seed: int, **held: float
+) -> Recording:
+    """Return a run at 2 kHz: the mean current and angle of the axes, and the force as torque."""
+    played = [play_axis(axis, target_rad, 100 * seed + k) for k, axis in enumerate(axes)]
+    mean = {key: np.mean([one[key] for one in played], axis=0) for key in played[0]}
+    return Recording(
+        name,
+        np.arange(len(target_rad)) / RATE_HZ,
+        {
+            f"{dof}_current_a": mean["motor_current_a"],
+            f"{dof}_angle_rad": mean["joint_angle_rad"],
+            f"{dof}_torque_n_m": mean["force_n"] * axes[0].arm_m,
+        },
+        conditions=held,
+        rig="simulated grasper",
+    )
+
+
+def declared(dof: str) -> Model:
+    """Return the paper's model as ours declares it: torque in proportion to current, and a zero."""
+    current = {"source": f"{dof}_current_a"}
+    terms = (Term(effect("motor.torque_constant"), 1, current), Term(effect("sensor.offset"), 1))
+    return Model(
+        "zhao",
+        dof,
+        f"{dof}_torque_n_m",
+        terms,
+        "Torque of a joint from its motor's current; Zhao and Nelson 2016, equations 12 to 14.",
+        FILTER,
+        run_offsets=False,
+        counted="all",
+    )
+
+
+def calibration_runs(dof: str, axes: Axes, seed: int, repeats: int = 2) -> list[Recording]:
+    """Return runs on objects that differ in stiffness and place, at 250 Hz."""
+    random = np.random.default_rng(seed + 77)
+    runs: list[Recording] = []
+    for repeat in range(repeats):
+        for force_n in LEVELS_N:
+            for number, kind in enumerate(INPUTS):
+                stiffness = float(np.exp(random.uniform(np.log(0.15), np.log(0.6))))
+                contact = float(random.uniform(0.05, 0.25))
+                held = tuple(
+                    replace(axis, contact_n_m_rad=stiffness, contact_rad=contact) for axis in axes
+                )
+                run = record(
+                    f"{kind}-{force_n:g}N-{repeat}",
+                    dof,
+                    held,
+                    _target(kind, held[0], force_n),
+                    seed * 1000 + len(runs),
+                    input_ratio=float(number),
+                    force_n=force_n,
+                )
+                runs.append(_averaged(run))
+    return runs
+
+
+def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
+    """Return what the diagnosis finds missing in the declared model on a grasper's runs."""
+    runs = calibration_runs(dof, axes, seed, repeats)
+    model = declared(dof)
+    diagnosis, stories = diagnose(runs, [model], split(runs, seed))
+    named = [claim.part.candidate for claim in stories[dof].claims]
+    names = {candidate.id for candidate in named if candidate is not None}
+    return Lacking(
+        tuple((finding.family, finding.verdict) for finding in diagnosis.findings),
+        tuple(term for term in stories[dof].model.terms if term.effect.id in names),
+    )
+
+
+def fitted(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Model:
+    """Return the declared model with added effects, fitted on this grasper's calibration runs."""
+    model = declared(dof)
+    model = replace(model, terms=(*model.terms, *added))
+    return fit(model, Campaign.of(calibration_runs(dof, axes, seed)), bootstrap=0)
+
+
+def of_model(model: Model, arm_m: float) -> ToForce:
+    """Return the force by a model, causal as live, without the lag of its filter."""
+
+    def force_n(run: Recording) -> FloatArray:
+        late = predict(model, run, causal=True) / arm_m
+        angle = run[f"{model.balance}_angle_rad"]
+        return angle_led(late, angle, run.sample_rate_hz, model.low_pass)
+
+    return force_n
+
+
+def of_current(dof: str, method: CurrentForce) -> ToForce:
+    """Return the force by the paper's method."""
+    return lambda run: method.force_n(run[f"{dof}_current_a"], run.sample_rate_hz)
+
+
+def report_runs(dof: str, axes: Axes, seed: int) -> dict[str, list[Recording]]:
+    """Return the runs that are reported, by kind of input, at 2 kHz."""
+    return {
+        kind: [
+            record(
+                f"{kind}-{force_n:g}N",
+                dof,
+                axes,
+                _target(kind, axes[0], force_n),
+                seed + 10 * k + j,
+            )
+            for j, force_n in enumerate(LEVELS_N)
+        ]
+        for k, kind in enumerate(INPUTS)
+    }
+
+
+def slope(dof: str, axes: Axes, method: CurrentForce, seed: int) -> float:
+    """Return the slope of estimate over force at the ends of long steady grasps (Figure 11 b)."""
+    points = []
+    for k, force_n in enumerate(LEVELS_N):
+        run = record("long", dof, axes, _target("long", axes[0], force_n), seed + k)
+        kept = _between(run, *end_of_hold(LONG_S))
+        estimate = of_current(dof, method)(run)
+        force = run[f"{dof}_torque_n_m"] / axes[0].arm_m
+        points.append((float(force[kept].mean()), float(estimate[kept].mean())))
+    force, estimate = np.array(points).T
+    return float(np.polyfit(force, estimate, 1)[0])
+
+
+def outcome(
+    dof: str, tests: Mapping[str, Sequence[Recording]], estimate: ToForce, arm_m: float
+) -> Outcome:
+    """Return what a method gives on the runs that are reported."""
+    errors, delays = [], []
+    for kind, runs in tests.items():
+        of_kind = []
+        for run in runs:
+            force = run[f"{dof}_torque_n_m"] / arm_m
+            found = estimate(run)
+            if kind == "periodic":
+                error, delay = _at_peaks(found, force, run.sample_rate_hz)
+                delays.append(delay)
+            else:
+                kept = _between(run, *end_of_hold(LONG_S if kind == "long" else SHORT_S))
+                error = float(found[kept].mean() - force[kept].mean())
+            of_kind.append(error)
+        errors.append(float(np.mean(of_kind)))
+    return Outcome((errors[0], errors[1], errors[2]), float(np.mean(delays)))
+
+
+def _target(kind: str, axis: AxisParameters, force_n: float) -> FloatArray:
+    if kind == "periodic":
+        return periodic(axis, force_n)
+    return hold(axis, force_n, LONG_S if kind == "long" else SHORT_S)
+
+
+def _at_peaks(found: FloatArray, force: FloatArray, rate_hz: float) -> tuple[float, float]:
+    """Return the error at the peaks of the last four cycles, N, and the delay, ms."""
+    cycle = round(rate_hz / 2)
+    smooth = ndimage.uniform_filter1d(force, max(1, round(0.01 * rate_hz)))
+    parts = [slice(len(force) - (k + 1) * cycle, len(force) - k * cycle) for k in range(4)]
+    errors = [float(found[part].max() - smooth[part].max()) for part in parts]
+    last = slice(len(force) - 4 * cycle, len(force))
+    estimate, truth = found[last] - found[last].mean(), smooth[last] - smooth[last].mean()
+    step = max(1, round(0.001 * rate_hz))
+    shifts = np.arange(-80, 81) * step
+    match = [float(np.dot(np.roll(estimate, -shift), truth)) for shift in shifts]
+    return float(np.mean(errors)), float(shifts[int(np.argmax(match))] / rate_hz * 1e3)
+
+
+def _between(run: Recording, start_s: float, stop_s: float) -> FloatArray:
+    return np.asarray((run.time_s >= start_s) & (run.time_s < stop_s))
+
+
+def _averaged(run: Recording) -> Recording:
+    n = len(run) // EVERY * EVERY
+    return replace(
+        run,
+        time_s=run.time_s[:n].reshape(-1, EVERY).mean(axis=1),
+        columns={k: v[:n].reshape(-1, EVERY).mean(axis=1) for k, v in run.columns.items()},
+        flags=run.flags[:n:EVERY],
+    )

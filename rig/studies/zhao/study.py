@@ -1,0 +1,185 @@
+"""Zhao and Nelson 2016 on simulated graspers: their method, and ours, in their three experiments.
+
+The diagnosis looks at one grasper that is not reported; what it names is added on all the others.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from estimation.effects import effect
+from estimation.model import Estimate, Term
+from rig.grasper.current_force import CurrentForce
+from rig.grasper.plant import PROTOTYPES
+from rig.studies.seeds import kept_outcomes
+from rig.studies.zhao.methods import (
+    Lacking,
+    Outcome,
+    axes_of,
+    fitted,
+    lacking,
+    of_current,
+    of_model,
+    outcome,
+    report_runs,
+    slope,
+)
+from rig.studies.zhao.paper import DOFS
+
+SCHEMA = "rig.study.zhao/1"
+
+LOOKED_AT = 1000
+"""Seed of the grasper that the diagnosis looks at; it is not reported."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One degree of freedom of one grasper.
+
+    Attributes:
+        seed: Seed of its hidden parameters.
+        slope: Of the paper's estimate over force in long steady grasps; one over its coefficient.
+        paper: The paper's method.
+        ours: The declared model with the added effects.
+        undeclared: The declared model alone, fitted on the same runs.
+    """
+
+    seed: int
+    slope: float
+    paper: Outcome
+    ours: Outcome
+    undeclared: Outcome
+
+
+@dataclass(frozen=True)
+class Study:
+    """The whole study.
+
+    Attributes:
+        prototype: Name of the prototype.
+        spread: Spread of the hidden parameters.
+        cells: Degree of freedom to its cells, one a seed.
+        lacking: Degree of freedom to what the diagnosis found on the grasper it looked at, and what
+            was therefore added to ours.
+    """
+
+    prototype: str
+    spread: float
+    cells: Mapping[str, Sequence[Cell]]
+    lacking: Mapping[str, Lacking] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Grasper:
+    """All degrees of freedom of one grasper, in the order of `DOFS`."""
+
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What the diagnosis said of one degree of freedom, as it is kept."""
+
+    findings: tuple[tuple[str, str], ...]
+    terms: tuple[Mapping[str, Any], ...]
+
+
+def look(prototype: str, spread: float, number: int) -> Looked:
+    """Ask the diagnosis what a degree of freedom's model lacks, on the grasper for that."""
+    dof = DOFS[number]
+    axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread)
+    found = lacking(dof, axes, LOOKED_AT)
+    return Looked(found.findings, tuple(_plain(term) for term in found.terms))
+
+
+def one_grasper(
+    prototype: str, spread: float, added: Mapping[str, Sequence[Term]], seed: int
+) -> Grasper:
+    """Measure all degrees of freedom of one grasper."""
+    return Grasper(tuple(measure(prototype, dof, seed, spread, added[dof]) for dof in DOFS))
+
+
+def measure(prototype: str, dof: str, seed: int, spread: float, added: Sequence[Term]) -> Cell:
+    """Calibrate both methods on some runs of a grasper and report them on others."""
+    axes = axes_of(PROTOTYPES[prototype], dof, seed, spread)
+    arm_m = axes[0].arm_m
+    method = CurrentForce(arm_m)
+    steep = slope(dof, axes, method, seed * 1000 + 500)
+    tests = report_runs(dof, axes, seed * 1000 + 700)
+    ways = [
+        of_current(dof, replace(method, coefficient=1.0 / steep)),
+        of_model(fitted(dof, axes, seed, added), arm_m),
+        of_model(fitted(dof, axes, seed, ()), arm_m),
+    ]
+    return Cell(seed, steep, *(outcome(dof, tests, way, arm_m) for way in ways))
+
+
+def run_study(
+    prototype: str,
+    seeds: int,
+    spread: float,
+    state: Path,
+    *,
+    workers: int = 1,
+    on_step: Callable[[], None] = lambda: None,
+) -> Study:
+    """Run the three experiments on graspers of one make.
+
+    Args:
+        prototype: `third`, `journal` or `ball`.
+        seeds: Number of graspers, from seed 0.
+        spread: Spread of the hidden parameters from grasper to grasper.
+        state: Folder where each is kept as it is done.
+        workers: Processes at once.
+        on_step: Called after each of three diagnoses and each grasper.
+    """
+    name = f"{SCHEMA} {prototype} {spread:g}"
+    looked = kept_outcomes(
+        partial(look, prototype, spread), _looked, len(DOFS), state, f"{name} diagnosis",
+        workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    lacked = {
+        dof: Lacking(found.findings, tuple(_term(term) for term in found.terms))
+        for dof, found in zip(DOFS, looked, strict=True)
+    }
+    added = {dof: found.terms for dof, found in lacked.items()}
+    graspers = kept_outcomes(
+        partial(one_grasper, prototype, spread, added), _grasper, seeds, state, name,
+        workers=workers, on_seed=on_step,
+    )  # fmt: skip
+    cells = {dof: [g.cells[k] for g in graspers] for k, dof in enumerate(DOFS)}
+    return Study(PROTOTYPES[prototype].name, spread, cells, lacked)
+
+
+def _looked(held: Any) -> Looked:
+    findings = tuple((family, verdict) for family, verdict in held["findings"])
+    return Looked(findings, tuple(held["terms"]))
+
+
+def _grasper(held: Any) -> Grasper:
+    return Grasper(tuple(_cell(cell) for cell in held["cells"]))
+
+
+def _cell(held: Any) -> Cell:
+    methods = {
+        name: Outcome(tuple(held[name]["errors_n"]), held[name]["delay_ms"])
+        for name in ("paper", "ours", "undeclared")
+    }
+    return Cell(held["seed"], held["slope"], **methods)
+
+
+def _plain(term: Term) -> dict[str, Any]:
+    values = {name: estimate.value for name, estimate in term.values.items()}
+    return {
+        "id": term.effect.id,
+        "sign": term.sign,
+        "channels": dict(term.channels),
+        "values": values,
+    }
+
+
+def _term(told: Mapping[str, Any]) -> Term:
+    values = {name: Estimate(value) for name, value in told["values"].items()}
+    return Term(effect(told["id"]), told["sign"], told["channels"], values)
