@@ -74,6 +74,13 @@ def fading(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
     return ranges.table(clock, form.max() - form if random.random() < 0.6 else form)
 
 
+def fading_within(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+    """Draw a level that goes towards another one in each run."""
+    time = random.uniform(0.15, 0.8)
+    form = (1.0 - np.exp(-grid() / time)) * bend(random, 0.15)
+    return ranges.table("run_time", form.max() - form if random.random() < 0.5 else form)
+
+
 def stepping(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
     """Draw a level that comes at one moment of each run or of the campaign."""
     clock = "campaign_time" if random.random() < 0.4 else "run_time"
@@ -188,3 +195,11 @@ def _recipes() -> dict[str, Recipe]:
 
 
 FRICTIONS = _recipes()
+
+WITHIN: dict[str, Recipe] = {
+    f"friction.warmup {place} within": rubbing(
+        place, "friction.warmup", ("time", "velocity_sign"), fading_within
+    )
+    for place in WORDS
+}
+"""Frictions of which runs that all load alike show no more than that they go with time."""
