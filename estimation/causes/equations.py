@@ -18,8 +18,8 @@ from estimation.derived import (
     CAMPAIGN_TIME,
     GEAR_RATIO,
     GEARBOX,
-    origin_of,
     measured_channels,
+    origin_of,
     zero_phase_channels,
 )
 from estimation.effects import Proportional
@@ -39,8 +39,10 @@ SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
 
 ANGLES = ("_angle_rad", "_position_m")
-RATES = {"_angle_rad": ("_velocity_rad_s", "_acceleration_rad_s2"),
-         "_position_m": ("_velocity_m_s", "_acceleration_m_s2")}
+RATES = {
+    "_angle_rad": ("_velocity_rad_s", "_acceleration_rad_s2"),
+    "_position_m": ("_velocity_m_s", "_acceleration_m_s2"),
+}
 
 
 class LayoutError(EstimationError):
@@ -161,7 +163,9 @@ class Layout:
         return replace(self, runs=[run for run in self.runs if run.name in kept])
 
 
-def lay_out(models: Sequence[Model], recordings: Sequence[Recording], train: Sequence[str]) -> Layout:
+def lay_out(
+    models: Sequence[Model], recordings: Sequence[Recording], train: Sequence[str]
+) -> Layout:
     """Fit declared equations on the training runs and lay out every run.
 
     Args:

@@ -66,8 +66,9 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
     chosen += list(itertools.combinations(known, 2))
     if "velocity_sign" in known:
         rest = [v for v in known if v not in ("velocity_sign", "velocity", "time")]
-        chosen += [("velocity_sign", *pair) for pair in itertools.combinations(rest, 2)
-                   if "load" in pair]
+        chosen += [
+            ("velocity_sign", *pair) for pair in itertools.combinations(rest, 2) if "load" in pair
+        ]
     for variables in chosen:
         ranges = tuple(_variable_range(layout, place, v, width) for v in variables)
         yield Function(place, variables, ranges, width)

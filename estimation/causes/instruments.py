@@ -42,8 +42,18 @@ def _efforts(equation: Equation) -> list[str]:
 
 
 def _is_motion(channel: str) -> bool:
-    return channel.endswith((*ANGLES, "_velocity_rad_s", "_velocity_m_s", "_acceleration_rad_s2",
-                             "_acceleration_m_s2")) or "_rate_" in channel
+    return (
+        channel.endswith(
+            (
+                *ANGLES,
+                "_velocity_rad_s",
+                "_velocity_m_s",
+                "_acceleration_rad_s2",
+                "_acceleration_m_s2",
+            )
+        )
+        or "_rate_" in channel
+    )
 
 
 def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
@@ -55,9 +65,7 @@ def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
         elif channel == equation.target:
             run.channels[instrumented(channel, equation.name)] = equation.estimate(run.channels)
     if equation.of_angle and equation.target in layout.measured:
-        angle = equation.estimate(
-            run.channels | {c: known[c] for c in own if c in known}
-        )
+        angle = equation.estimate(run.channels | {c: known[c] for c in own if c in known})
         run.channels[instrumented(equation.target, equation.name)] = angle
         base = next((a for a in ANGLES if equation.target.endswith(a)), "")
         if base:

@@ -319,14 +319,14 @@ class Joint:
         made = object.__new__(Joint)
         made.__dict__.update(self.__dict__)
         k = next(iter(columns[0].values())).shape[1]
-        made._tables = []  # noqa: SLF001 - the same class
+        made._tables = []
         for i, table in enumerate(self._tables):
             grown = {}
             for p in self.parts:
                 added = columns[i].get(p, np.zeros((len(table[p]), k)))
                 grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
-            made._tables.append(grown)  # noqa: SLF001
-        made._gram = made._products()  # noqa: SLF001
+            made._tables.append(grown)
+        made._gram = made._products()
         return made
 
 

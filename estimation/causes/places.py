@@ -126,21 +126,26 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
     effort = _effort(equation)
     roles |= {"load": (effort,)}
     if equation.of_angle:
-        return Place(equation.name, "deflection", equation.name,
-                     (Entry(equation.name, 1.0),), roles)
+        return Place(
+            equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
+        )
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
-    return Place(equation.name, "loss", equation.name,
-                 (Entry(equation.name, float(sign)),), roles, sign)
+    return Place(
+        equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles, sign
+    )
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
     term = next(t for t in equation.terms if t.effect.id == "motor.torque_constant")
     current = term.channels["source"]
     roles = _shared(angles, _position(angles, angles[0])) | {
-        "current": (current,), "drive": (current,), "reading": (current,),
+        "current": (current,),
+        "drive": (current,),
+        "reading": (current,),
     }
-    return Place(f"actuator {current}", "actuator", equation.name,
-                 (Entry(equation.name, 1.0),), roles)
+    return Place(
+        f"actuator {current}", "actuator", equation.name, (Entry(equation.name, 1.0),), roles
+    )
 
 
 def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
@@ -171,17 +176,20 @@ def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None
     angle = channel.endswith(ANGLES)
     if not angle and not channel.endswith(("_n_m", "_n")):
         return None  # an error of the current's reading is a change of the actuator's gain
+
     def suits(entry: Entry) -> tuple[bool, bool, bool]:
         of_angle = layout.equations[entry.equation].of_angle
         return entry.order == 0, of_angle == angle, entry.gain > 0
 
     home = max(enters, key=suits).equation
-    others = tuple(
-        n for n in (*angles, *_currents(layout)) if n != channel
-    )
+    others = tuple(n for n in (*angles, *_currents(layout)) if n != channel)
     roles = {
-        "reading": (channel,), "creeping": (channel,), "encoder": (channel,),
-        "clock": ("time_s",), "elapsed": (CAMPAIGN_TIME,), "campaign_clock": (CAMPAIGN_TIME,),
+        "reading": (channel,),
+        "creeping": (channel,),
+        "encoder": (channel,),
+        "clock": ("time_s",),
+        "elapsed": (CAMPAIGN_TIME,),
+        "campaign_clock": (CAMPAIGN_TIME,),
         "other_reading": others,
     }
     kind: Kind = "angle sensor" if angle else "torque sensor"

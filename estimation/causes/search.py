@@ -178,8 +178,10 @@ def evaluate(
     out = []
     for width, group in by_width.items():
         size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
-        for part in itertools.batched(group, size) if hasattr(itertools, "batched") else (
-            group[k : k + size] for k in range(0, len(group), size)
+        for part in (
+            itertools.batched(group, size)
+            if hasattr(itertools, "batched")
+            else (group[k : k + size] for k in range(0, len(group), size))
         ):
             out += _evaluated(joint, list(part), folds, before, numbers)
     return out
@@ -336,6 +338,7 @@ def _laid(
     laid = joint.laid(columns, unit=isinstance(cause, Source))
     if acts is not None:  # what starts between runs also shifts their means, by its own offset
         laid = [
-            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()} for own in laid
+            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
+            for own in laid
         ]
     return Candidate(cause, laid, acts)

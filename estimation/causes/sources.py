@@ -18,13 +18,33 @@ from estimation.effects import Effect, Parameter, catalogue
 from estimation.model import BALANCES
 from estimation.recording import FloatArray
 
-DECLARED_ONLY = ("arm.", "compliance.", "motor.torque_constant", "sensor.offset", "transmission.ratio",
-                 "transmission.damping", "friction.coulomb", "friction.viscous")
+DECLARED_ONLY = (
+    "arm.",
+    "compliance.",
+    "motor.torque_constant",
+    "sensor.offset",
+    "transmission.ratio",
+    "transmission.damping",
+    "friction.coulomb",
+    "friction.viscous",
+)
 ACTUATOR = ("motor.", "ripple.current")
-DEFLECTION = ("transmission.", "hysteresis.bouc_wen.twist", "hysteresis.presliding",
-              "ripple.output", "eccentric.load")
-TORQUE_SENSOR = ("sensor.gain_nonlinear", "sensor.drift", "sensor.creep", "sensor.lag",
-                 "sensor.delay", "sensor.crosstalk", "change.step.offset")
+DEFLECTION = (
+    "transmission.",
+    "hysteresis.bouc_wen.twist",
+    "hysteresis.presliding",
+    "ripple.output",
+    "eccentric.load",
+)
+TORQUE_SENSOR = (
+    "sensor.gain_nonlinear",
+    "sensor.drift",
+    "sensor.creep",
+    "sensor.lag",
+    "sensor.delay",
+    "sensor.crosstalk",
+    "change.step.offset",
+)
 ANGLE_SENSOR = ("sensor.encoder_inl", "sensor.delay", "sensor.lag")
 
 LEAST_PERIODS = 1.5
@@ -115,8 +135,10 @@ def repeats_one_reference(layout: Layout) -> bool:
 
 
 def _acts(effect: Effect, place: Place) -> bool:
-    if effect.id.startswith(DECLARED_ONLY) and effect.family in ("friction.coulomb",
-                                                                "friction.viscous"):
+    if effect.id.startswith(DECLARED_ONLY) and effect.family in (
+        "friction.coulomb",
+        "friction.viscous",
+    ):
         return False
     if effect.id.startswith(tuple(d for d in DECLARED_ONLY if not d.startswith("friction."))):
         return False
@@ -137,9 +159,16 @@ def _acts(effect: Effect, place: Place) -> bool:
         case "angle sensor":
             return effect.id.startswith(ANGLE_SENSOR)
         case "loss":
-            return not effect.id.startswith((*ACTUATOR, "sensor.", "transmission.",
-                                             "hysteresis.bouc_wen.twist", "change.step.offset",
-                                             "inertia."))
+            return not effect.id.startswith(
+                (
+                    *ACTUATOR,
+                    "sensor.",
+                    "transmission.",
+                    "hysteresis.bouc_wen.twist",
+                    "change.step.offset",
+                    "inertia.",
+                )
+            )
 
 
 def _of_run_time(effect: Effect) -> bool:

@@ -17,7 +17,7 @@ from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.search import Candidate, Found, Scored, search
 from estimation.causes.sources import Source
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
-from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.diagnosis.split import Sealed
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
 
@@ -154,7 +154,8 @@ class _Test:
         if candidate.acts is None:
             return laid
         return [
-            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()} for own in laid
+            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
+            for own in laid
         ]
 
     def _state(self, candidate: Candidate) -> Mapping[str, bool | None]:
@@ -191,9 +192,7 @@ class _Test:
         """Return the score of one more cause on the test runs."""
         old, new = self.squared(before), self.squared([*before, cause])
         state = self._state(cause)
-        told = [
-            k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is not None
-        ]
+        told = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is not None]
         total = 0.0
         for p in self.joint.parts:
             if p[1] == "within" and told:
@@ -227,8 +226,13 @@ class _Test:
                 for s in (before, after)
             ]
             out[name] = Error(
-                pairs[0][0], pairs[1][0], pairs[0][1], pairs[1][1],
-                (float("nan"), float("nan")), by_run[0], by_run[1],
+                pairs[0][0],
+                pairs[1][0],
+                pairs[0][1],
+                pairs[1][1],
+                (float("nan"), float("nan")),
+                by_run[0],
+                by_run[1],
             )
         return out
 
@@ -278,9 +282,7 @@ def _finding(
     part = (home, "within")
     return Finding(
         balance=home,
-        also_in=tuple(
-            dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)
-        ),
+        also_in=tuple(dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)),
         family=lead.family if may_name else "unknown",
         verdict=verdict,
         alternatives=tuple(others),
