@@ -7,7 +7,7 @@ class DriverError(Exception):
     Attributes:
         what: What happened, in one sentence.
         why: The cause as far as it is known; may be empty.
-        fix: What to do or to type next; may be empty.
+        fix: Action or next command; may be empty.
     """
 
     def __init__(self, what: str, why: str = "", fix: str = "") -> None:
@@ -54,7 +54,7 @@ class UnknownSchemeError(LinkError):
 
 
 class ProtocolMismatchError(DriverError):
-    """The board's firmware and this program speak different protocols."""
+    """The board's firmware and this program have different protocols."""
 
 
 class CommandRefusedError(DriverError):
@@ -70,4 +70,4 @@ class CommandRefusedError(DriverError):
 
 
 class DisarmUnconfirmedError(DriverError):
-    """The board was told to disarm and has not said that it did: its state is unknown."""
+    """The board was commanded to disarm and has not confirmed it: its state is unknown."""

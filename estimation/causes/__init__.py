@@ -1,1 +1,1 @@
-"""Which physical cause explains what the declared equations do not: hypotheses and their probability."""
+"""Physical causes of what declared equations leave unexplained: hypotheses and probabilities."""

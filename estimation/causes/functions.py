@@ -20,7 +20,7 @@ PLAY = 0.06
 """Half width of the play operator that stands for history, share of the travel."""
 
 GROWTH_S, FADE_S = 0.1, 0.3
-"""Rest before motion enters by the logarithm of its time over the first, and fades by the second."""
+"""Dwell: the logarithm of the last rest over the first time, fading in motion by the second."""
 
 LOOSE_PLACES = ("loss", "deflection", "actuator")
 

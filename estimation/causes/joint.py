@@ -1,7 +1,7 @@
 """All equations as one regression, cross-validated over runs and over levels of the conditions.
 
-The declared parameters, an offset of each equation and the amplitudes of every cause are one vector.
-Each equation has two residuals: within runs, and of the runs' means. Everything that a score needs
+The declared parameters, an offset of each equation and the amplitudes of every cause are one
+vector. Each equation has two residuals: within runs, and of the runs' means. Everything that a score needs
 is in cross-products of one run, worked out once, so a fold costs one small solve.
 """
 
@@ -298,19 +298,27 @@ class Joint:
         after: Sequence[Mapping[Part, FloatArray]],
     ) -> FloatArray:
         """Return the log ratio of errors, summed over parts, shape (families, candidates)."""
-        numbers, rows = self.numbers, []
+        rows = []
         for old, new in zip(before, after, strict=True):
-            total: FloatArray = np.zeros(())
-            for p in self.parts:
-                samples, floor = self.samples[p].sum(), numbers.form_floor * self.error[p]
-                weight = 1.0
-                if p[1] == "between":
-                    weight = numbers.between_weight
-                    floor += numbers.between_floor * self.error[p[0], "within"]
-                first, second = old[p].sum(axis=0) / samples, new[p].sum(axis=0) / samples
-                total = total + weight * np.log((first + floor) / (second + floor))
-            rows.append(total)
+            means = [
+                {p: e[p].sum(axis=0) / self.samples[p].sum() for p in self.parts}
+                for e in (old, new)
+            ]
+            rows.append(self.log_ratio(means[0], means[1]))
         return np.array(rows)
+
+    def log_ratio(
+        self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
+    ) -> FloatArray:
+        """Return the log ratio of mean squared errors, summed over parts, above their floors."""
+        numbers, total = self.numbers, np.zeros(())
+        for p in self.parts:
+            floor, weight = numbers.form_floor * self.error[p], 1.0
+            if p[1] == "between":
+                weight = numbers.between_weight
+                floor += numbers.between_floor * self.error[p[0], "within"]
+            total = total + weight * np.log((before[p] + floor) / (after[p] + floor))
+        return np.asarray(total)
 
     # ---- accepted causes
 

@@ -178,12 +178,9 @@ def evaluate(
     out = []
     for width, group in by_width.items():
         size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
-        for part in (
-            itertools.batched(group, size)
-            if hasattr(itertools, "batched")
-            else (group[k : k + size] for k in range(0, len(group), size))
-        ):
-            out += _evaluated(joint, list(part), folds, before, numbers)
+        for start in range(0, len(group), size):
+            part = group[start : start + size]
+            out += _evaluated(joint, part, folds, before, numbers)
     return out
 
 

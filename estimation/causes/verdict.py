@@ -193,14 +193,16 @@ class _Test:
         old, new = self.squared(before), self.squared([*before, cause])
         state = self._state(cause)
         told = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is not None]
-        total = 0.0
-        for p in self.joint.parts:
-            if p[1] == "within" and told:
-                floor = self.numbers.form_floor * self.joint.error[p]
-                samples = self.joint.samples[p][self.at][told].sum()
-                first, second = old[p][told].sum() / samples, new[p][told].sum() / samples
-                total += float(np.log((first + floor) / (second + floor)))
-        return total
+        if not told:
+            return 0.0
+        rows = [
+            {
+                p: np.asarray(v[told].sum() / self.joint.samples[p][self.at][told].sum())
+                for p, v in e.items()
+            }
+            for e in (old, new)
+        ]
+        return float(self.joint.log_ratio(rows[0], rows[1]))
 
     def rmse(self, causes: Sequence[Candidate], equation: str) -> float:
         """Return the root mean square error within test runs of one equation."""
@@ -245,9 +247,10 @@ def _findings(found: Found, test: _Test, sealed: Sealed, numbers: Numbers) -> li
         evidence = float(np.exp(min(numbers.sharpness * gain, 300.0)))
         likely = family_probabilities(ranked, numbers)
         if evidence < KEPT:
+            cause = scored.candidate.cause
             test.notes.append(
-                f"{scored.candidate.cause.family} ({scored.candidate.cause.place.name}) was found in"
-                " the training runs and not confirmed on the test runs."
+                f"{cause.family} ({cause.place.name}) was found in the training runs and not"
+                " confirmed on the test runs."
             )
             continue
         findings.append(_finding(scored, likely, before, test, may_name=sealed.may_name))

@@ -30,7 +30,7 @@ BLOCK = 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a network is trained.
+    """Settings of the training.
 
     Attributes:
         nodes: Hidden nodes.
@@ -49,7 +49,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """How a training went.
+    """Result of a training.
 
     Attributes:
         network: The trained network.
@@ -71,7 +71,7 @@ class Training:
 
 
 def has_torch() -> bool:
-    """Say whether torch is installed."""
+    """Whether torch is installed."""
     from importlib.util import find_spec
 
     return find_spec("torch") is not None

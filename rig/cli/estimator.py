@@ -5,9 +5,15 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.help import GroupedHelp
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
-estimator_app = typer.Typer(help="Compare estimators.", no_args_is_help=True)
+estimator_app = typer.Typer(
+    help="Compare estimators.",
+    cls=GroupedHelp,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 
 
 @estimator_app.callback()
@@ -21,7 +27,7 @@ def compare(
     second: Annotated[Path, typer.Argument(help="Another one of the same channel.")],
     on: Annotated[Path, typer.Option("--on", help="Recordings: a file, folder or archive.")],
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,

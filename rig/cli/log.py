@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 log_app = typer.Typer(
     name="log",
-    help="Look into, check, repair and export logs.",
+    help="Inspect, check, repair and export logs.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -28,7 +28,7 @@ OneLog = Annotated[Path, typer.Argument(help="A log.")]
 
 @log_app.command()
 def info(path: LogOrFolder, json: JsonFlag = False) -> None:
-    """Say what is in a log: run, conditions, streams, rates, marks, attachments."""
+    """Show the content of a log: run, conditions, streams, rates, marks, attachments."""
     from rig.log.reader import read_log
 
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
@@ -74,7 +74,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 
 def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
-    """Return the runs of a campaign's protocol that have no log; none where it is no campaign."""
+    """Return the runs of a campaign's protocol that have no log; empty if it is not a campaign."""
     from rig.recording.campaign import MANIFEST, read_manifest
 
     if not (path / MANIFEST).is_file():
@@ -104,7 +104,7 @@ def repair(
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Write what is readable of a damaged log to a new file; the original stays as it is."""
+    """Write the readable part of a damaged log to a new file; the original is not changed."""
     from rig.log.repair import repair_log
 
     report = repair_log(path, out)
@@ -116,11 +116,15 @@ def repair(
 
 @log_app.command()
 def export(
-    path: OneLog,
-    format_name: Annotated[str, typer.Option("--format", help="csv, parquet or npz.")] = "csv",
+    path: Annotated[
+        Path, typer.Argument(help="A log; or a folder, for one table of all its runs.")
+    ],
+    format_name: Annotated[
+        str, typer.Option("--format", help="csv or parquet; of a single log npz, too.")
+    ] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File with --topic, else folder; beside the log by default.")
+        Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[
@@ -134,10 +138,20 @@ def export(
     store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Export a log, one file for each topic."""
+    """Export a log, one file for each topic; or a campaign as one table.
+
+    The table of a campaign (a folder or an archive of any format that is known) has a row a sample,
+    with its run and conditions. Parquet holds units, instrument, calibrations and notes as
+    metadata; beside a CSV they stand in NAME.csv.json.
+    """
     from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log
 
+    if path.is_dir() or not path.name.endswith((".mcap", ".part")):
+        if topic or calibration or record:
+            raise UsageError("--topic, --calibration and --record are of a single log.")
+        _export_campaign(path, format_name, out, force, json)
+        return
     known = [item.value for item in ExportFormat]
     if format_name not in known:
         raise UsageError(
@@ -155,12 +169,39 @@ def export(
             results(json).print(f"wrote {target}")
 
 
+def _export_campaign(
+    path: Path, format_name: str, out: Path | None, force: bool, json: bool
+) -> None:
+    """Write all runs at a path as one table."""
+    from rig.cli.left_out import say_left_out
+    from rig.errors import UsageError
+    from rig.importers.registry import open_campaign
+    from rig.importers.tidy import TidyFormat, write_tidy
+
+    known = [item.value for item in TidyFormat]
+    if format_name not in known:
+        raise UsageError(
+            f"A campaign is not exported as {format_name!r}.",
+            fix=f"Choose one of {', '.join(known)}.",
+        )
+    campaign = open_campaign(path)
+    say_left_out(path, campaign)
+    if out is not None and out.is_dir():
+        out = out / f"{path.resolve().name}.{format_name}"
+    target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
+    written = write_tidy(campaign, target, TidyFormat(format_name), force)
+    if json:
+        emit_json({"written": [written], "runs": campaign.evidence.names})
+    else:
+        results(json).print(f"wrote {written}: {len(campaign.evidence)} runs")
+
+
 def _other_calibrations(
     path: Path, calibration: str | None, records: list[str], store: Path | None
 ) -> "CalibrationSet | None":
     """Return the set an export is to be made with; None for the one it was recorded with.
 
-    A record whose range the log leaves is held to the rules: a remark, or an error.
+    If the log exceeds the range of a record, the rules apply: a remark, or an error.
     """
     if calibration is None and not records:
         return None
@@ -201,7 +242,7 @@ def _logs(path: Path) -> list[Path]:
 
 
 def _described(log: "LogFile") -> dict[str, Any]:
-    """Return what `info` tells about a log."""
+    """Return the result of `info` for a log."""
     from rig.log.check import stream_time_s
     from rig.log.convert import exclusion
 

@@ -1,4 +1,4 @@
-"""`rig record`: run a protocol and leave one log a run."""
+"""`rig record`: run a protocol and write one log per run."""
 
 from datetime import datetime
 from pathlib import Path
@@ -30,16 +30,17 @@ def record(
     sim: SimFlag = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
+        Path | None, typer.Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", "-m", help="Fitted model to watch: does it still fit?")
+        Path | None,
+        typer.Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
     ] = None,
-    notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
+    notes: Annotated[str, typer.Option(help="Operator's notes, stored in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
-    """Run a protocol on the rig and leave one log a run in logs/.
+    """Run a protocol on the rig and write one log per run to logs/.
 
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
@@ -47,7 +48,7 @@ def record(
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
+    from rig.errors import KNOWN_ERRORS, UsageError
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import (
@@ -94,6 +95,8 @@ def record(
             for result in record_campaign(session, todo, folder, notes=notes, on_progress=show):
                 done += result.expected
                 recorded.append(result)
+                if bar.disable:  # no terminal: a line a run in place of the bar
+                    screen.print(f"{len(recorded)}/{len(todo)} {result.name}")
                 if watch is not None and (news := watch.after(result.path)):
                     bar.console.print(news, style="yellow", markup=False)
                 if result.drifted or not result.complete:
@@ -101,6 +104,12 @@ def record(
                     bar.console.print(text, style="yellow", markup=False)
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
+        raise
+    except KNOWN_ERRORS:
+        screen.print(
+            f"{len(recorded)} of {len(todo)} runs are recorded. Go on, once it is put right, with: "
+            f"rig record --resume {folder}"
+        )
         raise
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     results(json).print(

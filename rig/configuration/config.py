@@ -54,7 +54,7 @@ class _Section(BaseModel):
 
 
 class LoggerSection(_Section):
-    """What moves the rig and samples it, and where it is found.
+    """The board or drive that moves and samples the rig, and its URL.
 
     Attributes:
         driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
@@ -64,7 +64,7 @@ class LoggerSection(_Section):
         options: The driver's own options.
         bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
             with from the factory if none.
-        profile: What the board samples and moves: the reference rig, or the 3-DOF grasper.
+        profile: Samples and motors of the board: the reference rig, or the 3-DOF grasper.
     """
 
     driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
@@ -75,11 +75,11 @@ class LoggerSection(_Section):
 
 
 class DeviceSection(_Section):
-    """A further device whose channels are recorded beside the logger's.
+    """A further device whose channels are recorded with the logger's.
 
     Attributes:
         driver: Name of its driver; `rig devices` lists them.
-        url: Where it is; `sim://` for its fake.
+        url: URL; `sim://` for its fake.
         options: The driver's own options.
         bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
             from the factory if none.
@@ -149,12 +149,12 @@ AnyLimits = Annotated[
 
 
 class SafetySection(_Section):
-    """What is watched besides the limits, by the board first and by this computer again; on always.
+    """Monitors in addition to the limits, on the board and again on this computer; always on.
 
     A time or a heat of 0 switches its watch off.
 
     Attributes:
-        safe_state: What the drive motor does once something tripped: `release`, no current; or
+        safe_state: State of the drive motor after a trip: `release`, no current; or
             `hold`, stay where it stands with a low command, where encoder and current are sound.
         hold_command_ratio: Largest command while holding, of full scale.
         continuous_current_a: Motor current that warms the motor no further.
@@ -218,10 +218,10 @@ class MasterSection(_Section):
     """The master a grasper follows: potentiometers of yaw, pitch and grasp.
 
     Attributes:
-        url: Where it is, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
+        url: URL, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
         zero_counts: Counts of the converter at each joint's zero.
         rad_per_count: Turn of each joint for a count, negative where it is mounted the other way
-            round; a potentiometer of 300 degrees over 12 bits if not said.
+            round; by default a potentiometer of 300 degrees over 12 bits.
     """
 
     url: str | None = None
@@ -235,8 +235,8 @@ class SimulationSection(_Section):
     Attributes:
         seed: Seed of noise, offsets and drift.
         spread: Relative spread of the plant's parameters drawn by the seed.
-        hidden: Hidden effect to strength; effects that no declared model is told of.
-        draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
+        hidden: Hidden effect to strength; effects that no declared model contains.
+        draw_hidden: Seed that draws one more hidden effect without showing its name.
         firmware: Put the compiled firmware core in the loop where it is built.
         plant: `measured`, with losses that no declared model holds, or `declared`, without them.
         grasper: Prototype of the simulated grasper, where the profile is the grasper's.
@@ -259,7 +259,7 @@ class Config(_Section):
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.
         devices: Further devices by the name their recorded channels go under.
-        serials: Serial numbers of the devices on the rig, held against those of the records.
+        serials: Serial numbers of the devices on the rig, compared with those of the records.
     """
 
     name: str
@@ -329,7 +329,7 @@ class Config(_Section):
     def default_store(self) -> CalibrationStore:
         """The store where neither the configuration nor a command names one.
 
-        What comes from a simulated rig is kept beside the real calibrations, not among them.
+        Calibrations of a simulated rig are stored separately from the real ones.
         """
         folder = default_folder()
         if self.is_simulated:
@@ -356,7 +356,7 @@ class Config(_Section):
         return {name: limit for name, limit in self.drift if limit is not None}
 
     def calibration_verdicts(self) -> list[Verdict]:
-        """Return what speaks against the store's active lines now; empty without a store."""
+        """Return the objections to the store's active lines now; empty without a store."""
         if self.store is None:
             return []
         lines = active_lines(self.store, self.instrument.serial).values()
@@ -371,7 +371,7 @@ class Config(_Section):
         return Config.model_validate(whole)
 
     def logged(self) -> dict[str, Any]:
-        """Return what a log holds of it: all but what is hidden, which a diagnosis is to find."""
+        """Return the part for a log: all but the hidden effects, which a diagnosis must find."""
         whole = self.model_dump()
         for secret in ("hidden", "draw_hidden"):
             del whole["simulation"][secret]
@@ -379,7 +379,7 @@ class Config(_Section):
 
 
 def is_simulated(url: str) -> bool:
-    """Say whether a URL names a fake."""
+    """Whether a URL names a fake."""
     return url.startswith("sim:")
 
 

@@ -2,10 +2,10 @@
 
 Each effect is a compiled function (`hidden_drive`, `hidden_cable`, `hidden_sensors`) of the plant's
 own quantities and one row of a table, kept here: a strength and up to two numbers that shape it.
-Strength 0 leaves the plant exactly as it is, bit for bit: the effect is not evaluated. Strength 1
-is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are a
-quarter to three quarters of the variance that a linear balance leaves in motor current; effects of
-cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
+Strength 0 does not change the plant at all: the effect is not evaluated. Strength 1
+is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are
+a quarter to three quarters of the residual variance of a linear equation of motor current; effects
+of cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
 
 The forms are these modules' own and are deliberately not those an estimator would try first
 (rational functions in place of exponentials, side bands, contact damping), so that finding an
@@ -57,7 +57,7 @@ class Kind:
 
     Attributes:
         name: Name in the configuration.
-        description: What it is and what shapes it.
+        description: Description and shape parameters.
         shapes: Up to two numbers of its row.
         weakest: Smallest strength `draw` gives.
         strongest: Largest strength `draw` gives.
@@ -78,7 +78,7 @@ _PHASE = Shape("phase_rad", 0.0, 2.0 * math.pi)
 KINDS: tuple[Kind, ...] = (
     Kind(
         "motor_ripple",
-        "torque ripple of the motor, k periods a turn, amplitude modulated once a turn",
+        "torque ripple of the motor, k periods per turn, amplitude modulated once per turn",
         (Shape("periods_per_turn", 2.0, 6.0, whole=True), _PHASE),
     ),
     Kind(
@@ -98,7 +98,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "gear_eccentricity",
-        "wave in the gear's position along the spindle angle, with a second harmonic",
+        "periodic error of the gear's position along the spindle angle, with a second harmonic",
         (Shape("periods_per_turn", 12.0, 20.0, whole=True), _PHASE),
     ),
     Kind(
@@ -199,7 +199,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "spindle_ripple",
-        "torque ripple along the spindle angle, k periods a turn, with a second harmonic",
+        "torque ripple along the spindle angle, k periods per turn, with a second harmonic",
         (Shape("periods_per_turn", 12.0, 30.0), _PHASE),
     ),
     Kind(
@@ -291,7 +291,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "wrist_capstan",
-        "cable that the bent wrist wraps on its guide",
+        "cable wrapped over its guide by the wrist's angle",
         (Shape("friction", 0.7, 1.0),),
         alone=False,
     ),
@@ -410,7 +410,7 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
     for effect in effects:
         if effect.name not in NAMES:
             raise UnknownHiddenEffectError(
-                f"There is no hidden effect {effect.name!r}.", f"Known: {', '.join(NAMES)}."
+                f"Unknown hidden effect {effect.name!r}.", f"Known: {', '.join(NAMES)}."
             )
         place = NAMES.index(effect.name)
         shapes = KINDS[place].shapes
@@ -432,7 +432,7 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
 
 
 def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
-    """Return what a person asked to hide: effect to strength.
+    """Return the hidden effects requested by the user: effect to strength.
 
     Args:
         words: `effect` or `effect=strength`; `none` alone for nothing; one drawn by seed when there
@@ -440,7 +440,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
         seed: Seed of the draw.
 
     Raises:
-        UnknownHiddenEffectError: A name is unknown or a strength is no number.
+        UnknownHiddenEffectError: A name is unknown or a strength is not a number.
     """
     if not words:
         drawn = draw(seed)
@@ -454,7 +454,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
             found[name] = float(strength or 1.0)
         except ValueError as error:
             raise UnknownHiddenEffectError(
-                f"{strength!r} is no strength.", "Write for example motor_ripple=0.5."
+                f"{strength!r} is not a strength.", "Write for example motor_ripple=0.5."
             ) from error
     table(HiddenEffect(name, strength) for name, strength in found.items())
     return found

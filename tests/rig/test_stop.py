@@ -27,7 +27,7 @@ from drivers.transport import open_transport
 from rig.configuration.config import load_config
 from rig.bench.session import Session
 
-config = load_config(Path(sys.argv[1]))
+config = load_config(Path(sys.argv[1])).changed(safety={"watchdog_s": 1.0})
 with Session(config, open_transport(config.logger.url)) as session:
     for reading in session.play(np.full(600000, -1.04), np.full(600000, 0.1)):
         if reading.setpoint.max() > 0:
@@ -77,7 +77,8 @@ def started(script: str, config: Path) -> subprocess.Popen[str]:
 
 def stopped(config: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:
     code = main(["stop", "-c", str(config), "--json"])
-    return code, json.loads(capsys.readouterr().out)
+    (rig,) = json.loads(capsys.readouterr().out)["rigs"]
+    return code, rig
 
 
 def is_armed(config: Path) -> bool:
@@ -94,7 +95,7 @@ def test_a_session_that_has_the_rig_is_asked_to_end(
         code, told = stopped(board, capsys)
         session.communicate()
     assert (code, told["state"]) == (0, "disarmed")
-    assert told["holder"] == {"pid": session.pid, "was_killed": False}
+    assert told["rigs"][0]["holder"] == {"pid": session.pid, "was_killed": False}
     assert session.returncode != -signal.SIGKILL
     assert not is_armed(board)
 
@@ -108,7 +109,7 @@ def test_a_session_that_hangs_is_killed(
         code, told = stopped(board, capsys)
         session.communicate()
     assert (code, told["state"]) == (0, "disarmed")
-    assert told["holder"] == {"pid": session.pid, "was_killed": True}
+    assert told["rigs"][0]["holder"] == {"pid": session.pid, "was_killed": True}
     assert session.returncode == -signal.SIGKILL
     assert not is_armed(board)
 
@@ -122,9 +123,9 @@ def test_a_program_of_another_maker_is_named_and_left_alone(
         assert other.poll() is None
         other.communicate("")
     assert f"PID {other.pid}" in told
-    assert "Cut the motor supply" in told
+    assert "cut their supply" in told
     code, result = stopped(board, capsys)
-    assert (code, result["state"], result["holder"]) == (0, "disarmed", None)
+    assert (code, result["state"], result["rigs"][0]["holder"]) == (0, "disarmed", None)
 
 
 def test_a_rig_is_held_once_under_any_of_its_names(tmp_path: Path) -> None:

@@ -32,6 +32,9 @@ INADEQUATE = 0.08
 LATE = 0.02
 """Most that lags and skewed clocks may add to a clean residual's power, as a share of it."""
 
+MOST_TOGETHER = 5
+"""Most families that a confounded case may leave open: more is a protocol that shows nothing."""
+
 INCOMPLETE = 1.15
 """Most that the true structure may leave, over what is left without effects: else the effects make
 the rig move as no equation of its parts follows, for example in a limit cycle."""
@@ -184,7 +187,7 @@ def _truth(
     together: tuple[str, ...] = ()
     if kind == "confounded":
         together = _together(stage, switched, columns, clean)
-        if len(together) < 2:
+        if not 2 <= len(together) <= MOST_TOGETHER:
             return None
     return Truth(
         tuple(found),

@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize
 
 from estimation.candidates import candidates
 from estimation.derived import CABLE_ANGLE, CABLE_LOAD, GEARBOX, MOTOR_LOAD, zero_phase_channels
@@ -25,15 +26,16 @@ POINTS = 25
 ODDS = 6.0
 """Twice the logarithm of likelihoods that noise leaves open: odds of twenty to one."""
 
-FORM = 0.02
-"""Share of an effect's power that counts as its form, not as another cause."""
+FORM = 0.1
+"""Share of an effect's power that counts as its form, not as another cause: truths are bent, and
+the catalogue's form of the true family may leave as much."""
 
 STRIDE = 4
 """One in so many samples of 1 kHz is walked over by a family with memory."""
 
-BENT = 0.1
-"""Share of an effect's power up to which a family need be no better than the effect's own: the
-truth is bent, and no form of the catalogue is quite its own."""
+FREE = 0.5
+"""Share of itself by which a declared gain may change beside a family: one that takes the whole
+torque from another column is no explanation of this machine."""
 
 LONGEST_LAG = 60
 
@@ -69,13 +71,13 @@ def reproducing(
         base = np.concatenate(
             [residual.centred(_base(run, equation, clean[equation])) for run in runs]
         )
-        beyond = _left(base, whole)
+        gains = clean[equation].weights
+        beyond = _left(base, whole, gains)
         seen = ODDS * noise / count
         if beyond < 4.0 * seen:
             continue  # this equation does not show it
-        lefts = _lefts(recordings, twin, equation, places, base, whole)
-        own = min((lefts[f] for f in known if f in lefts), default=0.0)
-        enough = seen + FORM * beyond + min(own, BENT * beyond)
+        lefts = _lefts(recordings, twin, equation, places, (base, whole, gains))
+        enough = seen + FORM * beyond
         fitting = {family for family, left in lefts.items() if left <= enough}
         good = fitting if good is None else good & fitting
     return tuple(sorted((good or set()) | set(known[:1])))
@@ -101,13 +103,29 @@ def _base(run: Prepared, equation: str, fitted: Fitted) -> FloatArray:
     return np.hstack([middle, (wide - middle)[:, [sign]]])
 
 
-def _left(table: FloatArray, whole: FloatArray) -> float:
-    """Return the mean square that a least-squares fit leaves."""
+def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
+    """Return the mean square that a least-squares fit leaves, declared gains near their own.
+
+    Args:
+        table: Declared columns, the derivative by a width if there is one, a family's columns.
+        whole: What is fitted.
+        gains: Of the declared columns; each may change by `FREE` of itself.
+    """
     scale = np.sqrt(np.mean(table**2, axis=0)) + np.finfo(float).tiny
-    gram = (table / scale).T @ (table / scale) / len(whole)
-    right = (table / scale).T @ whole / len(whole)
-    weights = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
-    return float(max(np.mean(whole**2) - weights @ right, 0.0))
+    scaled = table / scale
+    gram = scaled.T @ scaled / len(whole)
+    right = scaled.T @ whole / len(whole)
+    most = np.full(len(scale), np.inf)
+    most[: len(gains)] = FREE * np.abs(gains) * scale[: len(gains)]
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-10 * values[-1]
+    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+    rotated = (vectors[:, kept].T @ right) / np.sqrt(values[kept])
+    weights = np.linalg.lstsq(root, rotated)[0]
+    if np.any(np.abs(weights) > most):
+        weights = optimize.lsq_linear(root, rotated, (-most - 1e-300, most + 1e-300)).x
+    left = np.mean(whole**2) - 2.0 * weights @ right + weights @ gram @ weights
+    return float(max(left, 0.0))
 
 
 def _lefts(
@@ -115,10 +133,10 @@ def _lefts(
     runs: Sequence[Prepared],
     equation: str,
     places: Sequence[NDArray[np.intp]],
-    base: FloatArray,
-    whole: FloatArray,
+    fitted: tuple[FloatArray, FloatArray, FloatArray],
 ) -> dict[str, float]:
     """Return family to the least that its columns leave beside the declared ones."""
+    base, whole, gains = fitted
     model = residual.declared(equation)
     declared_ids = {term.effect.id for term in model.terms}
     terms = [
@@ -135,7 +153,7 @@ def _lefts(
                 residual.centred(_columns(term, shape, channels, at))
                 for channels, at in zip(whole_runs, places, strict=True)
             ]
-            left = _left(np.hstack([base, np.concatenate(tables)]), whole)
+            left = _left(np.hstack([base, np.concatenate(tables)]), whole, gains)
             family = term.effect.family
             found[family] = min(found.get(family, np.inf), left)
     return found
