@@ -128,7 +128,8 @@ def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> Floa
         return (whole - _play(whole, half))[run.grid]
     if variable == "dwell":
         usual = float(np.percentile(np.abs(whole), 95))
-        return _rested(np.abs(whole) < max(width, 0.05 * usual), 1.0 / run.rate_hz)[run.grid]
+        resting = (np.abs(whole) < max(width, 0.05 * usual)).astype(np.float64)
+        return np.asarray(_rested(resting, 1.0 / run.rate_hz)[run.grid])
     return run.on_grid(name)
 
 

@@ -1,8 +1,8 @@
 """Torques and currents predicted from sensors that an equation does not read.
 
 A candidate that reads a sensor of its own equation can explain that sensor's noise. Each effort
-that an equation reads (a torque, a force, a current) is therefore replaced by its prediction through the
-other declared equations: instrumental variables. Angles are measured far better than they matter.
+that an equation reads (a torque, a force, a current) is therefore replaced by its prediction
+through the other declared equations: an instrumental variable. Angles are used as measured.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 """All equations as one regression, cross-validated over runs and over levels of the conditions.
 
 The declared parameters, an offset of each equation and the amplitudes of every cause are one
-vector. Each equation has two residuals: within runs, and of the runs' means. Everything that a score needs
-is in cross-products of one run, worked out once, so a fold costs one small solve.
+vector. Each equation has two residuals: within runs, and of the runs' means. Everything that a
+score needs is in cross-products of one run, worked out once, so a fold costs one small solve.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
@@ -19,8 +20,6 @@ Part = tuple[str, str]
 """An equation and `within` runs or `between` them."""
 
 Columns = Mapping[Part, FloatArray]
-Folds = Sequence[Sequence[Sequence[int]]]
-"""Families of folds; a fold is the runs that are left out together."""
 
 TINY = 1e-300
 
@@ -90,7 +89,7 @@ class Joint:
     @property
     def size(self) -> int:
         """Parameters of the base."""
-        return self._tables[0][self.parts[0]].shape[1] - 1
+        return int(self._tables[0][self.parts[0]].shape[1]) - 1
 
     # ---- laying out
 
@@ -279,9 +278,9 @@ class Joint:
             error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
         return np.asarray(np.maximum(error, 0.0))
 
-    def base_errors(self, folds: Folds) -> list[Mapping[Part, FloatArray]]:
+    def base_errors(self, folds: Folds) -> Sequence[Mapping[Part, FloatArray]]:
         """Return the squared errors of the base on what was left out, one mapping a family."""
-        out = []
+        out: list[Mapping[Part, FloatArray]] = []
         for family in folds:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for left_out in family:
@@ -336,54 +335,6 @@ class Joint:
             made._tables.append(grown)
         made._gram = made._products()
         return made
-
-
-def folds_of(layout: Layout) -> list[list[list[int]]]:
-    """Return families of folds: each run, and each level of every condition.
-
-    The levels of the loads and of the speed come from the data; further numeric conditions that
-    take a few values come from the recordings.
-    """
-    runs = layout.runs
-    families = [[[k] for k in range(len(runs))]]
-    found = [_levels(values) for values in _conditions(layout)]
-    unique: list[list[list[int]]] = []
-    for levels in found:
-        if levels and levels not in unique:
-            unique.append(levels)
-    return families + unique
-
-
-def _conditions(layout: Layout) -> list[list[float]]:
-    out = []
-    for equation in layout.equations.values():
-        if equation.of_angle:
-            continue
-        for name in (*equation.channels, equation.target):
-            if name.endswith(("_n_m", "_n")):
-                out.append([float(r.on_grid(name).mean()) for r in layout.runs])
-                break
-    speeds = [e.speed for e in layout.equations.values() if e.speed]
-    if speeds:
-        out.append([float(np.percentile(np.abs(r.on_grid(speeds[0])), 95)) for r in layout.runs])
-    return out
-
-
-def _levels(values: Sequence[float], count: int = 3) -> list[list[int]]:
-    """Return runs by the level of a condition; empty where it does not vary."""
-    array = np.asarray(values)
-    spread = float(np.ptp(array))
-    if len(array) < 2 * count or spread <= 0.1 * float(np.abs(array).mean()):
-        return []
-    order = np.argsort(array, kind="stable")
-    gaps = np.sort(np.argsort(-np.diff(array[order]), kind="stable")[: count - 1]) + 1
-    if array[order][gaps].size and np.diff(array[order])[gaps - 1].min() > 0.15 * spread:
-        groups = np.split(order, gaps)  # levels that were set
-    else:
-        groups = np.array_split(order, count)
-    if max(map(len, groups)) > 0.6 * len(array):
-        groups = np.array_split(order, count)
-    return [sorted(int(i) for i in g) for g in groups]
 
 
 def _first(run: RunSignals) -> Mapping[str, FloatArray]:

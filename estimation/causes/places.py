@@ -1,8 +1,8 @@
 """Where a cause can act, and how it then enters every equation.
 
 A place's signature follows from the declared equations: the sensitivity of each equation to an
-error of one reading, or to a torque at one shaft. A sensor's error enters every equation that reads the
-sensor; a torque beyond a compliance bends it as well.
+error of one reading, or to a torque at one shaft. A sensor's error enters every equation that reads
+the sensor; a torque beyond a compliance bends it as well.
 """
 
 from collections.abc import Mapping, Sequence

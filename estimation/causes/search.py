@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.causes.equations import Layout
+from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function, functions_at
-from estimation.causes.joint import Columns, Folds, Joint, folds_of
+from estimation.causes.joint import Columns, Joint
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.places import places_of
 from estimation.causes.sources import RELATIVE, Source, sources_at
@@ -217,7 +218,7 @@ def _precision(joint: Joint, candidate: Candidate, numbers: Numbers) -> FloatArr
         return everything
     enters = candidate.cause.place.enters
     knot = np.mean([e.gain**2 / joint.error[e.equation, "within"] for e in enters])
-    return everything + knot / numbers.knot_sd**2
+    return np.asarray(everything + knot / numbers.knot_sd**2)
 
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
