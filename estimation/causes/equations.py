@@ -6,7 +6,7 @@ grid that all equations of a run share.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -151,11 +151,13 @@ class Layout:
         equations: Name to equation.
         runs: The runs, in the order they were recorded.
         measured: Channels that every run has.
+        independent: Pairs of an effort and an equation that has it from other sensors than its own.
     """
 
     equations: Mapping[str, Equation]
     runs: Sequence[RunSignals]
     measured: tuple[str, ...]
+    independent: set[tuple[str, str]] = field(default_factory=set)
 
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""

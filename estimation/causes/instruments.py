@@ -62,6 +62,7 @@ def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
     for channel in own:
         if channel in known:
             run.channels[instrumented(channel, equation.name)] = known[channel]
+            layout.independent.add((channel, equation.name))
         elif channel == equation.target:
             run.channels[instrumented(channel, equation.name)] = equation.estimate(run.channels)
     if equation.of_angle and equation.target in layout.measured:

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
-from estimation.derived import CAMPAIGN_TIME
+from estimation.derived import CAMPAIGN_TIME, measured_channels
 
 Kind = Literal["loss", "actuator", "deflection", "torque sensor", "angle sensor"]
 
@@ -69,9 +69,13 @@ def direction_width(layout: Layout, place: Place) -> float:
 
 
 def _angles(layout: Layout) -> list[str]:
-    """Return the measured angles, the one with the largest travel first."""
-    names = [n for n in layout.measured if n.endswith(ANGLES) and not n.startswith("target_")]
-    return sorted(names, key=lambda n: -max(np.ptp(r.channels[n]) for r in layout.runs))
+    """Return the angles that the equations read, the one with the largest travel first.
+
+    No other channel is ever read: one that was recorded beside them may be a copy of a target.
+    """
+    read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
+    names = [n for n in measured_channels(read) if n.endswith(ANGLES) and n in layout.measured]
+    return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
 
 
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:
@@ -91,7 +95,9 @@ def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str,
         "elapsed": (CAMPAIGN_TIME,),
         "campaign_clock": (CAMPAIGN_TIME,),
         "motor_angle": tuple(layout_angles[:1]),
-        **dict.fromkeys(("position", "output_angle", "stop", "tilt"), (position,)),
+        **dict.fromkeys(("position", "stop", "tilt"), (position,)),
+        # a harmonic of the only shaft there is has one name
+        "output_angle": (position,) if len(layout_angles) > 1 else (),
     }
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
@@ -46,6 +46,15 @@ TORQUE_SENSOR = (
     "change.step.offset",
 )
 ANGLE_SENSOR = ("sensor.encoder_inl", "sensor.delay", "sensor.lag")
+
+FILTERS = (
+    "sensor.delay",
+    "sensor.lag",
+    "sensor.creep",
+    "motor.electrical",
+    "transmission.relaxation",
+)
+"""Effects that pass a reading through a linear filter, as smoothing its noise does."""
 
 LEAST_PERIODS = 1.5
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
@@ -116,9 +125,22 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
+            if effect.id.startswith(FILTERS) and _reads_own_noise(layout, place, channels):
+                continue
             for shape in _grid(layout, place, effect, dict(channels)):
                 for parts in _parts(effect):
                     yield Source(place, effect, tuple(channels), shape, parts)
+
+
+def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
+    """Whether an effort is read that some equation has from its own sensors alone.
+
+    A filter of such a reading explains that sensor's noise: a second sensor is needed to tell.
+    """
+    efforts = [c for _, c in channels if c in layout.measured and not c.endswith(ANGLES)]
+    return any(
+        (c, entry.equation) not in layout.independent for c in efforts for entry in place.enters
+    )
 
 
 def repeats_one_reference(layout: Layout) -> bool:
