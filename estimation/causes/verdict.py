@@ -27,9 +27,6 @@ SURE = 0.9
 IN_SET = 0.95
 """Probability that a set covers."""
 
-KEPT = 20.0
-"""E-value from which a cause counts as confirmed on the test runs."""
-
 VARIABLE_OF_ROLE: Mapping[str, str] = {
     "speed": "velocity",
     "acceleration": "acceleration",
@@ -246,7 +243,7 @@ def _findings(found: Found, test: _Test, sealed: Sealed, numbers: Numbers) -> li
         gain = test.gain(before, scored.candidate)
         evidence = float(np.exp(min(numbers.sharpness * gain, 300.0)))
         likely = family_probabilities(ranked, numbers)
-        if evidence < KEPT:
+        if evidence < numbers.kept_evidence:
             cause = scored.candidate.cause
             test.notes.append(
                 f"{cause.family} ({cause.place.name}) was found in the training runs and not"
