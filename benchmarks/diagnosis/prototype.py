@@ -1,4 +1,4 @@
-"""The joint decision core behind the command line of `rig diagnose`, to be measured beside it.
+"""The joint decision core behind the command line of `rig diagnose`, to be measured like it.
 
 `python -m benchmarks.diagnosis measure --prototype ...` asks this module. It goes when the core
 replaces the search behind `rig diagnose`.

@@ -1,1 +1,1 @@
-"""Physical causes of what declared equations leave unexplained: hypotheses and probabilities."""
+"""Physical causes of the residual of declared equations: hypotheses and their probabilities."""

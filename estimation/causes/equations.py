@@ -176,7 +176,7 @@ def lay_out(
         train: Names of the runs that may be fitted on.
 
     Raises:
-        LayoutError: A run leaves nothing to regress on.
+        LayoutError: A run has no sample to regress on.
         FitError: An equation cannot be identified.
     """
     timed = _on_one_clock(recordings)

@@ -224,7 +224,7 @@ class Joint:
         folds: Folds,
         precision: FloatArray,
     ) -> Outcome:
-        """Fit every candidate beside the base and return its errors on what was left out.
+        """Fit every candidate together with the base and return its errors on what was left out.
 
         Args:
             block: The candidates.

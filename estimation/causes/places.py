@@ -71,7 +71,7 @@ def direction_width(layout: Layout, place: Place) -> float:
 def _angles(layout: Layout) -> list[str]:
     """Return the angles that the equations read, the one with the largest travel first.
 
-    No other channel is ever read: one that was recorded beside them may be a copy of a target.
+    No other channel is ever read: another recorded channel may be a copy of a target.
     """
     read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
     names = [n for n in measured_channels(read) if n.endswith(ANGLES) and n in layout.measured]

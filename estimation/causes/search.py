@@ -62,7 +62,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate with its score beside a base.
+    """A candidate with its score given a base.
 
     Attributes:
         candidate: The candidate.
@@ -153,7 +153,7 @@ def candidates(train: Layout, joint: Joint) -> list[Candidate]:
 
 
 def _form(candidate: Candidate) -> tuple[str, str]:
-    """Return what shares one prior probability: a form of an effect, or all smooth functions."""
+    """Return the key of one prior probability: a form of an effect, or all smooth functions."""
     cause = candidate.cause
     return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id
 
@@ -171,7 +171,7 @@ def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
 def evaluate(
     joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
-    """Return the score of each candidate beside the base; those of a wrong sign are left out."""
+    """Return the score of each candidate given the base; those of a wrong sign are left out."""
     before = joint.base_errors(folds)
     by_width: dict[int, list[Candidate]] = {}
     for candidate in pool:

@@ -1,7 +1,7 @@
 """Candidate causes: an effect of the catalogue at a place, at the points of a grid of its shapes.
 
 Grids follow the data: a speed is searched over the speeds there are, a travel over the travel. An
-effect that cannot be told from a simpler one over that range is no point of the grid.
+effect that is not distinguishable from a simpler one over that range is left out.
 """
 
 import itertools
@@ -135,7 +135,7 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
 def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
     """Whether an effort is read that some equation has from its own sensors alone.
 
-    A filter of such a reading explains that sensor's noise: a second sensor is needed to tell.
+    A filter of such a reading explains that sensor's noise: a second sensor is needed.
     """
     efforts = [c for _, c in channels if c in layout.measured and not c.endswith(ANGLES)]
     return any(

@@ -156,7 +156,7 @@ class _Test:
         ]
 
     def _state(self, candidate: Candidate) -> Mapping[str, bool | None]:
-        """Return whether a cause acts in each run; None where the training runs leave it open.
+        """Return whether a cause acts in each run; None where the training runs do not decide.
 
         A test run between a run in which the cause acts and one in which it does not is open.
         """
