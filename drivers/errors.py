@@ -71,3 +71,15 @@ class CommandRefusedError(DriverError):
 
 class DisarmUnconfirmedError(DriverError):
     """The board was told to disarm and has not said that it did: its state is unknown."""
+
+
+class MissingExtraError(LinkError):
+    """A library that this room needs here is not installed.
+
+    Attributes:
+        extra: The project's extra that holds it, a key of `optional-dependencies`.
+    """
+
+    def __init__(self, what: str, why: str, extra: str) -> None:
+        self.extra = extra
+        super().__init__(what, why, f"Install the project's extra {extra!r}.")

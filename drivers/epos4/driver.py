@@ -21,6 +21,7 @@ from drivers.errors import (
     FrameError,
     LinkError,
     LinkTimeoutError,
+    MissingExtraError,
     ProtocolMismatchError,
 )
 from drivers.polling import PollSchedule
@@ -530,13 +531,13 @@ def _link(bus: CanBus, node_id: int) -> "CanopenLink":
     """Return the link; the `canopen` library is an extra, loaded only here.
 
     Raises:
-        LinkError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         from drivers.epos4.canopen_link import CanopenLink
     except ModuleNotFoundError as error:
-        raise LinkError(
-            "An EPOS4 needs the canopen library.", f"{error}.", "Run: pip install 'rig[can]'."
+        raise MissingExtraError(
+            "An EPOS4 needs the canopen library.", f"{error}.", "can"
         ) from error
     return CanopenLink(bus, node_id)
 

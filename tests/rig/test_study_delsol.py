@@ -10,7 +10,7 @@ from rig.cli.study import study_app
 from rig.studies.delsol import study as delsol
 from rig.studies.delsol.diagnosis import PULLS
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):

@@ -16,7 +16,7 @@ from rig.arm.simulated import draw_arm
 from rig.cli.main import main
 from rig.cli.study import study_app
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 @pytest.mark.measured
