@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo test lint site bench blind soak fuzz figures firmware firmware-arm clean
+.PHONY: setup demo test lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -45,11 +45,11 @@ bench: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks
 	$(BIN)/python docs/figures/diagnosis_cost.py
 
-# resumes where it stopped; BLIND="--counts strong=5,control=10 --workers 2" for less or faster,
-# BLIND=--baselines for textbook methods beside it (minutes a case)
-BLIND ?=
-blind: $(VENV)/.developing
-	$(BIN)/python -m tests.blind --out build/blind --report docs/results/blind.md $(BLIND)
+# how good the diagnosis is: appends a line to docs/results/diagnosis-versions.md; resumes where it
+# stopped; MEASURE="--otherlab FOLDER --machines FOLDER --rig OTHER_CHECKOUT/.venv/bin/rig" for more
+MEASURE ?=
+measure: $(VENV)/.developing
+	$(BIN)/python -m benchmarks.diagnosis measure $(MEASURE)
 
 # an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
 # listening sockets;
@@ -63,6 +63,12 @@ FUZZ ?=
 fuzz: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.reliability.fuzz $(FUZZ)
 	$(BIN)/python -m benchmarks.reliability fuzz
+
+# damages the drivers' wire formats in 200 places and runs their tests on each; a quarter of an hour.
+# MUTANTS="ati_net amt21" for some drivers
+MUTANTS ?=
+mutants: $(VENV)/.developing
+	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
 figures: $(VENV)/.developing
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done
@@ -80,6 +86,17 @@ firmware-arm: $(VENV)/.developing
 	"libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm" >&2; exit 0; }; done; \
 	$(MAKE) --no-print-directory -C firmware arm ARM_CXX=$(ARM_CXX) && \
 	$(BIN)/python -m pytest -q -rs tests/drivers/test_contract.py -k Cortex
+
+# the three Teensy images with Debian's Arm compiler, run instruction by instruction in an emulator;
+# TEENSY_CORES is a folder or archive of PJRC's cores, see firmware/teensy.mk; optional
+TEENSY_CORES ?=
+firmware-teensy: $(VENV)/.developing
+	@if [ ! -e "$(TEENSY_CORES)" ]; then echo "no Teensy cores at TEENSY_CORES=$(TEENSY_CORES): left out" \
+	"the Teensy images; give a folder or archive with PJRC's cores and QuadEncoder" >&2; \
+	elif ! command -v $(ARM_CXX) >/dev/null 2>&1; then echo "no $(ARM_CXX): left out the Teensy images;" \
+	"apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib" >&2; \
+	else $(MAKE) --no-print-directory -C firmware -f teensy.mk TEENSY_CORES=$(abspath $(TEENSY_CORES)) && \
+	TEENSY_CORES=$(abspath $(TEENSY_CORES)) $(BIN)/python -m pytest -q -rs tests/drivers/test_teensy_images.py; fi
 
 clean:
 	rm -rf $(VENV) firmware/build

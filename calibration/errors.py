@@ -15,3 +15,7 @@ class CalibrationError(Exception):
         self.why = why
         self.fix = fix
         super().__init__(" ".join(part for part in (what, why, fix) if part))
+
+
+class UnknownNameError(CalibrationError):
+    """What was named does not exist: a slip of whoever typed it."""

@@ -7,6 +7,7 @@ reached, so that an aborted session leaves nothing behind.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Protocol
 
 import numpy as np
@@ -141,11 +142,19 @@ class Procedure(Protocol):
         ...
 
 
+class Answer(Enum):
+    """What an operator wants before a step."""
+
+    DONE = "done"
+    BACK = "back"
+    """Measure the step before again."""
+
+
 class Operator(Protocol):
     """Who sets up a step: a person at the terminal, or hands in the simulated world."""
 
-    def prepare(self, step: Step) -> None:
-        """Return when the step is set up.
+    def prepare(self, step: Step) -> Answer | None:
+        """Return when the step is set up, or that the one before is to be measured again.
 
         Raises:
             AbortedError: The session is to end here.
@@ -165,24 +174,47 @@ Progress = Callable[[Step, int, int], None]
 """Told the step that begins, its number from 0, and how many there are."""
 
 
+Measured = Callable[[Step, list[Measurement]], None]
+"""Given the step that was measured, and all measurements so far, its own last."""
+
+
 def carry_out(
-    procedure: Procedure, operator: Operator, bench: Bench, on_step: Progress | None = None
+    procedure: Procedure,
+    operator: Operator,
+    bench: Bench,
+    on_step: Progress | None = None,
+    on_measured: Measured | None = None,
+    measured: list[Measurement] | None = None,
 ) -> list[Measurement]:
     """Go through the steps and return their measurements.
+
+    Args:
+        procedure: What is calibrated.
+        operator: Sets up the steps.
+        bench: Measures them.
+        on_step: Called before each step.
+        on_measured: Called after each step.
+        measured: Measurements of the first steps, where a session goes on; it grows step by step,
+            so that a caller has what was measured before an error.
 
     Raises:
         AbortedError: The operator ended the session.
         BadDataError: A sensor was at its limit.
     """
     steps = procedure.steps()
-    measured = []
-    for number, step in enumerate(steps):
+    measured = [] if measured is None else measured
+    while len(measured) < len(steps):
+        step = steps[len(measured)]
         if on_step:
-            on_step(step, number, len(steps))
-        operator.prepare(step)
+            on_step(step, len(measured), len(steps))
+        if operator.prepare(step) is Answer.BACK:
+            del measured[-1:]
+            continue
         measurement = bench.measure(step)
         refuse_saturated(measurement.recording)
         measured.append(measurement)
+        if on_measured:
+            on_measured(step, measured)
     return measured
 
 

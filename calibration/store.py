@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from calibration.errors import CalibrationError
+from calibration.errors import CalibrationError, UnknownNameError
 from calibration.linear import CalibrationSet
 from calibration.record import LINE, CalibrationRecord
 
@@ -28,6 +28,10 @@ _DIGITS = 6
 
 class StoreError(CalibrationError):
     """The store is damaged, or has no such record."""
+
+
+class NoRecordError(StoreError, UnknownNameError):
+    """No record, or more than one, is of that name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +89,18 @@ class CalibrationStore:
         """Return the record whose hash begins with `start`.
 
         Raises:
-            StoreError: None or several do, or it is damaged.
+            NoRecordError: None or several do.
+            StoreError: It is damaged.
         """
         if not re.fullmatch(r"[0-9a-f]{1,16}", start):
-            raise StoreError(f"{start!r} is not the beginning of a hash.", fix="Type rig cal list.")
+            raise NoRecordError(
+                f"{start!r} is not the beginning of a hash.", fix="Type rig cal list."
+            )
         paths = sorted((self.folder / "records").glob(f"*-{start}*.json"))
         paths = [path for path in paths if path.stem.rpartition("-")[2].startswith(start)]
         if len(paths) != 1:
             names = ", ".join(path.stem for path in paths)
-            raise StoreError(
+            raise NoRecordError(
                 f"{len(paths)} records begin with {start!r}.",
                 names or f"The store is {self.folder}.",
                 "Type `rig cal list` for the hashes.",

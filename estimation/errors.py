@@ -27,3 +27,7 @@ class MissingExtraError(EstimationError):
     def __init__(self, what: str, why: str, extra: str) -> None:
         self.extra = extra
         super().__init__(what, why, f"Install the project's extra {extra!r}.")
+
+
+class UnknownNameError(EstimationError):
+    """What was named does not exist: a slip of whoever typed it."""

@@ -26,6 +26,7 @@ from estimation.model import (
     with_values,
 )
 from estimation.recording import FloatArray, Recording
+from estimation.within_bounds import solve_within
 
 OFFSET = "sensor.offset"
 
@@ -306,7 +307,7 @@ def _bootstrap(
 
     Each replicate takes one Gauss-Newton step from the fit, with the derivative of the estimate by
     each shape, on the scale it is searched on, as a further column.
-    Parameters at a bound stay there: NaN.
+    Parameters at a bound stay there: NaN. The others stay within theirs.
     """
     runs = problem.runs
     if count == 0 or len(runs) < 2:
@@ -334,12 +335,14 @@ def _bootstrap(
     shapes = problem.shape_parameters
     start = np.concatenate([free, [_scaled(p, x) for p, x in zip(shapes, shape, strict=True)]])
     values = np.full((count, len(start) + 1), np.nan)
+    low = np.concatenate([problem.lower, [_scaled(p, p.lower) for p in shapes]]) - start
+    high = np.concatenate([problem.upper, [_scaled(p, p.upper) for p in shapes]]) - start
     for replicate, weight in enumerate(weights):
         total = np.tensordot(weight, products, axes=1)
         step = np.zeros(len(start))
-        step[moving] = linalg.lstsq(
-            total[np.ix_(moving, moving)], total[moving, -1], check_finite=False
-        )[0]
+        step[moving] = solve_within(
+            total[np.ix_(moving, moving)], total[moving, -1], low[moving], high[moving]
+        )
         values[replicate, :-1] = np.where(inside > 0, start + step, np.nan)
         if problem.offset is not None:
             mean = np.average(means, axis=0, weights=weight)
@@ -397,8 +400,13 @@ def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate
     if spreads is None or not np.isfinite(spreads[:, column]).all():
         return Estimate(float(value))
     replicates = spreads[:, column]
+    return Estimate(float(value), float(replicates.std(ddof=1)), interval95(value, replicates))
+
+
+def interval95(value: float, replicates: FloatArray) -> tuple[float, float]:
+    """Return the 95 % interval of a bootstrap; where few runs carry a value, wide enough for it."""
     low, high = np.percentile(replicates, [2.5, 97.5])
-    return Estimate(float(value), float(replicates.std(ddof=1)), (float(low), float(high)))
+    return min(float(low), float(value)), max(float(high), float(value))
 
 
 def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:

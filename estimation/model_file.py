@@ -15,6 +15,7 @@ A file of several balances holds each under `[[models]]`, with `[models.processi
 `[[models.effects]]` and `[models.fit]`, and has the schema `rig.models/1`.
 """
 
+import difflib
 import json
 import math
 import tomllib
@@ -29,7 +30,7 @@ from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term, nearest
-from estimation.model_table import ModelFileError, Table
+from estimation.model_table import ModelFileError, NoModelError, Table
 from estimation.rest import Samples
 
 SCHEMA = "rig.model/1"
@@ -58,10 +59,18 @@ def read_all(path: Path) -> list[Model]:
         path: The file, or the name of a model from `shipped`.
 
     Raises:
-        ModelFileError: The file is missing, is not TOML, or a key is unknown, missing or wrong.
+        NoModelError: There is no such file and no such name; it is a ModelFileError, too.
+        ModelFileError: It is not TOML, or a key is unknown, missing or wrong.
     """
     known = shipped()
     place = known.get(str(path), path)
+    if not place.exists():
+        near = difflib.get_close_matches(str(path), known, n=1)
+        raise NoModelError(
+            f"There is no model {str(path)!r}: neither a file nor a shipped model.",
+            f"Shipped: {', '.join(known)}.",
+            f"Did you mean {near[0]!r}?" if near else "Name a model file, or one of these.",
+        )
     try:
         text = place.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

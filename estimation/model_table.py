@@ -4,11 +4,16 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from estimation.errors import UnknownNameError
 from estimation.model import ModelError, nearest
 
 
 class ModelFileError(ModelError):
     """A model file cannot be read; says which file and which key."""
+
+
+class NoModelError(ModelFileError, UnknownNameError):
+    """There is no model of that name, and no such file."""
 
 
 class Table:

@@ -7,8 +7,11 @@ link, 4 safety trip, 5 data damaged or unreadable, 70 a bug in rig, 130 interrup
 from enum import IntEnum
 
 from calibration.errors import CalibrationError
+from calibration.errors import UnknownNameError as NoSuchRecord
 from drivers.errors import DriverError
 from estimation.errors import EstimationError
+from estimation.errors import UnknownNameError as NoSuchModel
+from estimation.files import OutputError
 
 
 class ExitCode(IntEnum):
@@ -74,11 +77,14 @@ class SafetyTripError(RigError):
 
 
 ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
+    OutputError: ExitCode.USAGE,
+    NoSuchModel: ExitCode.USAGE,
+    NoSuchRecord: ExitCode.USAGE,
     EstimationError: ExitCode.DATA,
     CalibrationError: ExitCode.DATA,
     DriverError: ExitCode.DEVICE,
 }
-"""Exit code of each other room's error base."""
+"""Exit code of each other room's errors; the first class that fits counts."""
 
 KNOWN_ERRORS: tuple[type[Exception], ...] = (RigError, *ROOM_EXIT_CODES)
 

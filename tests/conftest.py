@@ -9,6 +9,8 @@ from pathlib import Path
 
 # before numpy is loaded: threads of a BLAS wait for one another when tests run side by side
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# commands that are typed without a configuration are about the simulated rig in the tests
+os.environ["RIG_CONFIG"] = "simulated"
 
 import pytest
 from hypothesis import settings

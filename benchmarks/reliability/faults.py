@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drivers.errors import DriverError
 from drivers.registry import fakes
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.guard import (
     COLUMNS,
     CURRENT,
@@ -207,7 +207,7 @@ def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
     """Let a fault strike an armed rig: it must trip with its own code and be safe in time."""
     config = config.changed(**ASIDE.get(kind, {}))
     bench = ScriptedRig(kind, after_ticks)
-    board = TeensyFake(bench)
+    board = PythonBoard(bench)
     faults = Faults()
     link = FaultyTransport(SimulatedTransport(board, step_s=STEP_S), faults)
     ticks: list[NDArray[np.int64]] = []
@@ -246,7 +246,7 @@ def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
 
 def _after_silence(
     kind: str,
-    board: TeensyFake,
+    board: PythonBoard,
     said: str,
     ticks: list[NDArray[np.int64]],
     motors: list[NDArray[np.int64]],

@@ -27,7 +27,7 @@ from drivers.framing import FrameStream, encode_frame
 from drivers.qia128 import protocol as qia128
 from drivers.sliding import SlidingFrames
 from drivers.teensy import protocol as teensy
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, Limits
 from drivers.usb520 import protocol as usb520
@@ -101,8 +101,8 @@ def _frames(data: bytes) -> bool:
 
 
 @cache
-def _board() -> TeensyFake:
-    return TeensyFake(HandMovedBench())
+def _board() -> PythonBoard:
+    return PythonBoard(HandMovedBench())
 
 
 def _board_takes(data: bytes) -> bool:

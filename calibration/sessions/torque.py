@@ -8,7 +8,14 @@ import numpy as np
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError
-from calibration.torque import ShuntCheck, check_shunt, fit_torque, weight_torque_n_m
+from calibration.torque import (
+    MINIMUM_LEVELS,
+    MINIMUM_STEPS,
+    ShuntCheck,
+    check_shunt,
+    fit_torque,
+    weight_torque_n_m,
+)
 from calibration.torque import Step as Load
 from estimation.recording import FloatArray
 
@@ -55,6 +62,15 @@ class TorqueSession:
         rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
         if not (rising and self.arm_m > 0 and np.isfinite(self.arm_m)):
             raise BadDataError("levels", "An arm is longer than 0, and the masses rise from 0.")
+        levels, steps = 1 + len(self.masses_kg), 1 + 2 * len(self.masses_kg) * self.repeats
+        if levels < MINIMUM_LEVELS or steps < MINIMUM_STEPS:
+            raise BadDataError(
+                "points",
+                f"{len(self.masses_kg)} weights, {self.repeats} times up and down, are too few.",
+                f"A line needs {MINIMUM_LEVELS} different torques, no weight among them, and"
+                f" {MINIMUM_STEPS} steps.",
+                f"Give at least {MINIMUM_LEVELS - 1} weights.",
+            )
         if (self.shunt_v_v is None) != (self.counts_per_v_v is None):
             raise BadDataError(
                 "points", "A shunt check needs the certificate's V/V and the counts a V/V."
@@ -74,6 +90,24 @@ class TorqueSession:
                 )
             )
         return steps
+
+    def reading(self, measured: Sequence[Measurement], lines: CalibrationSet) -> str:
+        """Return what the last step read, and how far it is off the line of all steps so far."""
+        field = lines.channels[SENSORS[self.sensor]].counts
+        counts = _counts(measured[-1], field)
+        shown = f"{counts.mean():.1f} +- {counts.std():.1f} counts"
+        points = [
+            (float(c["mass_kg"]), _counts(m, field).mean())
+            for m in measured
+            if "mass_kg" in (c := m.recording.conditions)
+        ]
+        if "mass_kg" not in measured[-1].recording.conditions or len({m for m, _ in points}) < 3:
+            return shown
+        masses, means = np.array(points).T
+        line = np.polyfit(masses, means, 1)
+        span = abs(line[0]) * np.ptp(masses)
+        off = (means[-1] - np.polyval(line, masses[-1])) / span
+        return f"{shown}, {off:+.2%} of the range off the line so far"
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the line of the sensor; see `calibration.torque`."""

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from drivers.amt21 import protocol
+from drivers.amt21.turning import TOP_SPEED_RAD_S, RateGate, turns_at
 from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
@@ -27,6 +28,7 @@ class Amt21:
         multi_turn: Whether it also counts turns.
         rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
         reply_timeout_s: Time for an answer, on a USB adapter some milliseconds.
+        top_speed_rad_s: The fastest the shaft turns; a reading that would need more is damaged.
     """
 
     name = "amt21"
@@ -38,6 +40,7 @@ class Amt21:
         multi_turn: bool = False,
         rate_hz: float = 200.0,
         reply_timeout_s: float = 0.01,
+        top_speed_rad_s: float = TOP_SPEED_RAD_S,
     ) -> None:
         self._transport = transport
         self._requests = [protocol.request(address, turns) for turns in (False, True)]
@@ -47,6 +50,7 @@ class Amt21:
         self._counters = DeviceCounters()
         self._schedule = PollSchedule(rate_hz, self._counters)
         self._schedule.restart(transport.now_s)
+        self._gate = RateGate(top_speed_rad_s, multi_turn)
         angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
         half = protocol.FULL_TURN // 2
         turns = Channel("turns", "1", rate_hz, -half, half - 1, "whole turns")
@@ -80,6 +84,7 @@ class Amt21:
         """Number the samples from 0, the first being due now."""
         self._discard(self._transport.read(0.0))
         self._schedule.restart(self._transport.now_s)
+        self._gate.restart()
 
     def read(self, timeout_s: float) -> Batch:
         """Ask when the next sample is due and return it, or nothing when it is not due in time."""
@@ -87,16 +92,16 @@ class Amt21:
         self._discard(self._transport.read(max(0.0, min(wait_s, timeout_s))))
         now_s = self._transport.now_s
         if self._schedule.wait_s(now_s) > 0:
-            return self._batch(None, None)
+            return self._batch(None)
         self._schedule.skip_missed(now_s)
-        angle = self._ask(turns=False)
-        turns = self._ask(turns=True) if self._multi_turn and angle is not None else None
-        if angle is None or (self._multi_turn and turns is None):
+        position = self._plausible()
+        if position is None:
             self._schedule.lose()
-            return self._batch(None, None)
+            return self._batch(None)
+        self._gate.accept(position, self._transport.now_s)
         self._schedule.asked += 1
         self._counters.frames += 1
-        return self._batch(angle, turns)
+        return self._batch(position)
 
     def stop(self) -> None:
         """Do nothing: an encoder that is not asked is silent."""
@@ -105,11 +110,46 @@ class Amt21:
         """Let go of the line."""
         self._transport.close()
 
-    def _batch(self, angle: int | None, turns: int | None) -> Batch:
-        count = 0 if angle is None else 1
-        values = {"angle_rad": 0.0 if angle is None else angle * protocol.RAD_PER_COUNT}
+    def _plausible(self) -> int | None:
+        """Return a position that the shaft can have, None when there is no good one.
+
+        A position out of reach is asked for again: it was damaged, unless the second one agrees.
+        """
+        first = self._measure()
+        first_s = self._transport.now_s
+        if first is None or self._gate.fits(first, first_s):
+            return first
+        self._counters.crc_errors += 1
+        self._counters.retries += 1
+        second = self._measure()
+        if second is None:
+            return None
+        now_s = self._transport.now_s
+        if self._gate.fits(second, now_s) or self._gate.is_near(second, first, now_s - first_s):
+            return second
+        self._counters.crc_errors += 1
+        self._counters.timeouts += 1
+        return None
+
+    def _measure(self) -> int | None:
+        """Return the position, counts over all turns it counts; None without good answers."""
+        before = self._ask(turns=True) if self._multi_turn else 0
+        angle = None if before is None else self._ask(turns=False)
+        after = self._ask(turns=True) if self._multi_turn and angle is not None else 0
+        if before is None or angle is None or after is None:
+            return None
+        turns = turns_at(angle, before, after)
+        if turns is None:
+            self._counters.crc_errors += 1
+            return None
+        return turns * protocol.FULL_TURN + angle
+
+    def _batch(self, position: int | None) -> Batch:
+        count = 0 if position is None else 1
+        turns, angle = divmod(position or 0, protocol.FULL_TURN)
+        values = {"angle_rad": angle * protocol.RAD_PER_COUNT}
         if self._multi_turn:
-            values["turns"] = 0.0 if turns is None else float(protocol.signed(turns))
+            values["turns"] = float(protocol.signed(turns))
         return Batch(
             {name: np.full(count, value) for name, value in values.items()},
             np.full(count, self._transport.now_s),
@@ -162,6 +202,7 @@ def open_amt21(
     multi_turn: bool = False,
     rate_hz: RateOption = 200.0,
     baud_rate: BaudOption = 2_000_000,
+    top_speed_rad_s: Annotated[float, Field(gt=0)] = TOP_SPEED_RAD_S,
 ) -> Amt21:
     """Open the encoder on a serial adapter.
 
@@ -171,12 +212,14 @@ def open_amt21(
         multi_turn: Whether the encoder also counts turns.
         rate_hz: How often it is asked.
         baud_rate: 2 Mbit/s for types A to D; types E to H are set to 9600 to 115200.
+        top_speed_rad_s: The fastest the shaft turns, by which damaged readings are found.
 
     Raises:
         LinkError: The adapter cannot be opened, or the options are no encoder's.
     """
     try:
-        return Amt21(open_line(url, baud_rate), address, multi_turn, rate_hz)
+        line = open_line(url, baud_rate)
+        return Amt21(line, address, multi_turn, rate_hz, top_speed_rad_s=top_speed_rad_s)
     except ValueError as error:
         raise LinkError(f"No AMT21 can be asked so: {error}.") from error
 

@@ -21,6 +21,10 @@ from drivers.transport.python_can import open_can
 TRIES = 3
 REPLY_TIMEOUT_S = 0.02
 """Time for a whole answer: ten times the wire time of the longest at 250 kbit/s."""
+CHECK_S = 1.0
+"""Time between two looks whether the sensor still uses its calibration."""
+AFTER_RESTART = 0
+"""The calibration a sensor uses after a restart."""
 
 
 class AtiCan:
@@ -56,6 +60,9 @@ class AtiCan:
         self._schedule = PollSchedule(rate_hz, self._counters)
         self._matrix: NDArray[np.float64] | None = None
         self._unit_per_count = np.ones(6)
+        self._check_at_s = -np.inf
+        self._axis = 0
+        self._fallen_back = False
         self.bias = np.zeros(protocol.GAUGES)
         """Readings taken for no load, counts, shape (6,)."""
         self.status = 0
@@ -90,9 +97,7 @@ class AtiCan:
         """
         version = protocol.decode_firmware(self._ask(protocol.FIRMWARE)[0])
         serial = protocol.decode_serial(self._ask(protocol.SERIAL)[0])
-        chosen = bytes([self._calibration])
-        if self._ask(protocol.CALIBRATION, chosen)[0] != chosen:
-            raise FrameError(f"The sensor does not use its calibration {self._calibration}.")
+        self._choose_calibration()
         self._unit_per_count = self._read_units(version[:2])
         rows = [
             protocol.decode_matrix_row(self._ask(protocol.MATRIX_ROW, bytes([axis]), 3))
@@ -106,6 +111,9 @@ class AtiCan:
         """Number the samples from 0, the first being due now."""
         if self._matrix is None:
             self.identify()
+        elif self._calibration != AFTER_RESTART:
+            self._choose_calibration()
+        self._check_at_s = self._bus.now_s + CHECK_S
         self._schedule.restart(self._bus.now_s)
 
     def read(self, timeout_s: float) -> Batch:
@@ -114,7 +122,8 @@ class AtiCan:
         A saturated gauge makes the whole wrench wrong: it is flagged `SATURATED` and `SUSPECT`.
 
         Raises:
-            DriverError: Neither `identify` nor `start` has been called.
+            DriverError: The sensor has restarted and does not use the calibration that was chosen;
+                every reading says so until `start`. Or neither `identify` nor `start` was called.
         """
         if self._matrix is None:
             raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
@@ -124,9 +133,12 @@ class AtiCan:
             return self._batch(np.empty((0, 6)), 0)
         self._schedule.skip_missed(now_s)
         try:
+            if self._calibration != AFTER_RESTART and now_s >= self._check_at_s:
+                self._require_calibration(self._matrix)
             gauges = self._read_gauges()
         except LinkTimeoutError:
             self._schedule.lose()
+            self._check_at_s = -np.inf  # it may be silent because it restarts
             return self._batch(np.empty((0, 6)), 0)
         self._schedule.asked += 1
         self._counters.frames += 1
@@ -157,6 +169,43 @@ class AtiCan:
     def close(self) -> None:
         """Let go of the bus."""
         self._bus.close()
+
+    def _choose_calibration(self) -> None:
+        """Let the sensor use the calibration; it forgets it at a restart.
+
+        Raises:
+            FrameError: It does not.
+            LinkTimeoutError: It does not answer.
+        """
+        chosen = bytes([self._calibration])
+        if self._ask(protocol.CALIBRATION, chosen)[0] != chosen:
+            raise FrameError(f"The sensor does not use its calibration {self._calibration}.")
+        self._fallen_back = False
+
+    def _require_calibration(self, matrix: NDArray[np.float64]) -> None:
+        """Hold a row of the matrix in use against the one read at the start, each time the next.
+
+        No question tells the calibration in use: the one that chooses it also sets it.
+
+        Raises:
+            DriverError: It is another one.
+            LinkTimeoutError: The sensor does not answer.
+        """
+        row = protocol.decode_matrix_row(self._ask(protocol.MATRIX_ROW, bytes([self._axis]), 3))
+        if np.array_equal(row, matrix[self._axis]):
+            self._axis = (self._axis + 1) % 6
+            self._check_at_s = self._bus.now_s + CHECK_S
+            return
+        if not self._fallen_back:
+            self._counters.restarts += 1
+        self._fallen_back = True
+        raise DriverError(
+            f"The sensor at {self._bus.url}, base {self._base:#x}, does not use its calibration"
+            f" {self._calibration} any more.",
+            f"It has restarted, after which it uses calibration {AFTER_RESTART}."
+            f" Up to {CHECK_S:g} s of readings before this one are wrong.",
+            "Check its supply, then start again: the calibration is chosen anew.",
+        )
 
     def _read_gauges(self) -> NDArray[np.int16]:
         self.status, gauges = protocol.decode_reading(*self._ask(protocol.READ, b"", 2))

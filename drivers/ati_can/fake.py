@@ -80,6 +80,10 @@ class AtiCanFake:
         out, self._out = self._out, []
         return out
 
+    def restart(self) -> None:
+        """Switch it off and on: it uses its first calibration again."""
+        self._active = 0
+
     def _answer(self, operation: int, data: bytes) -> list[CanFrame]:
         if operation == protocol.READ and not data:
             gauges = np.clip(self._load(self._tick), protocol.GAUGE_MIN, protocol.GAUGE_MAX)

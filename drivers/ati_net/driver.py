@@ -9,6 +9,7 @@ from pydantic import Field
 
 from drivers.ati_net import protocol
 from drivers.ati_net.sequence import RecordSequence
+from drivers.ati_net.stream_watch import StreamWatch
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
@@ -47,6 +48,8 @@ class AtiNet:
         self._counters = DeviceCounters()
         self._sequence = RecordSequence(self._counters)
         self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._watch = StreamWatch(transport.url, rate_hz, self._counters)
+        self._streams = False
         self._closed = False
         self.status = 0
         """Status word of the newest record; `protocol.status_words` puts it in words."""
@@ -116,16 +119,23 @@ class AtiNet:
         self._sequence.restart()
         self._transport.write(protocol.encode_command(protocol.STREAM))
         self._arrivals.restart(self._transport.now_s)
+        self._watch.restart(self._transport.now_s)
+        self._streams = True
 
     def read(self, timeout_s: float) -> Batch:
         """Return the records that have come, stamped with the time of this read.
 
+        A stream that is silent is requested again.
+
         Raises:
-            DriverError: Neither `identify` nor `start` has been called.
+            LinkTimeoutError: It stays silent.
+            DriverError: The sensor is frozen; or neither `identify` nor `start` has been called.
         """
         if self._calibration is None:
             raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
         records = self._receive(timeout_s)
+        if self._streams:
+            self._follow(records["ft_sequence"].astype(np.uint32))
         kept, numbers = self._sequence.follow(records["rdt_sequence"])
         records = records[kept]
         now_s = self._transport.now_s
@@ -143,15 +153,21 @@ class AtiNet:
         )
 
     def set_bias(self) -> None:
-        """Take the present load for zero, in the device; it does not answer."""
+        """Take the present load for zero, in the device; it does not answer.
+
+        A command replaces the one that runs, so the stream is requested again after it.
+        """
         self._transport.write(protocol.encode_command(protocol.SET_BIAS))
+        self._ask_again()
 
     def reset_latch(self) -> None:
-        """Clear the latched threshold."""
+        """Clear the latched threshold; the stream is requested again after it."""
         self._transport.write(protocol.encode_command(protocol.RESET_LATCH))
+        self._ask_again()
 
     def stop(self) -> None:
         """End the stream."""
+        self._streams = False
         self._transport.write(protocol.encode_command(protocol.STOP))
 
     def close(self) -> None:
@@ -160,6 +176,18 @@ class AtiNet:
             return
         self._closed = True
         stop_and_let_go(self.stop, self._transport.close)
+
+    def _ask_again(self) -> None:
+        """Request the stream anew where it is to run; its records are numbered from 1 again."""
+        if self._streams:
+            self._sequence.expect_restart()
+            self._transport.write(protocol.encode_command(protocol.STREAM))
+
+    def _follow(self, internal: NDArray[np.uint32]) -> None:
+        now_s = self._transport.now_s
+        if not len(internal) and self._watch.is_to_be_asked_again(now_s):
+            self._ask_again()
+        self._watch.follow(internal, now_s)
 
     def _receive(self, timeout_s: float) -> NDArray[np.void]:
         """Return the records of the datagrams that are there, waiting for the first."""

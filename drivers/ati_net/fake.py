@@ -35,9 +35,16 @@ class RdtFake:
         self._out: list[bytes] = []
         self.status = 0
         self.bias = np.zeros(6, np.int64)
+        self.frozen_at: int | None = None
+        """Internal sample that is repeated for ever; None while the sensor works."""
+        self.deaf = 0
+        """Requests that get lost on their way."""
 
     def receive(self, data: bytes) -> None:
         """Carry out a request; anything else is not answered."""
+        if self.deaf:
+            self.deaf -= 1
+            return
         try:
             command, samples = protocol.decode_command(data)
         except FrameError:
@@ -48,8 +55,10 @@ class RdtFake:
             self._sequence = self._first
             self._left = samples or -1
         elif command == protocol.SET_BIAS:
+            self._left = 0  # a command replaces the one that runs
             self.bias = self.load(self._ticks)
         elif command == protocol.RESET_LATCH:
+            self._left = 0
             self.status &= ~(protocol.LATCHED | protocol.SUMMARY)
 
     def advance(self, ticks: int) -> None:
@@ -73,9 +82,10 @@ class RdtFake:
         return counts
 
     def _record(self) -> bytes:
-        counts = self.load(self._ticks) - self.bias
+        taken = self._ticks if self.frozen_at is None else self.frozen_at
+        counts = self.load(taken) - self.bias
         record = np.array(
-            (self._sequence, self._ticks * 7 % 2**32, self.status, counts), protocol.RECORD_DTYPE
+            (self._sequence, taken * 7 % 2**32, self.status, counts), protocol.RECORD_DTYPE
         )
         self._sequence = (self._sequence + 1) % 2**32
         return record.tobytes()

@@ -7,7 +7,11 @@ from drivers.counters import DeviceCounters
 
 _WRAP = 2**32
 RESTART_STEP = 1000
-"""A number this far behind the newest is a device that began anew, not a late packet."""
+"""A number this far behind the newest is a device that began anew, not a late packet.
+
+A stream that the host has requested anew may begin anew at any number. Whether it does is open for
+as many records: a device may as well go on counting.
+"""
 
 
 class RecordSequence:
@@ -21,6 +25,7 @@ class RecordSequence:
         self._counters = counters
         self._newest: int | None = None
         self._next = 0
+        self._may_restart = 0
         self.lost = 0
         """Records lost since `restart`."""
 
@@ -28,7 +33,12 @@ class RecordSequence:
         """Give the next record the number 0."""
         self._newest = None
         self._next = 0
+        self._may_restart = 0
         self.lost = 0
+
+    def expect_restart(self) -> None:
+        """Let the device's numbers begin anew once, because the host has asked for it."""
+        self._may_restart = RESTART_STEP
 
     def follow(self, numbers: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Say which records are new and in order, and number those from 0 since `restart`.
@@ -51,9 +61,13 @@ class RecordSequence:
         step = 1
         if self._newest is not None:
             step = (number - self._newest + _WRAP // 2) % _WRAP - _WRAP // 2
-        if step <= -RESTART_STEP:
+        if step < 0 and self._may_restart:
+            self._may_restart = 0
+            step = 1
+        elif step <= -RESTART_STEP:
             self._counters.restarts += 1
             step = 1
+        self._may_restart = max(0, self._may_restart - 1)
         if step <= 0:
             if step == 0:
                 self._counters.duplicates += 1

@@ -27,7 +27,9 @@ GAUGE_LIMIT = 32767
 
 @dataclass(frozen=True, slots=True)
 class Assumptions:
-    """What no public source settles about a digital F/T, as it is taken to be.
+    """What may differ on a digital F/T of another make-up.
+
+    As it stands here it is in the public driver named in the README.
 
     Attributes:
         matrix_by_rows: The calibration's matrix comes row by row, Fx first; else column by column.
@@ -78,6 +80,7 @@ class AtiSerial:
             protocol.FRAME_SIZE, protocol.frame_checks, self._counters, agree=5
         )
         self._errors_at_start = 0
+        self._early = b""
         self._closed = False
 
     @property
@@ -151,7 +154,7 @@ class AtiSerial:
         self._set_lock(protocol.LOCK)
         self._frames.restart()
         self._errors_at_start = self._counters.crc_errors
-        self._transport.write(protocol.encode(protocol.STREAM, protocol.START_STREAM))
+        self._early = self._start_stream()
         self._arrivals.restart(self._transport.now_s)
 
     def read(self, timeout_s: float) -> Batch:
@@ -164,7 +167,9 @@ class AtiSerial:
             raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
         give_up_s = self._transport.now_s + timeout_s
         while True:
-            data = self._transport.read(max(0.0, give_up_s - self._transport.now_s))
+            early, self._early = self._early, b""
+            wait_s = 0.0 if early else max(0.0, give_up_s - self._transport.now_s)
+            data = early + self._transport.read(wait_s)
             frames = self._frames.feed(data)
             if len(frames) or not data or self._transport.now_s >= give_up_s:
                 break
@@ -184,7 +189,9 @@ class AtiSerial:
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
         if self._assumed.lock_answers:
-            self._ask(message)
+            answer = self._ask(message)
+            if answer != protocol.SUCCESS:
+                raise self._refused(protocol.STORAGE, answer)
             return
         self._transport.write(message)
         self._transport.read(QUIET_S)  # an answer all the same is let go
@@ -222,6 +229,34 @@ class AtiSerial:
             raise FrameError(f"{count} registers were asked for, {len(data) - 1} bytes came.")
         return data[1:]
 
+    def _start_stream(self) -> bytes:
+        """Let the stream begin; return the bytes of it that came with the answer.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            DriverError: The sensor refuses.
+        """
+        request = protocol.encode(protocol.STREAM, protocol.START_STREAM)
+        for attempt in range(TRIES):
+            if attempt:
+                self._counters.retries += 1
+                self._quieten()  # it may stream although its answer did not come through
+            self._transport.write(request)
+            give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
+            came = b""
+            while len(came) < len(request) and self._transport.now_s < give_up_s:
+                came += self._transport.read(give_up_s - self._transport.now_s)
+            answer, rest = came[: len(request)], came[len(request) :]
+            try:
+                function, data = protocol.decode(answer)
+            except FrameError:
+                self._counters.discarded_bytes += len(came)
+                continue
+            if (function, data) != (protocol.STREAM, protocol.SUCCESS):
+                raise self._refused(protocol.STREAM, data)
+            return rest
+        raise self._no_answer()
+
     def _ask(self, request: bytes) -> bytes:
         """Return the data of the answer to a request."""
         for attempt in range(TRIES):
@@ -238,13 +273,20 @@ class AtiSerial:
                     continue  # more may be on its way
                 if function == request[1]:
                     return data
-                raise DriverError(
-                    f"The sensor at {self._transport.url} refused function {request[1]:#04x}.",
-                    f"Its reason is number {data.hex()}.",
-                )
+                raise self._refused(request[1], data)
             self._counters.discarded_bytes += len(came)
+        raise self._no_answer()
+
+    def _refused(self, function: int, answer: bytes) -> DriverError:
+        return DriverError(
+            f"The sensor at {self._transport.url} refused function {function:#04x}.",
+            f"Its answer is {answer.hex() or 'empty'}.",
+            "Switch the sensor off and on, then start again.",
+        )
+
+    def _no_answer(self) -> LinkTimeoutError:
         self._counters.timeouts += 1
-        raise LinkTimeoutError(
+        return LinkTimeoutError(
             f"No digital F/T answers at {self._transport.url}.",
             f"It was asked {TRIES} times.",
             "Check its supply, the line, 1.25 Mbit/s and even parity.",

@@ -16,6 +16,8 @@ SLAVE = 0x0A
 READ, WRITE, STREAM, STORAGE = 0x03, 0x10, 0x46, 0x6A
 START_STREAM = b"\x55"
 UNLOCK, LOCK = b"\xaa", b"\x18"
+SUCCESS = b"\x01"
+"""Answer to both functions of the sensor's own."""
 FAILED = 0x80
 """Added to the function of a refused request."""
 JAM = bytes(16)

@@ -1,7 +1,13 @@
 """An EPOS4 that speaks the frames a real one would, on the library's own CANopen server.
 
+Errors act as in maxon's firmware specification (chapter 7 and objects 0x6007, 0x605E, 0x1029, as
+transcribed in the public library `Imcab/EposLib`): a lost heartbeat stops the drive as 0x6007 says
+and takes the node out of "operational", so that process data end; a fault reset is ignored until an
+NMT "reset communication", which brings the communication objects back to their stored values.
+
 Not modelled: the times its controllers and the wire take, its inputs, homing, and every mode but
-cyclic torque. Averaged torque follows the target at once.
+cyclic torque. Averaged torque follows the target at once. A quick stop's ramp is a time in which
+the power stage stays on.
 """
 
 import struct
@@ -14,7 +20,8 @@ from canopen.sdo.exceptions import SdoAbortedError
 from drivers.device import Device
 from drivers.epos4 import protocol
 from drivers.epos4.canopen_link import EDS
-from drivers.epos4.driver import Epos4
+from drivers.epos4.drive import Epos4
+from drivers.epos4.fake_network import FrameNetwork
 from drivers.epos4.protocol import State
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.faulty import Faults
@@ -24,13 +31,22 @@ from drivers.transport.simulated_can import SimulatedCanBus
 Motor = Callable[[float, int], int]
 """Moves the motor by a torque, N m, for some milliseconds; returns its position, counts."""
 
-WRONG_STATE, NOT_THERE = 0x08000022, 0x06020000
+WRONG_STATE, NOT_THERE, OUT_OF_RANGE = 0x08000022, 0x06020000, 0x06090030
+HOST_LOST, BUS_PASSIVE = 0x8130, 0x8120
+RAMP_MS = 200
+"""Time a quick stop takes."""
+_COMMUNICATION = range(0x8100, 0x8300)
+"""Error codes that 0x6007 decides on."""
+_ALLOWED = {(0x6007, 0): (2, 3), (0x605E, 0): (0, 1, 2), (0x1029, 1): (0, 1, 2)}
+_AFTER_LOST_HOST = {0: "PRE-OPERATIONAL", 2: "STOPPED"}
+_RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
 _LOW = {
     State.SWITCH_ON_DISABLED: 0x40,
     State.READY: 0x31,
     State.SWITCHED_ON: 0x33,
     State.OPERATION_ENABLED: 0x37,
     State.QUICK_STOP: 0x17,
+    State.FAULT_REACTION: 0x1F,
     State.FAULT: 0x08,
 }
 
@@ -83,7 +99,7 @@ class Epos4Fake:
     ) -> None:
         self._motor = motor or FreeMotor()
         self._absent = absent
-        self._network = _FrameNetwork()
+        self._network = FrameNetwork()
         self._node = canopen.LocalNode(node_id, canopen.import_od(str(EDS), node_id))
         self._network[node_id] = self._node
         self._id = node_id
@@ -92,8 +108,10 @@ class Epos4Fake:
         self._host_silent_ms: int | None = None
         self.state = State.SWITCH_ON_DISABLED
         """Where its state machine is."""
-        for (index, subindex), value in (_factory() | (objects or {})).items():
-            self._store(index, subindex, value)
+        self._factory = _factory(node_id) | (objects or {})
+        self._store_all(self._factory)
+        self._needs_communication_reset = False
+        self._ramp_ms = 0
         self._node.add_write_callback(self._written)  # type: ignore[no-untyped-call]
         self._node.add_read_callback(self._asked)  # type: ignore[no-untyped-call]
         self._network.subscribe(0x80, lambda *_: self._synchronise())
@@ -113,6 +131,8 @@ class Epos4Fake:
         if frame.can_id == self._word(0x1400, 1) and self._operational:
             self._take_process_data(frame.data)
         self._network.notify(frame.can_id, bytearray(frame.data), 0.0)
+        if frame.can_id == 0 and frame.data[1:2] in (b"\0", bytes([self._id])):
+            self._restart(frame.data[0])
 
     def advance(self, ticks: int) -> None:
         """Let the motor move and heartbeats come for `ticks` milliseconds."""
@@ -123,7 +143,11 @@ class Epos4Fake:
                 self._host_silent_ms += 1
                 if self._host_limit_ms and self._host_silent_ms > self._host_limit_ms:
                     self._host_silent_ms = None
-                    self.fail(0x8130, 0x10)
+                    self.fail(HOST_LOST, 0x10)
+            if self.state is State.FAULT_REACTION:
+                self._ramp_ms -= 1
+                if self._ramp_ms <= 0:
+                    self.state = State.FAULT
 
     def transmit(self) -> list[CanFrame]:
         """Give the frames to be sent."""
@@ -140,11 +164,22 @@ class Epos4Fake:
         return self._integer(0x6071) * 1e-3 * self._word(0x6076) * 1e-6
 
     def fail(self, code: int, register: int = 1) -> None:
-        """Let an error happen: emergency frame, power stage off, fault."""
-        self.state = State.FAULT
+        """Let an error happen: emergency frame, the reaction set for it, fault."""
+        communication = code in _COMMUNICATION
+        ramp = self._word(0x6007) == 3 if communication else self._word(0x605E) != 0
+        if ramp and self.state is State.OPERATION_ENABLED:
+            self.state, self._ramp_ms = State.FAULT_REACTION, RAMP_MS
+        else:
+            self.state = State.FAULT
         self._store(0x603F, 0, code)
         self._store(0x1001, 0, register)
         self._node.emcy.send(code, register)
+        if code in (HOST_LOST, BUS_PASSIVE):
+            self._needs_communication_reset = True
+        if code == HOST_LOST and self._operational:
+            after = _AFTER_LOST_HOST.get(self._word(0x1029, 1))
+            if after:
+                self._node.nmt.state = after
 
     # state machine and objects
 
@@ -163,6 +198,8 @@ class Epos4Fake:
         if index in self._absent:
             raise SdoAbortedError(NOT_THERE)
         value = int.from_bytes(data, "little")
+        if value not in _ALLOWED.get((index, subindex), (value,)):
+            raise SdoAbortedError(OUT_OF_RANGE)
         mapping = index & 0xFFFC in (0x1400, 0x1600, 0x1800, 0x1A00)
         if mapping and self._node.nmt.state != "PRE-OPERATIONAL":
             raise SdoAbortedError(WRONG_STATE)
@@ -182,7 +219,11 @@ class Epos4Fake:
     def _command(self, controlword: int) -> None:
         """Go through the state machine of CiA 402."""
         before, reset = self._word(0x6040), protocol.FAULT_RESET
+        if self.state is State.FAULT_REACTION:
+            return
         if self.state is State.FAULT:
+            if self._needs_communication_reset:
+                return
             if controlword & reset and not before & reset:
                 self.state = State.SWITCH_ON_DISABLED
                 self._store(0x603F, 0, 0)
@@ -195,6 +236,22 @@ class Epos4Fake:
         elif self.state in (State.READY, State.SWITCHED_ON, State.OPERATION_ENABLED):
             enabled = controlword & 0x08
             self.state = State.OPERATION_ENABLED if enabled else State.SWITCHED_ON
+
+    def _restart(self, command: int) -> None:
+        """Follow an NMT reset: stored values again, boot-up, and pre-operational by itself."""
+        if command not in (_RESET_NODE, _RESET_COMMUNICATION):
+            return
+        stored = self._factory
+        if command == _RESET_COMMUNICATION:
+            stored = {at: value for at, value in stored.items() if at[0] < 0x2000}
+        else:
+            self.state = State.SWITCH_ON_DISABLED
+        self._store_all(stored)
+        self._needs_communication_reset = False
+        self._host_node = self._host_limit_ms = 0
+        self._host_silent_ms = None
+        self._node.nmt.state = "INITIALISING"
+        self._node.nmt.state = "PRE-OPERATIONAL"
 
     def _statusword(self) -> int:
         return _LOW[self.state] | (0x200 if self._operational else 0)
@@ -222,6 +279,10 @@ class Epos4Fake:
             self._node.set_data(entry >> 16, entry >> 8 & 0xFF, data[:size])
             data = data[size:]
 
+    def _store_all(self, objects: dict[tuple[int, int], int]) -> None:
+        for (index, subindex), value in objects.items():
+            self._store(index, subindex, value)
+
     def _store(self, index: int, subindex: int, value: int) -> None:
         variable = self._node.object_dictionary.get_variable(index, subindex)
         assert variable is not None, f"{index:#x}:{subindex}"  # noqa: S101
@@ -235,57 +296,7 @@ class Epos4Fake:
         return value
 
 
-class _FrameNetwork(canopen.Network):
-    """Keeps the frames to be sent; what is periodic comes by ticks."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.out: list[CanFrame] = []
-        self._tasks: list[_Periodic] = []
-
-    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        self.out.append(CanFrame(can_id, bytes(data)))
-
-    def send_periodic(  # type: ignore[override]
-        self, can_id: int, data: bytes, period: float, remote: bool = False
-    ) -> "_Periodic":
-        task = _Periodic(self, can_id, data, round(period * 1000))
-        self._tasks.append(task)
-        return task
-
-    def drop(self, task: "_Periodic") -> None:
-        self._tasks.remove(task)
-
-    def advance(self) -> None:
-        """Let 1 ms pass."""
-        for task in self._tasks:
-            task.advance()
-
-
-class _Periodic:
-    """A frame that is sent again and again."""
-
-    def __init__(self, network: _FrameNetwork, can_id: int, data: bytes, period_ms: int) -> None:
-        self._network = network
-        self._can_id = can_id
-        self._data = data
-        self._period_ms = period_ms
-        self._elapsed_ms = 0
-
-    def advance(self) -> None:
-        self._elapsed_ms += 1
-        if self._elapsed_ms >= self._period_ms:
-            self._elapsed_ms = 0
-            self._network.send_message(self._can_id, self._data)
-
-    def update(self, data: bytes) -> None:
-        self._data = data
-
-    def stop(self) -> None:
-        self._network.drop(self)
-
-
-def _factory() -> dict[tuple[int, int], int]:
+def _factory(node_id: int) -> dict[tuple[int, int], int]:
     """Return the objects a drive comes with: a motor of 700 mA and 17.8 mN m/A."""
     objects = {
         (0x1000, 0): 0x00020192,
@@ -298,13 +309,17 @@ def _factory() -> dict[tuple[int, int], int]:
         (0x1018, 2): 0x63500000,
         (0x1018, 3): 0x01700000,
         (0x1018, 4): 0x00C0FFEE,
+        (0x1029, 0): 1,
+        (0x1029, 1): 0,
         (0x2200, 1): 240,
         (0x3001, 1): 700,
         (0x3001, 2): 1400,
         (0x3001, 3): 1,
         (0x3001, 4): 86,
         (0x3001, 5): 17_800,
+        (0x6007, 0): 3,
         (0x603F, 0): 0,
+        (0x605E, 0): 2,
         (0x6040, 0): 0,
         (0x6060, 0): 0,
         (0x6061, 0): 0,
@@ -314,7 +329,7 @@ def _factory() -> dict[tuple[int, int], int]:
     }
     for number in range(4):
         for communication, mapping, cob in ((0x1400, 0x1600, 0x200), (0x1800, 0x1A00, 0x180)):
-            objects[communication + number, 1] = cob + 0x100 * number + 1
+            objects[communication + number, 1] = cob + 0x100 * number + node_id
             objects[communication + number, 2] = protocol.EVENT_DRIVEN
             objects[mapping + number, 0] = 0
     return objects

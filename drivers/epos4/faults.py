@@ -1,6 +1,8 @@
 """An EPOS4's error codes in plain words: what happened, why, what to do.
 
-Source: the error list of maxon's EPOS4 firmware, as found in two public drivers that agree.
+Source: the error list of maxon's EPOS4 firmware, as found in two public drivers that agree and in
+the transcription of the 2026 firmware specification in the public library `Imcab/EposLib`; where
+they differ (0x738A to 0x738D), the specification.
 """
 
 from drivers.errors import DriverError
@@ -25,6 +27,8 @@ ERRORS: dict[int, tuple[str, str, str]] = {
     0x4210: ("The power stage is too hot.", "", _LOAD),
     0x4380: ("The motor is too hot.", "Its I2t model has reached the limit.", _LOAD),
     0x5113: ("The logic supply is too low.", "", _SUPPLY),
+    0x5281: ("The hardware's parts do not fit one another.", "", _MAKER),
+    0x5282: ("The STO card was not recognised.", "It is not fully in.", "Push the card in fully."),
     0x6080: ("The sign of life is missing.", "", _BUS),
     0x6081: ("The external watchdog ran out.", "", _BUS),
     0x6320: ("A parameter is out of range.", "", _SETTINGS),
@@ -35,8 +39,13 @@ ERRORS: dict[int, tuple[str, str, str]] = {
     0x7382: ("The encoder's index is wrong.", "", _SENSOR),
     0x7388: ("The Hall sensors' pattern is wrong.", "", _SENSOR),
     0x7389: ("The Hall sensors' sequence is wrong.", "", _SENSOR),
-    0x738A: ("The SSI sensor does not answer well.", "", _SENSOR),
-    0x738C: ("The SSI sensor's frames are wrong.", "", _SENSOR),
+    0x738A: (
+        "Encoder and Hall sensors disagree on the angle.",
+        "A wire is wrong, a sensor is defective, or resolution or pole pairs do not fit.",
+        _SENSOR,
+    ),
+    0x738C: ("The SSI sensor could not be read.", "", _SENSOR),
+    0x738D: ("The SSI sensor's frames are wrong.", "Their start or stop bits do not fit.", _SENSOR),
     0x8110: ("The drive lost CAN frames.", "Its receive buffer overran.", _BUS),
     0x8111: ("The drive lost CAN frames.", "A receive buffer overran.", _BUS),
     0x8120: ("The drive's CAN is error passive.", "Many frames are damaged.", _BUS),
@@ -64,13 +73,13 @@ ERRORS: dict[int, tuple[str, str, str]] = {
 """What, why and what to do, by error code."""
 
 _RANGES: tuple[tuple[range, tuple[str, str, str]], ...] = (
-    (range(0x1080, 0x1084), ("The drive did not start properly.", "", _MAKER)),
-    (range(0x5280, 0x5282), ("The drive's hardware failed.", "", _MAKER)),
+    (range(0x1080, 0x1089), ("The drive did not start properly.", "", _MAKER)),
+    (range(0x5280, 0x5281), ("The drive's hardware failed.", "", _MAKER)),
     (range(0x5480, 0x5484), ("The drive's hardware failed.", "", _MAKER)),
-    (range(0x6180, 0x6191), ("The drive's firmware failed.", "", _MAKER)),
+    (range(0x6180, 0x61F1), ("The drive's firmware failed.", "", _MAKER)),
     (range(0x7390, 0x7393), ("A position sensor failed.", "", _SENSOR)),
     (range(0x8180, 0x8184), ("The drive's EtherCAT failed.", "", _BUS)),
-    (range(0xFF12, 0xFF22), ("Auto-tuning failed.", "", "Tune again with the axis free to move.")),
+    (range(0xFF11, 0xFF25), ("Auto-tuning failed.", "", "Tune again with the axis free to move.")),
 )
 
 
@@ -99,5 +108,5 @@ def explain(code: int) -> tuple[str, str, str]:
 def fault(code: int) -> DriveFaultError:
     """Return the error of an error code."""
     what, why, fix = explain(code)
-    then = "Then clear the fault and arm again."
+    then = "Then clear the fault (rig clear) and arm again."
     return DriveFaultError(f"{what} (error {code:#06x})", why, f"{fix} {then}".strip(), code)

@@ -20,9 +20,16 @@ PDO_INVALID = 1 << 31
 SYNCHRONOUS, EVENT_DRIVEN = 1, 255
 """Transmission types: at every SYNC; at once."""
 
-NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
-OPERATIONAL, PRE_OPERATIONAL = 5, 127
+NMT_START, NMT_PRE_OPERATIONAL, NMT_RESET_COMMUNICATION = 0x01, 0x80, 0x82
+STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 """Network states, as in a heartbeat."""
+
+DISABLE_ON_LOST_HOST = 2
+"""0x6007: voltage off when the connection is lost; 3 brakes along the quick stop's ramp."""
+DISABLE_ON_FAULT = 0
+"""0x605E: voltage off at a fault; 1 and 2 brake along a ramp."""
+PRE_OPERATIONAL_ON_LOST_HOST = 0
+"""0x1029:1: objects can still be read and written; 1 stays operational, 2 stops the node."""
 
 SHUTDOWN, ENABLE_OPERATION, DISABLE_VOLTAGE, FAULT_RESET = 0x06, 0x0F, 0x00, 0x80
 """Controlwords."""

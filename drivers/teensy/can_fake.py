@@ -5,7 +5,7 @@ from drivers.framing import cobs_decode, cobs_encode
 from drivers.teensy.can_device import TeensyCanDevice
 from drivers.teensy.can_segments import BOARD_ID, HOST_ID, Joiner, Splitter
 from drivers.teensy.can_transport import CanTransport
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.faulty import Faults
@@ -46,5 +46,5 @@ class BoardNode:
 
 def open_fake(faults: Faults) -> Device:
     """Open the device on a fake board behind a CAN bus with faults."""
-    bus = SimulatedCanBus([BoardNode(TeensyFake(HandMovedBench()))])
+    bus = SimulatedCanBus([BoardNode(PythonBoard(HandMovedBench()))])
     return TeensyCanDevice(CanTransport(FaultyCanBus(bus, faults)))

@@ -5,6 +5,10 @@ tick: between two commands everything but a limit is known ahead, so one call of
 bulk encode do for as many ticks. `firmware/core/board.hpp` is the twin that runs tick by tick; a
 test holds the two against each other byte for byte.
 
+For simulation only, where there is no compiler. The guards that hold encoders and current against
+one another (trips 15 to 19) are in the compiled core alone: this board takes their limits and does
+not hold them.
+
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
@@ -78,8 +82,8 @@ class Bench(Protocol):
         ...
 
 
-class TeensyFake:
-    """A logger board on a bench, with the interface of `drivers.transport.simulated.Board`.
+class PythonBoard:
+    """A board for simulation on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
         bench: The physics.

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from drivers.device import Device
 from drivers.teensy.device import TeensyDevice
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.guard import (
     COLUMNS,
     CURRENT,
@@ -53,5 +53,5 @@ class HandMovedBench:
 
 def open_fake(faults: Faults) -> Device:
     """Open the device on a fake board behind a cable with faults."""
-    board = SimulatedTransport(TeensyFake(HandMovedBench()), "sim://teensy")
+    board = SimulatedTransport(PythonBoard(HandMovedBench()), "sim://teensy")
     return TeensyDevice(FaultyTransport(board, faults))

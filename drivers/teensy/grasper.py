@@ -14,6 +14,7 @@ from drivers.teensy.protocol import (
     CHOICE_NAMES,
     GAIN_NAMES,
     HEADER_FIELDS,
+    LOOP_LIMIT_NAMES,
     MOTOR_LIMIT_NAMES,
     SAMPLE_FIELDS,
     TOP,
@@ -25,7 +26,14 @@ from drivers.teensy.protocol import (
 MOTORS = (1, 2, 3)
 INPUT_NAMES = tuple(f"{what}_{k}" for what in ("motor", "current", "force") for k in MOTORS)
 """Fields of a sample a trip can name, in the order of its channel number."""
-AXIS_LIMIT_NAMES = ("max_current", "max_force", "min_motor", "max_motor", *MOTOR_LIMIT_NAMES)
+AXIS_LIMIT_NAMES = (
+    "max_current",
+    "max_force",
+    "min_motor",
+    "max_motor",
+    *MOTOR_LIMIT_NAMES,
+    *LOOP_LIMIT_NAMES,
+)
 
 GRASPER = Profile(
     "grasper",
@@ -67,6 +75,15 @@ class AxisLimits:
         i2t: Heat above it that the motor can take, counts^2 s.
         stall_current: Current, counts, above which a motor that does not move is stalled.
         stall_motion: Motor counts within which it does not move.
+        max_motor_jump: This and the following as in `drivers.teensy.reference.Limits`.
+        max_following: Farthest the motor may be from its target, counts.
+        following_ticks: How long it may be farther.
+        full_scale_current: Measured current at a command of 10000, counts; 0 for no comparison.
+        current_offset: Measured current at a command of 0, counts.
+        max_current_error: Largest difference of measured and commanded current, counts.
+        current_ticks: Ticks over which that difference is averaged.
+        frozen_current: Change of the current behind which a still motor has a dead encoder, counts.
+        frozen_motion: Motor counts within which it is still.
     """
 
     max_current: int = TOP
@@ -78,6 +95,15 @@ class AxisLimits:
     i2t: int = TOP
     stall_current: int = TOP
     stall_motion: int = 0
+    max_motor_jump: int = TOP
+    max_following: int = TOP
+    following_ticks: int = TOP
+    full_scale_current: int = 0
+    current_offset: int = 0
+    max_current_error: int = TOP
+    current_ticks: int = 1
+    frozen_current: int = TOP
+    frozen_motion: int = 0
 
     @property
     def valid(self) -> bool:
@@ -85,6 +111,9 @@ class AxisLimits:
         sizes = (self.max_current, self.max_force, self.max_motor_step, self.continuous_current)
         return (
             min(*sizes, self.i2t, self.stall_current, self.stall_motion) >= 0
+            and min(self.max_motor_jump, self.max_following, self.max_current_error) >= 0
+            and min(self.frozen_current, self.frozen_motion) >= 0
+            and min(self.following_ticks, self.current_ticks) >= 1
             and self.min_motor <= self.max_motor
         )
 
@@ -117,6 +146,6 @@ class GrasperLimits:
         return all(axis.valid for axis in self.axes) and choice_is_valid(self)
 
     def as_array(self) -> NDArray[np.int64]:
-        """Return the limits in the order of the wire, shape (33,)."""
+        """Return the limits in the order of the wire, shape (60,)."""
         axes, *choice = astuple(self)
         return np.array([*(limit for axis in axes for limit in axis), *choice], np.int64)

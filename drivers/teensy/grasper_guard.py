@@ -284,4 +284,4 @@ GRASPER_LOGIC = BoardLogic(
     converted={CURRENT + k: (INT16_MIN, INT16_MAX) for k in range(MOTORS)}
     | {FORCE + k: (-TOP - 1, FORCE_MAX) for k in range(MOTORS)},
 )
-"""What `drivers.teensy.fake.TeensyFake` does a tick on the grasper."""
+"""What `drivers.teensy.fake.PythonBoard` does a tick on the grasper."""

@@ -281,4 +281,4 @@ REFERENCE_LOGIC = BoardLogic(
     status_column=STATUS,
     converted={PROXIMAL: INT16, DISTAL: INT16, CURRENT: INT16, FSR: (-(2**32), FSR_MAX)},
 )
-"""What `drivers.teensy.fake.TeensyFake` does a tick on the reference rig."""
+"""What `drivers.teensy.fake.PythonBoard` does a tick on the reference rig."""

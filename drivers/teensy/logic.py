@@ -1,4 +1,4 @@
-"""What a board in Python does a tick, by profile: the part of `TeensyFake` that is not the same."""
+"""What a board in Python does a tick, by profile: the part of `PythonBoard` that differs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

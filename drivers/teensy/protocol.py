@@ -69,6 +69,11 @@ class Trip(IntEnum):
     SENSOR_MISSING = 12
     MOTOR_TRAVEL = 13
     OVER_FORCE = 14
+    ENCODERS_DISAGREE = 15
+    FOLLOWING_ERROR = 16
+    CURRENT_MISMATCH = 17
+    ENCODER_JUMP = 18
+    ENCODER_FROZEN = 19
 
 
 class SafeState(IntEnum):
@@ -119,6 +124,18 @@ MOTOR_LIMIT_NAMES = (
     "stall_motion",
 )
 """What is watched over time of every motor with a position loop."""
+LOOP_LIMIT_NAMES = (
+    "max_motor_jump",
+    "max_following",
+    "following_ticks",
+    "full_scale_current",
+    "current_offset",
+    "max_current_error",
+    "current_ticks",
+    "frozen_current",
+    "frozen_motion",
+)
+"""What a motor's position loop is believed by, see `drivers.teensy.reference.Limits`."""
 CHOICE_NAMES = (
     "stall_ticks",
     "saturated_ticks",
@@ -133,7 +150,7 @@ TRIP_REPORT_DTYPE = layout(
     *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
 
-FIRMWARE_VERSION = 0x000300
+FIRMWARE_VERSION = 0x000400
 """Version of the firmware that goes with this program: major, minor, patch, one byte each."""
 
 

@@ -13,6 +13,7 @@ from drivers.teensy.protocol import (
     CHOICE_NAMES,
     GAIN_NAMES,
     HEADER_FIELDS,
+    LOOP_LIMIT_NAMES,
     MOTOR_LIMIT_NAMES,
     SAMPLE_FIELDS,
     TOP,
@@ -53,6 +54,18 @@ LIMIT_NAMES = (
     "min_jaw",
     "max_jaw",
     *MOTOR_LIMIT_NAMES,
+    *LOOP_LIMIT_NAMES,
+    "motor_per_turn",
+    "spindle_per_turn",
+    "jaw_per_turn",
+    "twist_e6",
+    "stretch_e6",
+    "max_twist",
+    "max_stretch",
+    "max_spindle_jump",
+    "max_jaw_jump",
+    "torque_e3",
+    "max_still_torque",
     *CHOICE_NAMES,
 )
 ARM_DTYPE = layout(
@@ -96,6 +109,30 @@ class Limits:
             squared less the continuous one squared, never below 0.
         stall_current: Current, counts, above which a motor that does not move is stalled.
         stall_motion: Motor counts within which it does not move.
+        max_motor_jump: Farthest the motor's count may go in one tick.
+        max_following: Farthest the spindle may be from its target, counts.
+        following_ticks: How long it may be farther.
+        full_scale_current: Measured current at a command of 10000, counts, signed; 0 where current
+            and command are not compared.
+        current_offset: Measured current at a command of 0, counts.
+        max_current_error: Largest difference between measured and commanded current, counts.
+        current_ticks: Ticks over which that difference is averaged.
+        frozen_current: Change of the current, counts, behind which a motor that did not move has a
+            dead encoder.
+        frozen_motion: Motor counts within which it did not move.
+        motor_per_turn: Counts of the motor, signed, for a turn of the spindle; motor and spindle
+            are not compared where this is 0, jaw and spindle where `jaw_per_turn` is.
+        spindle_per_turn: Counts of the spindle, signed, for the same turn.
+        jaw_per_turn: Counts of the jaw, signed, for the same turn.
+        twist_e6: Counts the motor is ahead for 1e6 counts of proximal torque, signed.
+        stretch_e6: Counts the jaw is ahead for 1e6 counts of distal torque, signed.
+        max_twist: Largest span of what motor and spindle differ by otherwise, motor counts.
+        max_stretch: The same of jaw and spindle, jaw counts.
+        max_spindle_jump: Farthest the spindle's count may go in one tick.
+        max_jaw_jump: Farthest the jaw's count may go in one tick.
+        torque_e3: Proximal counts, signed, that 1000 counts of current make at rest; 0 where they
+            are not compared.
+        max_still_torque: Largest difference of both while the motor stands still, proximal counts.
         stall_ticks: How long it may be stalled.
         saturated_ticks: How long a torque or current count may be at the end of its range.
         stale_ticks: How long a torque or current count may stay the same.
@@ -118,6 +155,26 @@ class Limits:
     i2t: int = TOP
     stall_current: int = TOP
     stall_motion: int = 0
+    max_motor_jump: int = TOP
+    max_following: int = TOP
+    following_ticks: int = TOP
+    full_scale_current: int = 0
+    current_offset: int = 0
+    max_current_error: int = TOP
+    current_ticks: int = 1
+    frozen_current: int = TOP
+    frozen_motion: int = 0
+    motor_per_turn: int = 0
+    spindle_per_turn: int = 0
+    jaw_per_turn: int = 0
+    twist_e6: int = 0
+    stretch_e6: int = 0
+    max_twist: int = TOP
+    max_stretch: int = TOP
+    max_spindle_jump: int = TOP
+    max_jaw_jump: int = TOP
+    torque_e3: int = 0
+    max_still_torque: int = TOP
     stall_ticks: int = TOP
     saturated_ticks: int = TOP
     stale_ticks: int = TOP
@@ -137,14 +194,18 @@ class Limits:
             *(self.max_current, self.max_load_ma, self.max_proximal, self.max_distal),
             *(self.max_motor_step, self.continuous_current, self.i2t),
             *(self.stall_current, self.stall_motion),
+            *(self.max_motor_jump, self.max_following, self.max_current_error),
+            *(self.frozen_current, self.frozen_motion, self.max_twist, self.max_stretch),
+            *(self.max_spindle_jump, self.max_jaw_jump, self.max_still_torque),
         )
         return (
             min(sizes) >= 0
+            and min(self.following_ticks, self.current_ticks) >= 1
             and self.min_spindle <= self.max_spindle
             and self.min_jaw <= self.max_jaw
             and choice_is_valid(self)
         )
 
     def as_array(self) -> NDArray[np.int64]:
-        """Return the limits in the order of the wire, shape (19,)."""
+        """Return the limits in the order of the wire, shape (39,)."""
         return np.array(astuple(self), np.int64)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.device import Device
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, run_ticks
 from drivers.teensy_master.driver import TeensyMaster
@@ -41,6 +41,6 @@ class TurnedByHand:
 
 def open_fake(faults: Faults) -> Device:
     """Open the master on a fake board behind a cable with faults."""
-    board = TeensyFake(TurnedByHand(), logic=GRASPER_LOGIC)
+    board = PythonBoard(TurnedByHand(), logic=GRASPER_LOGIC)
     link = SimulatedTransport(board, "sim://teensy-master", tick_s=GRASPER.tick_us * 1e-6)
     return TeensyMaster(FaultyTransport(link, faults))

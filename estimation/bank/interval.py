@@ -4,7 +4,9 @@ The width follows the state: a linear fit of the absolute error on a few product
 so that the wanted share of the errors on left-out runs lies inside. Since the run's offset is the
 larger part of the error, a run lies wholly inside, or has a tail outside; the share holds over runs
 like those fitted, not within each. Runs are the units that can be exchanged, so of R runs the
-quantile is taken at coverage x (1 + 1 / R), as conformal prediction does for R samples.
+quantile is taken at coverage x (1 + 1 / R), as conformal prediction does for R samples. Where runs
+state conditions, the width is raised so that the share holds too on the lowest and highest level of
+each condition, left out in turn (`edges`, `widened`).
 
 Source: locally weighted split conformal prediction, J. Lei et al., "Distribution-free predictive
 inference for regression", Journal of the American Statistical Association 113 (2018), section 5.2.
@@ -91,6 +93,28 @@ def rescaled(
     level = min(coverage * (1 + 1 / len(designs)), 1.0)
     factor = max(float(np.quantile(np.abs(np.concatenate(residuals)) / widths, level)), 1.0)
     return Interval(source.columns, factor * source.weights, factor * source.least)
+
+
+def widened(
+    interval: Interval,
+    designs: Sequence[FloatArray],
+    residuals: Sequence[FloatArray],
+    coverage: float = COVERAGE,
+) -> Interval:
+    """Return an interval that covers a share of the errors beyond the edges; never a narrower one.
+
+    Args:
+        interval: The interval of runs like those fitted.
+        designs: Design of each run at an extreme level of a condition, shape (n, size).
+        residuals: Its error by weights fitted without that level, shape (n,).
+        coverage: The share.
+    """
+    ratio = [
+        np.abs(residual) / interval.half_width(design)
+        for design, residual in zip(designs, residuals, strict=True)
+    ]
+    factor = max(float(np.quantile(np.concatenate(ratio), coverage)), 1.0)
+    return Interval(interval.columns, factor * interval.weights, factor * interval.least)
 
 
 def calibrate(

@@ -11,9 +11,10 @@ from estimation.diagnosis.design import Mapper, Run, tables, targets
 from estimation.diagnosis.evidence import resampled
 from estimation.diagnosis.least_squares import least_squares
 from estimation.diagnosis.paths import path_of
-from estimation.fitting import OFFSET
+from estimation.fitting import OFFSET, interval95
 from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray
+from estimation.within_bounds import solve_within
 
 NUDGE = 0.02
 """Step of a numerical derivative by a shape, in steps of its grid."""
@@ -188,17 +189,21 @@ def intervals(
 ) -> list[dict[str, Estimate]]:
     """Return every effect's parameters with 95 % intervals of a bootstrap over runs.
 
-    Each replicate takes one Gauss-Newton step from the fit in amplitudes and shapes together.
+    Each replicate takes one Gauss-Newton step from the fit in amplitudes and shapes together, and
+    keeps the amplitudes within their bounds: a bound that is active in the fit would else shift the
+    other parameters of every replicate.
     """
     weights = balance.solve(terms)
+    amplitudes = [p for term in terms for p in term.effect.amplitudes]
     tables_ = zip(balance.base(terms), balance.left(terms), strict=True)
     products = [np.column_stack(pair).T @ np.column_stack(pair) for pair in tables_]
     moved = np.full((count, len(products[0]) - 1), np.nan)
+    low, high = np.full(moved.shape[1], -np.inf), np.full(moved.shape[1], np.inf)
+    low[: len(weights)] = [p.lower for p in amplitudes] - weights
+    high[: len(weights)] = [p.upper for p in amplitudes] - weights
     for row, weight in enumerate(resampled(len(products), count, seed)):
         total = np.tensordot(weight, products, axes=1)
-        scale = np.sqrt(np.maximum(np.diag(total)[:-1], np.finfo(float).tiny))
-        normal = total[:-1, :-1] / np.outer(scale, scale)
-        moved[row] = linalg.lstsq(normal, total[:-1, -1] / scale)[0] / scale
+        moved[row] = solve_within(total[:-1, :-1], total[:-1, -1], low, high)
     values: list[dict[str, Estimate]] = []
     linear, at = len(weights), 0
     place = linear
@@ -240,8 +245,7 @@ def as_model(
 
 
 def _estimate(value: float, replicates: FloatArray) -> Estimate:
-    low, high = np.percentile(replicates, [2.5, 97.5])
-    return Estimate(value, float(replicates.std(ddof=1)), (float(low), float(high)))
+    return Estimate(value, float(replicates.std(ddof=1)), interval95(value, replicates))
 
 
 def _gram(columns: Sequence[FloatArray], target: Sequence[FloatArray]) -> FloatArray:

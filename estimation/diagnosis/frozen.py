@@ -13,6 +13,7 @@ from estimation.diagnosis.maps import RIDGE, Map
 from estimation.diagnosis.result import Error
 from estimation.diagnosis.turning import turned
 from estimation.recording import FloatArray
+from estimation.within_bounds import solve_within
 
 ROUNDS = 30
 SETTLED = 1e-5
@@ -99,12 +100,13 @@ def _with_maps(balance: Balance, terms: Sequence[Candidate], maps: Sequence[Map]
         flat = [t - t.mean(axis=0) if balance.demean else t for t in thin]
         rows.append(np.hstack([columns, *flat]))
     whole, aim = np.vstack(rows), np.concatenate(balance.target)
-    scale = np.sqrt(np.maximum(np.einsum("nk,nk->k", whole, whole), np.finfo(float).tiny))
+    squared = np.maximum(np.einsum("nk,nk->k", whole, whole), np.finfo(float).tiny)
     own = balance.columns(terms)[0].shape[1]
-    pull = np.diag(np.concatenate([np.full(own, 1e-9), np.full(len(scale) - own, RIDGE)]))
-    normal = (whole.T @ whole) / np.outer(scale, scale) + pull
-    weights: FloatArray = np.linalg.solve(normal, (whole.T @ aim) / scale) / scale
-    return weights
+    pull = squared * np.concatenate([np.full(own, 1e-9), np.full(len(squared) - own, RIDGE)])
+    low, high = np.full(len(squared), -np.inf), np.full(len(squared), np.inf)
+    amplitudes = [p for term in terms for p in term.effect.amplitudes]
+    low[:own], high[:own] = [p.lower for p in amplitudes], [p.upper for p in amplitudes]
+    return solve_within(whole.T @ whole + np.diag(pull), whole.T @ aim, low, high)
 
 
 def squares(frozen: Frozen, runs: Sequence[Run], at_rest: bool = False) -> FloatArray:

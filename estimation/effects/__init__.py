@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
 from estimation.effects.unknown_product import FORMS, product
-from estimation.errors import EstimationError
+from estimation.errors import UnknownNameError
 
 __all__ = [
     "Effect",
@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 
-class UnknownEffectError(EstimationError):
+class UnknownEffectError(UnknownNameError):
     """No file of the catalogue holds the effect asked for."""
 
 

@@ -23,8 +23,9 @@ from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import rescaled
 from estimation.bank.states import LAGS, Bank
 from estimation.closing import is_closing, processed
-from estimation.estimators.bank import EVERY, BankEstimator, RunEvidence, fit_runs
+from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.network import NetworkEstimator
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.networks import training
 from estimation.networks.network import NetworkError, to_unit
 from estimation.recording import FloatArray, Recording
@@ -162,7 +163,9 @@ def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEs
     lowest = np.min([source.ranges[0], *(run.ranges[0] for run in runs)], axis=0)
     highest = np.max([source.ranges[1], *(run.ranges[1] for run in runs)], axis=0)
     ranges = np.array([lowest, highest])
-    return replace(source, weights=weights, interval=interval, ranges=ranges, instrument="")
+    return replace(
+        source, weights=weights, interval=interval, ranges=ranges, instrument="", origin=None
+    )
 
 
 def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> NetworkEstimator:
@@ -177,7 +180,7 @@ def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> Netw
     stiff[0] = 0.0
     scale = np.full(len(prior), NODE_SPREAD)
     moved = np.roll(pull(normals, prior, scale, stiff), -1)
-    return replace(source, network=replace(network, output=moved[None]), instrument="")
+    return replace(source, network=replace(network, output=moved[None]), instrument="", origin=None)
 
 
 def stiffness(bank: Bank) -> FloatArray:

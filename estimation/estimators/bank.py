@@ -8,17 +8,19 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.bank.fitting import Normal, Pool, Settings, chosen, solve
-from estimation.bank.interval import COVERAGE, Interval, calibrate
+from estimation.bank.edges import edges
+from estimation.bank.fitting import Pool, Settings, chosen, solve
+from estimation.bank.interval import COVERAGE, Interval, calibrate, widened
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
+from estimation.estimators.origin import Origin
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.recording import FloatArray, Recording, read_only
-from estimation.scores import Score, score
 
 INNER_FOLDS = 5
 EVERY = 4
@@ -53,6 +55,7 @@ class BankEstimator:
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
+        origin: Where it comes from; None where nobody stated it.
     """
 
     SCHEMA: ClassVar[str] = "rig.bank/3"
@@ -65,6 +68,7 @@ class BankEstimator:
     scale: FloatArray
     instrument: str = ""
     low_pass: LowPass = PAPER
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         for name, shape in {
@@ -128,6 +132,7 @@ class BankEstimator:
     def save(self, path: Path) -> None:
         """Write the estimator as NPZ."""
         interval = {} if self.interval is None else self.interval.arrays()
+        origin = {} if self.origin is None else self.origin.arrays()
         write_arrays(
             path,
             self.SCHEMA,
@@ -142,6 +147,7 @@ class BankEstimator:
                 "scale": self.scale,
                 "low_pass": np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)]),
                 **interval,
+                **origin,
             },
         )
 
@@ -169,6 +175,7 @@ class BankEstimator:
                 arrays["scale"],
                 str(arrays["instrument"]),
                 LowPass(cutoff_hz, int(order)),
+                Origin.from_arrays(arrays),
             )
         except (KeyError, ValueError) as error:
             raise NetworkError(f"The file {path} holds no state estimator.", str(error)) from error
@@ -211,41 +218,6 @@ def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> Float
     return np.column_stack([channels[name] for name in bank.channels])
 
 
-@dataclass(frozen=True, eq=False)
-class RunEvidence:
-    """Samples of one run to fit: every fourth valid closing one.
-
-    Attributes:
-        design: The bank's products, shape (n, size).
-        truth: The target without lag, shape (n,).
-        normal: The run's share in the normal equations.
-        ranges: Lowest and highest value of each judged channel, shape (2, judged).
-    """
-
-    design: FloatArray
-    truth: FloatArray
-    normal: Normal
-    ranges: FloatArray
-
-    @classmethod
-    def of_rows(cls, bank: Bank, rows: FloatArray, truths: FloatArray) -> "list[RunEvidence]":
-        """Return the evidence for each target; they share what is made of the rows.
-
-        Args:
-            bank: The states and products.
-            rows: Filtered channels of the samples to fit, shape (n, channels).
-            truths: The targets, shape (n, targets).
-        """
-        design = bank.design(rows)
-        judged = rows[:, : bank.judged]
-        ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
-        whole = Normal.of(design, truths)
-        return [
-            cls(design, truth, whole.only(k), ranges)
-            for k, truth in enumerate(np.ascontiguousarray(truths.T))
-        ]
-
-
 def fit_runs(
     runs: Sequence[RunEvidence],
     bank: Bank,
@@ -277,10 +249,29 @@ def fit_runs(
             run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
         ]
         interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
+        interval = _beyond_edges(interval, runs, whole, bank, settings, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
     weights = solve(whole, bank.shape, settings or Settings())[:, 0]
     return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
+
+
+def _beyond_edges(
+    interval: Interval,
+    runs: Sequence[RunEvidence],
+    whole: Pool,
+    bank: Bank,
+    settings: Settings,
+    coverage: float,
+) -> Interval:
+    """Return the interval raised to the errors on extreme levels left out in turn."""
+    designs, residuals = [], []
+    for level in edges([run.conditions for run in runs], INNER_FOLDS):
+        rest = whole.without(Pool.of([runs[k].normal for k in level]))
+        weights = solve(rest, bank.shape, settings)[:, 0]
+        designs += [runs[k].design for k in level]
+        residuals += [runs[k].design @ weights - runs[k].truth for k in level]
+    return widened(interval, designs, residuals, coverage) if designs else interval
 
 
 @dataclass(frozen=True)
@@ -336,29 +327,6 @@ class BankRecipe:
         if self.causal:
             source = causal_channels(recording, bank.channels, self.low_pass, tracked=True)
         truths = run[self.target][kept, None]
-        (evidence,) = RunEvidence.of_rows(bank, rows_of(source, bank)[kept], truths)
+        rows = rows_of(source, bank)[kept]
+        (evidence,) = RunEvidence.of_rows(bank, rows, truths, recording.conditions)
         return evidence
-
-
-def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int) -> Score:
-    """Return the error on runs not fitted, each held out once; flagged samples are left out.
-
-    Args:
-        recipe: What is fitted.
-        campaign: The runs; excluded ones are left out.
-        folds: Number of folds, at least 2.
-        seed: Seed of the folds.
-
-    Raises:
-        NetworkError: There is no closing sample to fit.
-    """
-    found = [recipe.evidence_of(recording) for recording in campaign.evidence]
-    runs = [run for run in found if run is not None]
-    order = np.random.default_rng(seed).permutation(len(runs))
-    estimates, truths = [], []
-    for held_out in (order[k::folds] for k in range(folds)):
-        rest = [run for k, run in enumerate(runs) if k not in held_out]
-        weights = fit_runs(rest, recipe.bank, recipe.target, recipe.settings).weights
-        estimates += [runs[k].design @ weights for k in held_out]
-        truths += [runs[k].truth for k in held_out]
-    return score(np.concatenate(estimates), np.concatenate(truths))

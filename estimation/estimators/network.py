@@ -12,6 +12,7 @@ from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
+from estimation.estimators.origin import Origin
 from estimation.filters import PAPER, LowPass
 from estimation.networks import network as files
 from estimation.networks.network import Network
@@ -38,6 +39,7 @@ class NetworkEstimator:
         network: The network; its inputs are channel names, its one output the target.
         low_pass: Filter of every channel.
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
+        origin: Where it comes from; None where nobody stated it.
     """
 
     SCHEMA: ClassVar[str] = "rig.estimator/1"
@@ -45,6 +47,7 @@ class NetworkEstimator:
     network: Network
     low_pass: LowPass = PAPER
     instrument: str = ""
+    origin: Origin | None = None
 
     @property
     def target(self) -> str:
@@ -84,7 +87,8 @@ class NetworkEstimator:
         """Return the estimator as named arrays; `from_arrays` gives it back."""
         processing = np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)])
         own = {"low_pass": processing, "instrument": np.array(self.instrument)}
-        return {**own, **files.to_arrays(self.network)}
+        origin = {} if self.origin is None else self.origin.arrays()
+        return {**own, **origin, **files.to_arrays(self.network)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> "NetworkEstimator":
@@ -98,7 +102,12 @@ class NetworkEstimator:
         if processing.shape != (2,):
             raise files.NetworkError("The network's file does not state its filter.")
         instrument = str(arrays.get("instrument", ""))
-        return cls(network, LowPass(float(processing[0]), int(processing[1])), instrument)
+        try:
+            origin = Origin.from_arrays(arrays)
+        except ValueError as error:
+            raise files.NetworkError("The network's file is damaged.", str(error)) from error
+        low_pass = LowPass(float(processing[0]), int(processing[1]))
+        return cls(network, low_pass, instrument, origin)
 
     def save(self, path: Path) -> None:
         """Write the estimator as NPZ."""

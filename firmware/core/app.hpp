@@ -6,6 +6,7 @@
 //   void drive(const Profile::Outputs&);                   set values of the motors
 //   std::size_t read(std::uint8_t* out, std::size_t room);  bytes from the host, without waiting
 //   std::size_t write(const std::uint8_t*, std::size_t);    takes what it can without waiting
+//   void feed();                                           keeps the chip's own watchdog from resetting it
 //   class Lock;                                            keeps the tick out while it lives
 #pragma once
 
@@ -13,6 +14,7 @@
 #include <cstdint>
 
 #include "board.hpp"
+#include "liveness.hpp"
 
 namespace rig {
 
@@ -24,6 +26,7 @@ class App {
     // Once every Profile::kTickUs, from the sampling timer.
     void tick(std::uint32_t tick_us) {
         hardware_.drive(board_.tick(tick_us, hardware_.sample()));
+        if (liveness_.ticked()) hardware_.feed();
     }
     void tick() { tick(hardware_.now_us()); }
 
@@ -37,6 +40,7 @@ class App {
         }
         if (first_ == last_) fill();
         if (first_ < last_) first_ += hardware_.write(waiting_ + first_, last_ - first_);
+        liveness_.turned();
     }
 
   private:
@@ -50,6 +54,7 @@ class App {
 
     Hardware& hardware_;
     Board<Profile, TransmitCapacity> board_;
+    Liveness liveness_;
     std::uint8_t waiting_[kChunk] = {};
     std::size_t first_ = 0;
     std::size_t last_ = 0;

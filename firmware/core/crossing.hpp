@@ -20,4 +20,9 @@ struct Crossing {
 
 constexpr std::int64_t magnitude(std::int64_t value) { return value < 0 ? -value : value; }
 
+// INT32_MAX is no limit: a difference of two counts can be larger.
+constexpr bool exceeds(std::int64_t value, std::int32_t limit) {
+    return limit != INT32_MAX && magnitude(value) > limit;
+}
+
 }  // namespace rig

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "control.hpp"
+#include "loop_guard.hpp"
 #include "motor_guard.hpp"
 #include "safety_choice.hpp"
 #include "sensor_guard.hpp"
@@ -19,23 +20,30 @@ class GrasperProfile {
     static constexpr std::int64_t kTickUs = 500;
     static constexpr std::uint32_t kProtocolHash = protocol_hash(
         "rig teensy protocol 1, grasper\n",
-        "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor_1 i4, motor_2 i4, "
-        "motor_3 i4, target_1 i4, target_2 i4, target_3 i4, current_1 i2, current_2 i2, current_3 "
-        "i2, force_1 u2, force_2 u2, force_3 u2, command_1_e4 i2, command_2_e4 i2, command_3_e4 "
-        "i2, dropped u2\n",
+        "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor_1 i4, motor_2 "
+        "i4, motor_3 i4, target_1 i4, target_2 i4, target_3 i4, current_1 i2, current_2 i2, "
+        "current_3 i2, force_1 u2, force_2 u2, force_3 u2, command_1_e4 i2, command_2_e4 i2, "
+        "command_3_e4 i2, dropped u2\n",
         "17 ARM: version u1, kind u1, sequence u2, kp_1 f8, ki_1 f8, kd_1 f8, velocity_filter_1 "
         "f8, limit_1 f8, kp_2 f8, ki_2 f8, kd_2 f8, velocity_filter_2 f8, limit_2 f8, kp_3 f8, "
         "ki_3 f8, kd_3 f8, velocity_filter_3 f8, limit_3 f8, max_current_1 i4, max_force_1 i4, "
         "min_motor_1 i4, max_motor_1 i4, max_motor_step_1 i4, continuous_current_1 i4, i2t_1 i4, "
-        "stall_current_1 i4, stall_motion_1 i4, max_current_2 i4, max_force_2 i4, min_motor_2 i4, "
-        "max_motor_2 i4, max_motor_step_2 i4, continuous_current_2 i4, i2t_2 i4, stall_current_2 "
-        "i4, stall_motion_2 i4, max_current_3 i4, max_force_3 i4, min_motor_3 i4, max_motor_3 i4, "
+        "stall_current_1 i4, stall_motion_1 i4, max_motor_jump_1 i4, max_following_1 i4, "
+        "following_ticks_1 i4, full_scale_current_1 i4, current_offset_1 i4, max_current_error_1 "
+        "i4, current_ticks_1 i4, frozen_current_1 i4, frozen_motion_1 i4, max_current_2 i4, "
+        "max_force_2 i4, min_motor_2 i4, max_motor_2 i4, max_motor_step_2 i4, "
+        "continuous_current_2 i4, i2t_2 i4, stall_current_2 i4, stall_motion_2 i4, "
+        "max_motor_jump_2 i4, max_following_2 i4, following_ticks_2 i4, full_scale_current_2 i4, "
+        "current_offset_2 i4, max_current_error_2 i4, current_ticks_2 i4, frozen_current_2 i4, "
+        "frozen_motion_2 i4, max_current_3 i4, max_force_3 i4, min_motor_3 i4, max_motor_3 i4, "
         "max_motor_step_3 i4, continuous_current_3 i4, i2t_3 i4, stall_current_3 i4, "
-        "stall_motion_3 i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, watchdog_us i4, "
-        "safe_state i4, hold_command_e4 i4\n",
+        "stall_motion_3 i4, max_motor_jump_3 i4, max_following_3 i4, following_ticks_3 i4, "
+        "full_scale_current_3 i4, current_offset_3 i4, max_current_error_3 i4, current_ticks_3 "
+        "i4, frozen_current_3 i4, frozen_motion_3 i4, stall_ticks i4, saturated_ticks i4, "
+        "stale_ticks i4, watchdog_us i4, safe_state i4, hold_command_e4 i4\n",
         "19 SETPOINTS: version u1, kind u1, sequence u2, 50 x (target_1 i4, target_2 i4, target_3 "
         "i4)\n");
-    static constexpr std::size_t kArmSize = kMotors * (8 * 5 + 4 * 9) + 4 * 6;
+    static constexpr std::size_t kArmSize = kMotors * (8 * 5 + 4 * 18) + 4 * 6;
     static constexpr std::size_t kSetpointSize = 4 * kMotors;
     static constexpr std::size_t kMaxSetpoints = 50;
 
@@ -94,7 +102,10 @@ class GrasperProfile {
         }
         if (!primed_) {
             primed_ = true;
-            for (std::size_t k = 0; k < kMotors; ++k) axes_[k].guard.prime(now.motor[k]);
+            for (std::size_t k = 0; k < kMotors; ++k) {
+                axes_[k].guard.prime(now.motor[k]);
+                axes_[k].loop.prime(now.motor[k], now.current[k]);
+            }
             currents_.prime(now.current);
             forces_.prime(now.force);
         }
@@ -108,6 +119,10 @@ class GrasperProfile {
                 axis.guard.check(axis.limits.motor, choice_.stall_ticks, kTickUs, now.motor[k],
                                  now.current[k], channel(k), channel(kMotors + k));
             if (motion.code != kNoTrip) return motion;
+            const Crossing loop =
+                axis.loop.check(axis.limits.loop, kTickUs, now.motor[k], now.motor[k],
+                                now.current[k], {channel(k), channel(k), channel(kMotors + k)});
+            if (loop.code != kNoTrip) return loop;
         }
         const Crossing current = currents_.check(choice_, kTickUs, now.current);
         return current.code != kNoTrip ? current : forces_.check(choice_, kTickUs, now.force);
@@ -118,6 +133,7 @@ class GrasperProfile {
         for (Axis& axis : axes_) {
             axis.controller.limit_to(choice_.hold_command_e4);
             axis.guard.begin_to_hold();
+            axis.loop.begin_to_hold();
         }
         currents_.begin_to_hold();
         forces_.begin_to_hold();
@@ -136,6 +152,7 @@ class GrasperProfile {
         for (std::size_t k = 0; k < kMotors; ++k) {
             outputs.command_e4[k] =
                 axes_[k].controller.tick(setpoint.target[k], now.motor[k], now.motor[k]);
+            axes_[k].loop.drove(setpoint.target[k], outputs.command_e4[k]);
         }
         return outputs;
     }
@@ -161,22 +178,26 @@ class GrasperProfile {
         std::int32_t min_motor = 0;
         std::int32_t max_motor = 0;
         MotorLimits motor;
+        LoopLimits loop;
 
         void read(Reader& reader) {
             for (std::int32_t* limit : {&max_current, &max_force, &min_motor, &max_motor}) {
                 *limit = reader.i32();
             }
             motor.read(reader);
+            loop.read(reader);
         }
 
         bool valid() const {
-            return max_current >= 0 && max_force >= 0 && min_motor <= max_motor && motor.valid();
+            return max_current >= 0 && max_force >= 0 && min_motor <= max_motor && motor.valid() &&
+                   loop.valid();
         }
     };
 
     struct Axis {
         AxisLimits limits;
         MotorGuard guard;
+        LoopGuard loop;
         Controller controller;
     };
 

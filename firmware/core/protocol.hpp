@@ -11,7 +11,7 @@
 namespace rig {
 
 constexpr std::uint8_t kVersion = 1;
-constexpr std::uint32_t kFirmwareVersion = 0x000300;
+constexpr std::uint32_t kFirmwareVersion = 0x000400;
 constexpr std::size_t kQueueCapacity = 2000;
 constexpr std::int32_t kMinWatchdogUs = 5000;
 constexpr std::int32_t kMaxWatchdogUs = 1000000;
@@ -42,7 +42,8 @@ constexpr char kOtherLines[] =
     "HOLDING, trip << 8\n"
     "trip: 0 NONE, 1 HOST_SILENT, 2 OVER_CURRENT, 3 PROXIMAL_TORQUE, 4 DISTAL_TORQUE, 5 "
     "SPINDLE_TRAVEL, 6 JAW_TRAVEL, 7 OVER_SPEED, 8 OVERHEATED, 9 STALLED, 10 SENSOR_SATURATED, "
-    "11 SENSOR_STALE, 12 SENSOR_MISSING, 13 MOTOR_TRAVEL, 14 OVER_FORCE\n"
+    "11 SENSOR_STALE, 12 SENSOR_MISSING, 13 MOTOR_TRAVEL, 14 OVER_FORCE, 15 ENCODERS_DISAGREE, "
+    "16 FOLLOWING_ERROR, 17 CURRENT_MISMATCH, 18 ENCODER_JUMP, 19 ENCODER_FROZEN\n"
     "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, 6 "
     "WRONG_VERSION\n";
 
@@ -88,6 +89,11 @@ enum Trip : std::uint8_t {
     kSensorMissing = 12,
     kMotorTravel = 13,
     kOverForce = 14,
+    kEncodersDisagree = 15,
+    kFollowingError = 16,
+    kCurrentMismatch = 17,
+    kEncoderJump = 18,
+    kEncoderFrozen = 19,
 };
 
 enum Result : std::uint8_t {

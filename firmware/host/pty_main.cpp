@@ -52,6 +52,8 @@ class PtyHardware {
     typename Profile::Inputs sample() { return plant_.sample(); }
     void drive(const typename Profile::Outputs& outputs) { plant_.step(outputs); }
 
+    void feed() {}  // a process has no watchdog of its own
+
     std::size_t read(std::uint8_t* out, std::size_t room) { return some(::read(master_, out, room)); }
     std::size_t write(const std::uint8_t* data, std::size_t size) {
         return some(::write(master_, data, size));

@@ -134,6 +134,54 @@ TEST_CASE("a Teensy answers a hello, with interrupts off only while it touches t
     CHECK(Serial.out.size() > rig::kSerialSize);
 }
 
+TEST_CASE("only a tick that ended, behind a main loop that turned, feeds the chip's watchdog") {
+    setup();
+    CHECK(WDOG3_TOVAL.value <= 20 * 33);
+    CHECK((WDOG3_CS & (WDOG_CS_EN | WDOG_CS_UPDATE)) == WDOG_CS_EN);
+    timer.function();  // may find that the loop turned in another test
+    const int begun = WDOG3_CNT.writes;
+    timer.function();
+    CHECK(WDOG3_CNT.writes == begun);  // the main loop has not turned
+    loop();
+    timer.function();
+    const int meal = WDOG3_CNT.writes - begun;
+    CHECK(meal > 0);
+    const int level = board.levels[rig::wiring::kAlivePin];
+    timer.function();  // it hangs now
+    timer.function();
+    CHECK(WDOG3_CNT.writes == begun + meal);
+    CHECK(board.levels[rig::wiring::kAlivePin] == level);
+    loop();
+    loop();  // the tick hangs now
+    CHECK(WDOG3_CNT.writes == begun + meal);
+    timer.function();
+    CHECK(WDOG3_CNT.writes == begun + 2 * meal);
+    CHECK(board.levels[rig::wiring::kAlivePin] != level);
+}
+
+TEST_CASE("a Teensy whose timer does not start leaves its motors off and its watchdog hungry") {
+    board.levels[rig::wiring::kDriveEnablePin] = HIGH;
+    timer.works = false;
+    setup();
+    timer.works = true;
+    CHECK(board.levels[rig::wiring::kDriveEnablePin] == LOW);
+    const int begun = WDOG3_CNT.writes;
+    for (int turns = 0; turns < 100; ++turns) loop();
+    CHECK(WDOG3_CNT.writes == begun);
+}
+
+TEST_CASE("a USB line that was gone for a moment is written to again") {
+    setup();
+    Serial.out.clear();
+    Serial.detached = true;
+    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 1, 0})) Serial.in.push_back(byte);
+    for (int turns = 0; turns < 10; ++turns) loop();
+    CHECK(Serial.out.empty());
+    Serial.detached = false;
+    for (int turns = 0; turns < 10; ++turns) loop();
+    CHECK(Serial.out.size() > rig::kSerialSize);
+}
+
 TEST_CASE("an enabled controller that is not ready tells no current") {
     rig::ReferenceHardware teensy;
     teensy.begin();
@@ -147,7 +195,13 @@ TEST_CASE("an enabled controller that is not ready tells no current") {
     CHECK(teensy.sample().current == rig::kMissing);
     board.levels[rig::wiring::kDriveReadyPin] = HIGH;
     CHECK(teensy.sample().current != rig::kMissing);
+}
+
+TEST_CASE("each encoder of a Teensy 4.1 has inputs of the crossbar for itself") {
+    rig::ReferenceHardware teensy;
+    teensy.begin();
     CHECK(teensy.sample().motor == 1000);
+    CHECK(teensy.sample().spindle == 2000);
     CHECK(teensy.sample().jaw == 3000);
 }
 

@@ -149,7 +149,9 @@ TEST_CASE("what is wired to a motor is read with it, and one that is not ready t
     outputs.command_e4[2] = 5000;
     for (std::uint32_t tick = 0; tick < wiring::kReadyAfterTicks; ++tick) grasper.drive(outputs);
     const Profile::Inputs inputs = grasper.sample();
-    CHECK(inputs.motor[2] == 3000);
+    for (std::size_t k = 0; k < Profile::kMotors; ++k) {
+        CHECK(inputs.motor[k] == static_cast<std::int32_t>(1000 * (k + 1)));
+    }
     CHECK(inputs.force[2] == 20);
     CHECK(inputs.current[0] == 0);
     CHECK(inputs.current[1] == rig::kMissing);

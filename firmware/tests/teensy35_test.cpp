@@ -40,6 +40,32 @@ TEST_CASE("it starts with both motors off, 0 A asked of both converters, and edg
     CHECK(FTM2_MOD == 0xFFFF);
 }
 
+TEST_CASE("only a tick that ended, behind a main loop that turned, feeds the chip's watchdog") {
+    setup();
+    CHECK(WDOG_TOVALL.value <= 20);
+    CHECK(WDOG_TOVALH.value == 0);
+    CHECK((WDOG_STCTRLH & (WDOG_STCTRLH_WDOGEN | WDOG_STCTRLH_ALLOWUPDATE)) == WDOG_STCTRLH_WDOGEN);
+    timer.function();  // may find that the loop turned in another test
+    const int begun = WDOG_REFRESH.writes;
+    timer.function();
+    CHECK(WDOG_REFRESH.writes == begun);  // the main loop has not turned
+    loop();
+    timer.function();
+    const int meal = WDOG_REFRESH.writes - begun;
+    CHECK(meal > 0);
+    const int level = board.levels[rig::wiring::kAlivePin];
+    timer.function();  // it hangs now
+    timer.function();
+    CHECK(WDOG_REFRESH.writes == begun + meal);
+    CHECK(board.levels[rig::wiring::kAlivePin] == level);
+    loop();
+    loop();  // the tick hangs now
+    CHECK(WDOG_REFRESH.writes == begun + meal);
+    timer.function();
+    CHECK(WDOG_REFRESH.writes == begun + 2 * meal);
+    CHECK(board.levels[rig::wiring::kAlivePin] != level);
+}
+
 TEST_CASE("a 16-bit counter is followed over its ends, however often") {
     rig::WideCounter counter;
     std::int32_t expected = 0;

@@ -22,6 +22,7 @@ from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
 from rig.arm.search import EDGE_S, RATE_SHARE, Prepared, prepare
 from rig.arm.within import period_of
+from rig.errors import DataError
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable
 
@@ -29,6 +30,10 @@ LINK = 2
 """The mass turns with joints 1 and 2; the insertion does not move it."""
 
 LIFTING = [0, 1]
+
+OTHER_MOUNTINGS = ("parallel",)
+"""Words in a run's name that state another place of the mass. Its distance from the axes is not
+that of the insertion axis, and gravity shows only mass times distance."""
 
 EFFECTS = ("presliding J1", "presliding J2")
 """The first effect that `rig study pique` keeps on each lifting joint. The later ones, springs and
@@ -79,9 +84,11 @@ def find_payload(
         on_run: Called with the name of each run before its turn.
 
     Raises:
-        DataError: A run is too short, or lacks a joint.
+        DataError: A run is too short, lacks a joint, or is named after another mounting.
         ArmError: A run has too few periods.
     """
+    for run in runs:
+        _check_mounting(run.name)
     tried = [effect for effect in candidates(PSM) if effect.name in EFFECTS]
     kept = [effect.name for effect in tried]
     fitted = prepare(model, tried, DAMPING)
@@ -100,6 +107,17 @@ def find_payload(
         masses=tuple(masses),
         provenance=Provenance.now(0),
     )
+
+
+def _check_mounting(name: str) -> None:
+    stated = [word for word in OTHER_MOUNTINGS if word in name.lower()]
+    if stated:
+        raise DataError(
+            f"The run {name!r} states the mounting {stated[0]!r}, whose geometry is not modelled.",
+            "The mass is taken to be fixed on the base of the insertion axis. Torque shows mass "
+            "times distance from the joint's axis, so another place gives another mass.",
+            "Leave the run out.",
+        )
 
 
 def _mass(

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import sys
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,9 @@ from pathlib import Path
 from drivers.errors import DriverError, ProtocolMismatchError
 from drivers.teensy import protocol
 from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.grasper import GRASPER
+from drivers.teensy.reference import REFERENCE
+from rig.bench.flashing import Board, board_to_flash
 from rig.bench.logger import open_logger
 from rig.configuration.config import Config
 from rig.errors import RigError, UsageError
@@ -129,24 +133,40 @@ def build_for(board: str) -> Path:
     return SOURCES / ".pio" / "build" / board
 
 
-def flash(board: str) -> None:
-    """Build for a Teensy and write it to the one that is plugged in.
+def flash(board: str, serial: str = "") -> Board:
+    """Build for a Teensy and write it to the one that is plugged in; return which that was.
+
+    Args:
+        board: Which image.
+        serial: Serial number the board must have; any when empty.
 
     Raises:
-        UsageError: No such board, no source tree, or no PlatformIO.
+        UsageError: No such image, no source tree, no PlatformIO, or not exactly one board.
+        PortBusyError: Another program has the board.
+        SafetyTripError: The board is armed.
         FirmwareToolError: It fails.
     """
+    _require_platformio(board)
+    profile = GRASPER if board.endswith("grasper") else REFERENCE
+    found = board_to_flash(serial, profile)
+    what = f"Flashing {board} to the board {found.serial} at {found.port}: {found.state}."
+    sys.stderr.write(f"{what}\n")
     _platformio(board, ["--target", "upload"])
+    return found
 
 
 def _platformio(board: str, more: list[str]) -> None:
+    _require_platformio(board)
+    _run(["pio", "run", "--project-dir", str(SOURCES), "--environment", board, *more])
+
+
+def _require_platformio(board: str) -> None:
     if board not in BOARDS:
         raise UsageError(f"There is no board {board!r}.", fix=f"Choose {', '.join(BOARDS)}.")
     _require_sources()
     if not (SOURCES / "platformio.ini").is_file():
         raise UsageError("This source tree has no platformio.ini.", fix="Update the checkout.")
     _require("pio", "pip install platformio")
-    _run(["pio", "run", "--project-dir", str(SOURCES), "--environment", board, *more])
 
 
 def _require_sources() -> None:

@@ -1,8 +1,8 @@
 """A session with the rig: connected devices, limits checked at every sample, safe on every way out.
 
 The session streams from start to end. `rest` reads the disarmed rig; `play` arms it and plays a
-trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM), the logger is disarmed
-first, and the disarming is confirmed by the logger itself.
+trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM, a lost terminal), the
+logger is disarmed first, and the disarming is confirmed by the logger itself.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,6 +22,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.bench.companions import Companion, open_companions
+from rig.bench.holding import holding
 from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
 from rig.bench.trips import HostWatch, trip_error, tripped
@@ -84,6 +85,7 @@ class Session:
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
             ways_out.enter_context(leaving_safely())  # left last: no signal breaks the way out
+            ways_out.enter_context(holding(self.config.logger.url))
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
             self.companions = open_companions(self.config)

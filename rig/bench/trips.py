@@ -72,6 +72,28 @@ WORDS: dict[Trip, tuple[str, str]] = {
         "A force crossed its limit",
         "Find out what the jaw met; the limits are [limits] ..._force_n.",
     ),
+    Trip.ENCODERS_DISAGREE: (
+        "Two encoders on one drive train disagree by more than backlash and twist",
+        "Check the encoder cables and couplings; see [plausibility] twist_window_rad and"
+        " stretch_window_rad.",
+    ),
+    Trip.FOLLOWING_ERROR: (
+        "The motion stayed too far behind its target",
+        "Look for what blocks the drive or lets it slip; see [plausibility] following_rad.",
+    ),
+    Trip.CURRENT_MISMATCH: (
+        "The measured current is not the commanded one",
+        "Check the read-back's wiring and the motor controller's scaling; see [plausibility]"
+        " current_window_a.",
+    ),
+    Trip.ENCODER_JUMP: (
+        "An encoder's count jumped farther than the shaft can turn",
+        "Check its cable and shielding, then reference the rig again.",
+    ),
+    Trip.ENCODER_FROZEN: (
+        "The current changed and the motor's encoder did not move",
+        "Check the encoder's cable and supply; see [plausibility] frozen_current_a.",
+    ),
     Trip.SENSOR_MISSING: (
         "A sensor gave no reading",
         "Check its wiring and supply.",

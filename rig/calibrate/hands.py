@@ -9,7 +9,7 @@ from calibration.procedure import Step
 from calibration.torque import weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.guard import COLUMNS, Drive
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import Config
@@ -111,7 +111,7 @@ class SimulatedHands:
 
     def __init__(self, config: Config) -> None:
         self.bench = HandledBench(config)
-        self._board = TeensyFake(self.bench)
+        self._board = PythonBoard(self.bench)
         self._rdt = LoadedRdt(config.simulation.seed)
         self._seed = config.simulation.seed
 

@@ -12,10 +12,10 @@ their own (`rig.canopen.process`), so that they wait for nobody.
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.epos4.driver import Epos4
+from drivers.epos4.drive import Epos4
 from drivers.errors import LinkLostError
 from drivers.teensy.control import PREVIOUS_MOTOR_COUNT
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.guard import (
     COLUMNS,
     COMMAND_E4,
@@ -146,7 +146,7 @@ class CanopenLogger:
         device.start()
         self.bench = Epos4Bench(device)
         self.bench.release()  # an earlier program may have left it in force
-        self._board = TeensyFake(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self._board = PythonBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
         self._began_s = bus.now_s
         self._late = round(late_s * 1e6) // TICK_US
         self._ticks = 0

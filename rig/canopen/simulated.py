@@ -6,7 +6,7 @@ Not modelled beyond what the drive's fake leaves out: the load motor, which this
 import ctypes
 import os
 
-from drivers.epos4.driver import Epos4
+from drivers.epos4.drive import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.transport.can_bus import CanBus
 from drivers.transport.live_can import LiveCanBus
@@ -54,8 +54,14 @@ class PlantMotor:
 def open_simulated_canopen(config: Config) -> CanopenLogger:
     """Return the link to the logic of a simulated CANopen rig, in virtual time."""
     options = {"node_id": 1, **config.logger.options}
-    bus = SimulatedCanBus([_drive(config, options["node_id"])], "sim://epos4")
+    bus = open_simulated_bus(config)
     return CanopenLogger(Epos4(bus, **options), bus)
+
+
+def open_simulated_bus(config: Config) -> CanBus:
+    """Return the host's place on a bus with a drive's fake, in virtual time."""
+    node_id = config.logger.options.get("node_id", 1)
+    return SimulatedCanBus([_drive(config, node_id)], "sim://epos4")
 
 
 def open_live_bus(config: Config) -> CanBus:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from time import monotonic
 from types import FrameType
 
-from drivers.epos4.driver import Epos4
+from drivers.epos4.drive import Epos4
 from drivers.errors import DriverError
 from drivers.transport.python_can import open_can
 from rig.canopen.logger import CanopenLogger

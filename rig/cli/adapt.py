@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.output.console import emit_json, progress, results, to_json
+from rig.cli.left_out import say_left_out
+from rig.output.console import JsonFlag, emit_json, progress, results, to_json
 
 
 def adapt(
@@ -22,18 +23,25 @@ def adapt(
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="File for the result; - for stdout.")] = None,
+    json: JsonFlag = False,
+    json_out: Annotated[
+        Path | None, typer.Option("--json-out", help="File for the result as JSON.")
+    ] = None,
 ) -> None:
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
     from estimation.files import write_text_atomic
+    from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.adapt import open_source, run_adaptation
+    from rig.models.origins import with_origin
     from rig.output.table import to_rich
     from rig.reports import adapt as shown
 
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
+    campaign, steps = with_one_zero(campaign, estimator.target)
     with progress() as bar:
         task = bar.add_task("runs", total=len(campaign))
         result, new = run_adaptation(
@@ -45,12 +53,16 @@ def adapt(
             seed=seed,
             on_run=lambda run: bar.advance(task),
         )
-    screen = results(str(json) == "-")
+    screen = results(json)
     screen.print(to_rich(shown.table(result)))
+    for line in sentence(steps):
+        screen.print(line)
     if out is not None:
-        new.save(out)
+        figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
+        with_origin(new, campaign.select(result.used), figures, source).save(out)
         screen.print(f"Estimator: {out}", markup=False)
-    if json is not None and str(json) != "-":
-        write_text_atomic(json, to_json(result))
-    elif json is not None:
+    if json_out is not None:
+        write_text_atomic(json_out, to_json(result))
+        screen.print(f"Result: {json_out}", markup=False)
+    if json:
         emit_json(result)

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 cal_app = typer.Typer(
     name="cal",
     help="Keep calibrations, look at them, and choose the active ones.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -24,9 +27,6 @@ StoreOption = Annotated[
     typer.Option(
         "--store", help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations."
     ),
-]
-ConfigOption = Annotated[
-    Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
 ]
 Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")]
 
@@ -176,6 +176,7 @@ def use(
 @cal_app.command()
 def check(
     config: ConfigOption = None,
+    sim: SimFlag = False,
     log: Annotated[
         Path | None, typer.Option(help="Hold this log's counts against the calibrated ranges, too.")
     ] = None,
@@ -189,9 +190,9 @@ def check(
     from datetime import UTC, datetime
 
     from calibration.rules import judge, judge_raw
-    from rig.configuration.config import load_config
+    from rig.configuration.chosen import choose_rig
 
-    settings = load_config(config)
+    settings = choose_rig(config, sim)
     kept = _store(store, settings)
     now = datetime.now(UTC)
     here = ("", settings.instrument.serial)
@@ -224,7 +225,7 @@ def diagnose(
     """Ask the diagnosis what a calibration lacks, on the raw logs it was made from."""
     from rig.calibrate.diagnose import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
-    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
@@ -238,6 +239,7 @@ def diagnose(
         seed=seed,
         on_stage=lambda what: screen.print(f"{what} ..."),
     )
+    remember(done, looks)
     screen = results(json)
     for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
         screen.print(line, markup=False)
@@ -262,8 +264,8 @@ def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
 def _store(folder: Path | None, settings: "Config | None" = None) -> "CalibrationStore":
     from calibration.store import CalibrationStore, default_folder
 
-    if folder is None and settings is not None and settings.store is not None:
-        return settings.store
+    if folder is None and settings is not None:
+        return settings.store or settings.default_store
     return CalibrationStore(folder or default_folder())
 
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.output.console import JsonFlag
 
 if TYPE_CHECKING:
-    from calibration.procedure import Operator, Procedure, Step
-    from drivers.device import Device
-    from rig.calibrate.run import Kept
-    from rig.configuration.config import Config
+    from calibration.procedure import Procedure
 
 calibrate_app = typer.Typer(
     name="calibrate",
     help="Calibrate a sensor or a part of the rig, step by step.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -28,8 +28,9 @@ calibrate_app = typer.Typer(
 def calibrate() -> None:
     """Calibrate a sensor or a part of the rig, step by step.
 
-    Nothing is kept before the last step has been measured and its data were found good. Ctrl-C
-    ends a session at any time with the rig safe and nothing written.
+    The reading is shown after each step; b measures the step before again. Nothing becomes a
+    calibration before the last step has been measured and its data were found good. Ctrl-C or q
+    ends a session at any time with the rig safe; what a person set up is kept for --resume.
     """
 
 
@@ -37,19 +38,25 @@ def calibrate() -> None:
 class Keeping:
     """How a session is run and kept: the options that every command has."""
 
-    operator: Annotated[str, typer.Option(help="Who calibrates; kept in the record.")]
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None
+    operator: Annotated[
+        str, typer.Option(envvar="USER", help="Who calibrates; kept in the record.")
+    ] = ""
+    config: ConfigOption = None
+    sim: SimFlag = False
     store: Annotated[
         Path | None,
         typer.Option(
-            "--store", help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations."
+            "--store",
+            help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; a simulated"
+            " rig has a folder of its own beside it, NAME-simulated.",
         ),
     ] = None
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the raw logs.")] = None
     raw: Annotated[
         Path | None, typer.Option("--from", help="Measure nothing: conclude from these raw logs.")
+    ] = None
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on with a session that was stopped: its folder.")
     ] = None
     force_sensor: Annotated[
         str | None, typer.Option(help="DRIVER=URL of it, as ati-net=udp:192.168.1.1:49152.")
@@ -70,8 +77,10 @@ def session(make: "Callable[..., Procedure]") -> None:
     shared = inspect.signature(Keeping)
 
     def command(**options: Any) -> None:
+        from rig.cli.calibrate_session import conduct
+
         how = Keeping(**{name: options.pop(name) for name in shared.parameters})
-        _conduct(make(**options), how)
+        conduct(_made(make, options), how)
 
     parameters = [*shared.parameters.values(), *own.parameters.values()]
     keyword = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in parameters]
@@ -216,141 +225,15 @@ def fsr(
     )
 
 
-def _conduct(procedure: "Procedure", how: Keeping) -> None:
-    from datetime import datetime
-
-    from calibration.store import CalibrationStore, default_folder
-    from rig.calibrate.raw import read_raw
-    from rig.calibrate.run import Signature, keep
-    from rig.configuration.config import load_config
+def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedure":
+    """Make a procedure of its options; what they cannot be is a slip of whoever typed them."""
+    from calibration.quality import BadDataError
     from rig.errors import UsageError
-
-    settings = load_config(how.config)
-    _ = settings.reference_limits  # the procedures are of its sensors and its motor
-    if how.seed is not None:
-        settings = settings.changed(simulation={"seed": how.seed})
-    if how.raw is not None:
-        kind, measurements, lines = read_raw(how.raw)
-        if kind != procedure.kind:
-            raise UsageError(
-                f"{how.raw} holds a calibration of {kind}.", fix=f"Type `rig calibrate {kind}`."
-            )
-    else:
-        lines = settings.calibration_set()
-        measurements = _measure(procedure, settings, how)
-    store = CalibrationStore(how.store or default_folder())
-    if how.store is None and settings.store is not None:
-        store = settings.store
-    folder = (
-        how.out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-calibrate-{procedure.kind}"
-    )
-    signature = Signature(
-        operator=how.operator,
-        days=how.days,
-        instrument=settings.instrument.serial or "",
-        serials=settings.serials,
-        notes=how.notes,
-    )
-    kept = keep(procedure, measurements, lines, signature, store, folder)
-    if how.use:
-        for digest in kept.records:
-            store.use(digest, _now(), how.operator)
-    _show(kept, how)
-
-
-def _measure(procedure: "Procedure", settings: "Config", how: Keeping) -> list[Any]:
-    from calibration.procedure import carry_out
-    from rig.bench.logger import open_logger
-    from rig.calibrate.bench import RigBench
-
-    screen = remarks()
-    operator: Operator
-    if settings.is_simulated:
-        from rig.calibrate.hands import SimulatedHands
-
-        hands = SimulatedHands(settings)
-        bench = RigBench(settings, procedure.devices, hands.open_logger, hands.open_force_sensor)
-        operator = hands if how.yes else Asking(hands)
-    else:
-        force = _force_sensor(how.force_sensor, procedure.devices)
-        bench = RigBench(settings, procedure.devices, lambda: open_logger(settings), force)
-        operator = Unasked() if how.yes else Asking(None)
-
-    def tell(step: "Step", number: int, total: int) -> None:
-        screen.print(f"{number + 1}/{total} {step.name}", markup=False)
 
     try:
-        return carry_out(procedure, operator, bench, tell)
-    except KeyboardInterrupt:
-        screen.print("\nStopped; the rig is safe and nothing was kept.")
-        raise
-
-
-class Asking:
-    """A person at the terminal; hands in the simulated world then do what the person confirms."""
-
-    def __init__(self, hands: "Operator | None") -> None:
-        from sys import stdin
-
-        from rig.errors import UsageError
-
-        if not stdin.isatty():
-            raise UsageError(
-                "A guided calibration asks, and this is no terminal.",
-                fix="Run it in a terminal, or on the simulated rig with --yes.",
-            )
-        self._hands = hands
-
-    def prepare(self, step: "Step") -> None:
-        """Show the instruction and wait for Enter; `q` ends the session."""
-        from calibration.procedure import AbortedError
-
-        if step.instruction:
-            screen = remarks()
-            screen.print(step.instruction, markup=False)
-            screen.print("Enter when done, q to stop: ", end="")
-            try:
-                answer = input()
-            except EOFError:
-                answer = "q"
-            if answer.strip().lower().startswith("q"):
-                raise AbortedError("The calibration was stopped; nothing was kept.")
-        if self._hands is not None:
-            self._hands.prepare(step)
-
-
-class Unasked:
-    """Nobody: right for steps the rig does alone."""
-
-    def prepare(self, step: "Step") -> None:
-        """Refuse a step that needs hands."""
-        from rig.errors import UsageError
-
-        if step.instruction:
-            raise UsageError(
-                f"The step {step.name} needs hands: {step.instruction}",
-                "With --yes nobody is asked, and a real rig has no hands.",
-                "Leave --yes away.",
-            )
-
-
-def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
-    from drivers.registry import open_device
-    from rig.errors import UsageError
-
-    if "force_sensor" not in devices:
-        return None
-    driver, _, url = (words or "").partition("=")
-    if not url:
-        raise UsageError(
-            "This calibration needs a force sensor.",
-            fix="Name it: --force-sensor ati-net=udp:192.168.1.1:49152",
-        )
-
-    def opened() -> "Device":
-        return open_device(driver, url)
-
-    return opened
+        return make(**options)
+    except BadDataError as error:
+        raise UsageError(error.what, error.why, error.fix) from error
 
 
 def _numbers(words: str, option: str) -> list[float]:
@@ -371,34 +254,3 @@ def _three(words: str, option: str) -> list[float]:
     if len(values) != 3:
         raise UsageError(f"{option} takes three numbers with commas between.", f"Given: {words}.")
     return values
-
-
-def _now() -> str:
-    from datetime import UTC, datetime
-
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def _show(kept: "Kept", how: Keeping) -> None:
-    screen = results(how.json)
-    for digest, record in kept.records.items():
-        screen.print(f"{digest}  {record.channel} from {record.input}", markup=False)
-        deviations = [row[k] ** 0.5 for k, row in enumerate(record.fit.covariance)]
-        for k, (name, value) in enumerate(record.fit.parameters.items()):
-            spread = f" +- {deviations[k]:.2g}" if deviations else ""
-            screen.print(f"  {name} {value:.6g}{spread}", markup=False)
-        if record.fit.residual_rms is not None:
-            screen.print(f"  residual rms {record.fit.residual_rms:.3g}", markup=False)
-    for name, found in kept.conclusion.found.items():
-        shown = f"{found:.4g}" if isinstance(found, float) else found
-        screen.print(f"  {name} {shown}", markup=False)
-    screen.print(f"Raw logs: {kept.folder}", markup=False)
-    if not how.use:
-        first = next(iter(kept.records))
-        screen.print(f"Use it: rig cal use {first} --by {how.operator}", markup=False)
-    if how.json:
-        records = {
-            digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
-            for digest, r in kept.records.items()
-        }
-        emit_json({"folder": kept.folder, "records": records, "found": kept.conclusion.found})

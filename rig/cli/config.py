@@ -5,31 +5,86 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import SimFlag
+from rig.cli.shipped import complete_config, config_names
 from rig.output.console import JsonFlag, emit_json, results
 
 config_app = typer.Typer(
     name="config",
-    help="Check and show a configuration.",
+    help="Begin, check and show a configuration.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 
+TEENSY = "16c0:0483"
+"""USB vendor and product of the Teensy's serial port."""
+
 ConfigArgument = Annotated[
     Path | None,
-    typer.Argument(help="A TOML file, or a shipped one by name; the simulated rig's if none."),
+    typer.Argument(help="A TOML file, or a shipped one by name; the default one if none."),
 ]
 
 
 @config_app.command()
-def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
+def init(
+    out: Annotated[Path, typer.Argument(help="File to write.")] = Path("rig.toml"),
+    like: Annotated[
+        str,
+        typer.Option(
+            help=f"Shipped configuration to begin with: {', '.join(config_names())}.",
+            autocompletion=complete_config,
+        ),
+    ] = "reference",
+    json: JsonFlag = False,
+) -> None:
+    """Write a configuration to begin with, for the board that is plugged in.
+
+    Comments and units stand in it; what was measured on another rig (gains, limits) is to be looked
+    at before anything moves.
+    """
+    from difflib import get_close_matches
+
+    from estimation.files import write_text_atomic
+    from rig.configuration.config import SHIPPED
+    from rig.doctor.ports import serial_ports
+    from rig.errors import UsageError
+
+    if like not in config_names():
+        near = get_close_matches(like, config_names(), n=1)
+        raise UsageError(
+            f"There is no shipped configuration {like!r}.",
+            f"There are: {', '.join(config_names())}.",
+            f"Did you mean {near[0]!r}?" if near else "",
+        )
+    if out.exists():
+        raise UsageError(f"{out} is there already.", fix="Name another file.")
+    boards = [port for port in serial_ports() if port.usb.startswith(TEENSY)]
+    text = (SHIPPED / f"{like}.toml").read_text()
+    if len(boards) == 1:
+        text = text.replace(f'"usb:{TEENSY}"', f'"usb:{boards[0].usb}"')
+    write_text_atomic(out, text)
+    screen = results(json)
+    found = ", ".join(f"{board.path} (usb:{board.usb})" for board in boards)
+    screen.print(f"Wrote {out}. Boards plugged in: {found or 'none'}.")
+    if len(boards) != 1:
+        screen.print(f"Write the board's address into `url` of {out}; `rig devices` shows it.")
+    screen.print("Then: rig config check, rig doctor. Check limits and gains before it moves.")
+    if json:
+        emit_json({"written": out, "boards": boards})
+
+
+@config_app.command()
+def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Check keys, ranges, drivers, options, and that devices on a CAN bus get along.
 
     Exit code 2 when the configuration cannot be used; every problem is named.
     """
     from rig.configuration.check import problems
-    from rig.configuration.config import load_config
+    from rig.configuration.chosen import choose_rig
 
-    settings = load_config(path)
+    settings = choose_rig(path, sim)
     found = problems(settings)
     screen = results(json)
     for problem in found:
@@ -44,12 +99,12 @@ def check(path: ConfigArgument = None, json: JsonFlag = False) -> int:
 
 
 @config_app.command()
-def show(path: ConfigArgument = None, json: JsonFlag = False) -> None:
+def show(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """Show the whole configuration as every log keeps it, defaults and units written out."""
-    from rig.configuration.config import load_config
+    from rig.configuration.chosen import choose_rig
     from rig.configuration.text import to_toml
 
-    settings = load_config(path)
+    settings = choose_rig(path, sim)
     if json:
         emit_json(settings.model_dump())
     else:

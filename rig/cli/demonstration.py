@@ -22,7 +22,7 @@ from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
 from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.run import remember, run_diagnosis
 from rig.diagnosis.written import written_models
 from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
@@ -113,13 +113,15 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     looked = write_report(folder / "first_look.html", look)
     # simulated runs are no evidence of anybody's rig: they stay out of the user's own ledger
     ledger = folder / "looks.jsonl"
+    looks = Ledger(ledger)
     done = run_diagnosis(
-        open_campaign(logs), [declared], Ledger(ledger), seed=seed, quick=True, on_stage=on_stage
+        open_campaign(logs), [declared], looks, seed=seed, quick=True, on_stage=on_stage
     )
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write_all(written_models(done), model_path)
     page = diagnosis_page.page(done, Provenance.now(seed))
     report = write_report(folder / "diagnosis.html", page)
+    remember(done, looks)
     return Demo(
         folder,
         report,

@@ -5,18 +5,23 @@ from typing import Annotated
 
 import typer
 
-from rig.output.console import emit_json, plain, remarks, results
+from rig.cli.left_out import say_left_out
+from rig.cli.shipped import model_names
+from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
     path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
     model: Annotated[
         Path | None,
-        typer.Option("--model", "-m", help="Declared model: a file, or a shipped one by name."),
+        typer.Option(
+            "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
+        ),
     ] = None,
     balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
-    json_: Annotated[
-        Path | None, typer.Option("--json", help="Where the diagnosis goes; - is stdout.")
+    json_: JsonFlag = False,
+    json_out: Annotated[
+        Path | None, typer.Option("--json-out", help="File for the diagnosis as JSON.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Folder for the page that a person reads.")
@@ -47,11 +52,12 @@ def diagnose(
     import json
 
     from estimation import model_file
-    from estimation.files import write_text_atomic
+    from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
+    from estimation.files import check_output, write_text_atomic
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import subject
     from rig.diagnosis.written import with_cost_of_causal_filters, written_models
     from rig.output.provenance import Provenance
@@ -59,36 +65,43 @@ def diagnose(
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
 
+    page_file = report / "diagnosis.html" if report else None
+    outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}
+    for output, kind in outputs.items():
+        check_output(output, kind)
     working = remarks()
+    looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_)
+        say_left_out(path, asked.campaign)
         done = run_diagnosis(
             asked.campaign,
             asked.models,
-            Ledger(ledger or default_ledger()),
+            looks,
             seed=seed,
             executor=executor,
             quick=quick,
             on_stage=lambda what: working.print(f"{what} ..."),
         )
+    # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
+    # that left nothing, and nobody sees a result that the ledger does not hold
+    written = []
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
-    screen = results(json_ == Path("-"))
-    for line in sentences(done.diagnosis):
-        screen.print(line, markup=False)
-    for note in done.diagnosis.notes:
-        screen.print(note, markup=False)
-    if model_out is not None:
         model_file.write_all(written_models(done), model_out)
-        screen.print(f"Model: {model_out}", markup=False)
-    if report is not None:
-        where = write_report(report / "diagnosis.html", page(done, Provenance.now(seed)))
-        screen.print(f"Report: {where}", markup=False)
+        written.append(f"Model: {model_out}")
+    if page_file is not None:
+        write_report(page_file, page(done, Provenance.now(seed)))
+        written.append(f"Report: {page_file}")
     if protocol_out is not None:
-        screen.print(write_protocol(done.diagnosis, protocol_out), markup=False)
-    if json_ == Path("-"):
-        emit_json(done.diagnosis.to_json())
-    elif json_ is not None:
+        written.append(write_protocol(done.diagnosis, protocol_out))
+    if json_out is not None:
         text = json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False)
-        write_text_atomic(json_, text + "\n")
-        screen.print(f"Diagnosis: {json_}", markup=False)
+        write_text_atomic(json_out, text + "\n")
+        written.append(f"Diagnosis: {json_out}")
+    remember(done, looks)
+    screen = results(json_)
+    for line in (*sentences(done.diagnosis), *done.diagnosis.notes, *written):
+        screen.print(line, markup=False)
+    if json_:
+        emit_json(done.diagnosis.to_json())

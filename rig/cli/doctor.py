@@ -1,29 +1,24 @@
 """`rig doctor | devices | udev | selftest`: what is there, and is it in order."""
 
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
-ConfigOption = Annotated[
-    Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-]
 
-
-def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
+def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Look for what is wrong with the rig, and say what to type.
 
     Exit code 1 when something must be put right, 0 when there are at most warnings.
     """
-    from rig.configuration.config import load_config
     from rig.doctor.examine import examine
     from rig.doctor.finding import Level, worst
 
     screen = results(json)
     found = []
-    for finding in examine(load_config(config)):
+    for finding in examine(chosen_rig(config, sim)):
         found.append(finding)
         screen.print(
             f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}", markup=False
@@ -36,15 +31,17 @@ def doctor(config: ConfigOption = None, json: JsonFlag = False) -> int:
     return 1 if grave is Level.ERROR else 0
 
 
-def devices(config: ConfigOption = None, json: JsonFlag = False) -> None:
+def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """List serial ports, CAN interfaces, installed drivers, and what is configured."""
     from drivers.registry import drivers
     from rig.configuration.check import LOGGER
-    from rig.configuration.config import load_config
+    from rig.configuration.chosen import choose_rig, default_config
     from rig.doctor.ports import can_interfaces, serial_ports
 
-    settings = load_config(config)
-    configured: dict[str, Any] = {LOGGER: settings.logger, **settings.devices}
+    configured: dict[str, Any] = {}
+    if sim or config or default_config():
+        settings = choose_rig(config, sim)
+        configured = {LOGGER: settings.logger, **settings.devices}
     ports, buses = serial_ports(), can_interfaces()
     texts = {name: driver.description for name, driver in drivers().items()}
     if json:
@@ -77,16 +74,15 @@ def udev(json: JsonFlag = False) -> None:
         typer.echo(udev_rules(), nl=False)
 
 
-def selftest(config: ConfigOption = None, json: JsonFlag = False) -> int:
+def selftest(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Run the acceptance test of a bench: devices, rates, zeros, limits, watchdog, stop.
 
     Nothing moves. Exit code 1 when a check fails.
     """
     from rig.configuration.check import refuse_problems
-    from rig.configuration.config import load_config
     from rig.doctor.selftest import selftest as checks
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     refuse_problems(settings)
     screen = results(json)
     done = []

@@ -4,12 +4,14 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.doctor import ConfigOption
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
     help="Say which firmware is where, build it, flash it.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -20,15 +22,14 @@ BoardOption = Annotated[
 
 
 @firmware_app.command()
-def version(config: ConfigOption = None, json: JsonFlag = False) -> int:
+def version(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Hold the board's firmware against this program's and this source tree's.
 
     Exit code 1 when they do not go together.
     """
     from rig.bench.firmware import compare
-    from rig.configuration.config import load_config
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     versions = compare(settings)
     screen = results(json)
     screen.print(f"program   {versions.program}", markup=False)
@@ -54,11 +55,20 @@ def build(board: BoardOption = "", json: JsonFlag = False) -> None:
 
 
 @firmware_app.command()
-def flash(board: BoardOption = "teensy41", json: JsonFlag = False) -> None:
-    """Build for a Teensy and write it to the one that is plugged in; the rig must be disarmed."""
+def flash(
+    board: BoardOption = "teensy41",
+    serial: Annotated[str, typer.Option(help="Serial number the board must have.")] = "",
+    json: JsonFlag = False,
+) -> None:
+    """Build for a Teensy and write it to the only one that is plugged in.
+
+    A second Teensy on this computer is refused, for the loader takes the first it finds, and so is
+    an armed board or one that another program has.
+    """
     from rig.bench.firmware import flash as write
 
-    write(board)
-    results(json).print("Flashed. Next: rig firmware version", markup=False)
+    found = write(board, serial)
+    text = f"Flashed {board} to the board {found.serial}. Next: rig firmware version"
+    results(json).print(text, markup=False)
     if json:
-        emit_json({"flashed": board})
+        emit_json({"flashed": board, "serial": found.serial, "port": found.port})

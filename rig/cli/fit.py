@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.left_out import say_left_out
+from rig.cli.shipped import complete_model, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
@@ -30,8 +32,11 @@ def fit_states(
     """Fit products of physical states, and report the error on runs left out."""
     from estimation.bank.states import LOAD_SCALES, Bank
     from estimation.channels import unit_of
-    from estimation.estimators.bank import BankRecipe, held_out_score
+    from estimation.estimators.bank import BankRecipe
+    from estimation.estimators.held_out import held_out_score
     from rig.errors import UsageError
+    from rig.importers.jaw_steps import sentence, with_one_zero
+    from rig.models.origins import with_origin
 
     if surrogate not in LOAD_SCALES:
         raise UsageError(
@@ -39,20 +44,25 @@ def fit_states(
             fix=f"Choose one of: {', '.join(LOAD_SCALES)}.",
         )
     recipe = BankRecipe(target, Bank(surrogate), causal=live)
+    campaign, steps = with_one_zero(campaign, target)
     kept = campaign.evidence
     estimator = recipe.fit(campaign)
     error = held_out_score(recipe, kept, min(folds, len(kept)), seed) if len(kept) > 1 else None
     screen = results(json_)
+    for line in sentence(steps):
+        screen.print(line)
     if error is not None:
         screen.print(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
             f" rmse {error.rmse:.4g} {unit_of(target)}."
         )
     if out is not None:
-        estimator.save(out)
+        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
+        with_origin(estimator, campaign, figures).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_:
-        emit_json({"target": target, "surrogate": surrogate, "held_out": error, "out": out})
+        told = {"target": target, "surrogate": surrogate, "held_out": error, "jaw_steps": steps}
+        emit_json(told | {"out": out})
 
 
 def fit_network(
@@ -69,9 +79,12 @@ def fit_network(
     from estimation.cross_validation import closing_score
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
+    from rig.importers.jaw_steps import sentence, with_one_zero
+    from rig.models.origins import with_origin
 
     inputs = (*STATE_INPUTS, surrogate)
     recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
+    campaign, steps = with_one_zero(campaign, target)
     kept = campaign.evidence
     folds = min(folds, len(kept))
     error = None
@@ -83,17 +96,20 @@ def fit_network(
             error = closing_score(recipe, kept, folds, seed, lambda: bar.advance(task))
     screen = results(json_)
     screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
+    for line in sentence(steps):
+        screen.print(line)
     if error is not None:
         screen.print(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
             f" rmse {error.rmse:.4g} {unit_of(target)}."
         )
     if out is not None:
-        estimator.save(out)
+        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
+        with_origin(estimator, campaign, figures).save(out)
         screen.print(f"Estimator: {out}", markup=False)
     if json_:
         told = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
-        emit_json(told | {"held_out": error, "out": out})
+        emit_json(told | {"held_out": error, "jaw_steps": steps, "out": out})
 
 
 def fit(
@@ -103,8 +119,9 @@ def fit(
         typer.Option(
             "--model",
             "-m",
-            help="Declared model: a file, a shipped one by name, `states` for products of"
-            " physical states, or `network` for a network with some of them as inputs.",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
+            " products of physical states, `network` for a network with some of them as inputs.",
+            autocompletion=complete_model,
         ),
     ] = "grip",
     out: Annotated[
@@ -140,6 +157,7 @@ def fit(
 
     screen = results(json_)
     campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
         return

@@ -5,11 +5,14 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 grasper_app = typer.Typer(
     name="grasper",
     help="The 3-DOF grasper: possible designs, its master, recordings of the simulated one.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -74,10 +77,8 @@ def record(
 
 @grasper_app.command()
 def follow(
-    config: Annotated[
-        Path | None,
-        typer.Option("--config", "-c", help="Configuration; simulated grasper if none."),
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     master: Annotated[
         str | None,
         typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
@@ -95,10 +96,10 @@ def follow(
     the motors out of force.
     """
     from rig.configuration.check import refuse_problems
-    from rig.configuration.config import load_config
     from rig.grasper.following import follow_master
 
-    settings = load_config(config or Path("grasper"))
+    # the simulated rig of this command is the simulated grasper
+    settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)
     refuse_problems(settings)
     screen = results(json)
     with progress() as bar:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 REACHED_RATIO = 0.1
@@ -14,9 +15,8 @@ REACHED_RATIO = 0.1
 def grip(
     torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
     duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     model: Annotated[
         Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
     ] = None,
@@ -32,13 +32,12 @@ def grip(
 
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.configuration.config import load_config
     from rig.errors import UsageError
     from rig.live.estimator import ModelEstimator
     from rig.live.grip import SHARE, hold_grip
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     most_a = SHARE * settings.reference_limits.load_command_a
     path = model or settings.model_path
     if path is None:

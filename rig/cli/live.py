@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, results
 
 
 def live(
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     model: Annotated[
         Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
     ] = None,
@@ -41,12 +41,13 @@ def live(
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
     A simulated rig plays a first look unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe. With --json, one object a line. In a
-    terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it, q leaves.
+    without --protocol. Ctrl-C leaves, with the rig safe and exit code 130. With --json, one object
+    a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
+    q leaves.
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
-    from rig.configuration.config import load_config
+    from rig.errors import ExitCode
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
@@ -59,7 +60,7 @@ def live(
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     refuse_problems(settings)
     machine = machine_of(settings)
     if protocol is None and settings.is_simulated:
@@ -95,5 +96,5 @@ def live(
             half_widths=half_widths_of(estimators),
             footer=HELP if keys else "Ctrl-C leaves",
         )
-        show(until(blocks, duration), options, results(json_))
-    return 0
+        summary = show(until(blocks, duration), options, results(json_))
+    return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK

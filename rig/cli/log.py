@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.help import GroupedHelp
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 log_app = typer.Typer(
     name="log",
     help="Look into, check, repair and export logs.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -39,20 +41,59 @@ def info(path: LogOrFolder, json: JsonFlag = False) -> None:
 
 @log_app.command()
 def check(path: LogOrFolder, json: JsonFlag = False) -> int:
-    """Count samples expected and received and list every gap.
+    """Count samples expected and received, list every gap, and sum up in a line.
 
-    Exit code 0 if complete, 1 if samples are missing, 5 if a file is damaged.
+    A campaign is complete when every run of its protocol is. Earlier attempts of a run that was
+    recorded again, and logs that were repaired, are listed and not counted. Exit code 0 if
+    complete, 1 if samples or runs are missing, 5 if a file is damaged.
     """
+    from rig.errors import ExitCode
+    from rig.log.attempts import heads_of, standing
     from rig.log.check import check_log
 
-    reports = [check_log(item) for item in _logs(path)]
-    code = max((report.verdict.exit_code for report in reports), default=0)
+    heads = heads_of(_logs(path))
+    counted = [log.path for log in standing(heads)]
+    superseded = [log.path for log in heads if log.path not in counted]
+    reports = [check_log(item) for item in counted]
+    missing = _missing_runs(path, {report.run for report in reports})
+    code = max((report.verdict.exit_code for report in reports), default=ExitCode.OK)
+    code = max(code, ExitCode.FAILED if missing else ExitCode.OK)
     if json:
-        emit_json({"logs": reports, "exit_code": int(code)})
-    else:
-        for report in reports:
-            _show_report(report)
+        found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
+        emit_json(found | {"exit_code": int(code)})
+        return int(code)
+    for report in reports:
+        _show_report(report)
+    screen = results(json=False)
+    for item in superseded:
+        screen.print(f"superseded  {item}: not counted")
+    for name in missing:
+        screen.print(f"missing     {name}. Record it: rig record --resume {path}")
+    screen.print(_summed_up(reports, len(superseded), len(missing)))
     return int(code)
+
+
+def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
+    """Return the runs of a campaign's protocol that have no log; none where it is no campaign."""
+    from rig.recording.campaign import MANIFEST, read_manifest
+
+    if not (path / MANIFEST).is_file():
+        return []
+    protocol, _ = read_manifest(path)
+    return [plan.name for plan in protocol.any_plans() if plan.name not in there]
+
+
+def _summed_up(reports: "list[LogReport]", superseded: int, missing: int) -> str:
+    """Return the line that sums up a check."""
+    from rig.log.check import Verdict
+
+    whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
+    received = sum(topic.received for report in reports for topic in report.topics)
+    expected = sum(topic.expected for report in reports for topic in report.topics)
+    line = f"{whole} of {len(reports) + missing} runs complete, {received} of {expected} samples"
+    if superseded:
+        line += f"; {superseded} superseded {'log' if superseded == 1 else 'logs'} not counted"
+    return f"{line}."
 
 
 @log_app.command()

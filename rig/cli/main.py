@@ -12,15 +12,19 @@ from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
+from rig.cli.clear import clear
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.effects import effects
+from rig.cli.estimator import estimator_app
 from rig.cli.export import export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
+from rig.cli.help import GroupedHelp
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
@@ -35,8 +39,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 app = typer.Typer(
     name="rig",
     help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
+    cls=GroupedHelp,
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help keeps the start instant
     epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
@@ -52,10 +57,12 @@ app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
 app.command()(export)
+app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.command()(loop)
+app.command()(effects)
 app.add_typer(log_app, name="log")
 app.add_typer(grasper_app, name="grasper")
 app.add_typer(study_app, name="study")
@@ -64,6 +71,7 @@ app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
 app.command()(stop)
+app.command()(clear)
 app.command()(udev)
 app.add_typer(firmware_app, name="firmware")
 
@@ -92,7 +100,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        result = app(args=words, standalone_mode=False)
+        result = app(args=words, standalone_mode=False, prog_name="rig")
     except typer.Exit as stop:
         return stop.exit_code
     except SystemExit:  # how typer and rich leave when the reader of stdout has left
@@ -132,8 +140,10 @@ def _report(error: Exception, words: list[str]) -> int:
 
         fix = f"Install the extra {extra!r}: {as_typed(install_command(extra))}"
     lines = [f"error: {what}"]
-    lines += [f"  why: {why}"] if why else []
-    lines += [f"  fix: {fix}"] if fix else []
+    for word, text in (("why", why), ("fix", fix)):
+        first, *more = text.splitlines() or [""]
+        lines += [f"  {word}: {first}"] if first else []
+        lines += [f"       {line}" for line in more]
     sys.stderr.write("\n".join(lines) + "\n")
     if "--json" in words:
         emit_json({"error": {"what": what, "why": why, "fix": fix, "exit_code": int(code)}})

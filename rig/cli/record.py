@@ -2,21 +2,32 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.rig_options import ConfigOption, SimFlag, announced, chosen_rig
+from rig.cli.shipped import complete_protocol, protocol_names
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+
+if TYPE_CHECKING:
+    from rig.configuration.config import Config
+    from rig.machines.machine import Machine
 
 
 def record(
     protocol: Annotated[
         str | None,
-        typer.Option("--protocol", "-p", help="Protocol file or shipped name."),
+        typer.Option(
+            "--protocol",
+            "-p",
+            help=f"Protocol: a file, or one of {', '.join(protocol_names())}. If none: diagnosis;"
+            " unloaded without a load motor, grasper on a grasper.",
+            autocompletion=complete_protocol,
+        ),
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="Configuration; simulated rig if none.")
-    ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
@@ -36,7 +47,6 @@ def record(
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
     from rig.configuration.check import refuse_problems
-    from rig.configuration.config import load_config
     from rig.errors import UsageError
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
@@ -50,19 +60,20 @@ def record(
 
     screen = remarks()
     if resume is not None:
-        if (protocol, config, out, seed) != (None, None, None, None):
+        if (protocol, config, out, seed) != (None, None, None, None) or sim:
             raise UsageError(
                 "--resume goes on as the campaign was begun.",
                 "Protocol, configuration, folder and seed are those of the campaign.",
                 f"Type `rig record --resume {resume}` alone.",
             )
         plan, settings = read_manifest(resume)
+        announced(settings)
         folder = resume
     else:
-        settings = load_config(config)
+        settings = chosen_rig(config, sim)
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
-        plan = load_protocol(protocol or machine_of(settings).first_look(settings))
+        plan = load_protocol(protocol or _default_protocol(machine_of(settings), settings))
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
@@ -99,3 +110,9 @@ def record(
         told = {"folder": folder, "runs": recorded, "look_at": bad}
         emit_json(told if watch is None else {**told, "models": watch.to_json()})
     return 1 if bad else 0
+
+
+def _default_protocol(machine: "Machine", settings: "Config") -> str:
+    """Return the protocol of a campaign that is to be diagnosed, where the rig can play it."""
+    first = machine.first_look(settings)
+    return "diagnosis" if first == "quick" else first

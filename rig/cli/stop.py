@@ -1,34 +1,98 @@
-"""`rig stop`: take the motors out of force, and say so only once the board has said so."""
+"""`rig stop`: take the motors out of force, and say so only once the board has confirmed it."""
 
-from rig.cli.doctor import ConfigOption
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from pathlib import Path
+from typing import Any
+
+from rig.bench.holding import Ending
+from rig.cli.rig_options import ConfigOption, SimFlag, announced
+from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
-def stop(config: ConfigOption = None, json: JsonFlag = False) -> int:
-    """Disarm the rig and read back that it is disarmed.
+def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+    """Disarm the rig and read back that it is disarmed; without options, every configured rig.
 
-    Exit code 0 only when the rig itself has said so; 4 when its state is unknown.
+    A session of this program that has the rig is first asked to disarm and end (SIGTERM), and is
+    killed when it does not: the board then misses it and stops by itself. Programs of other makers
+    are left alone and named. Configured are RIG_CONFIG, ./rig.toml and all of ~/.config/rig/*.toml.
+    Exit code 0 only when every rig itself has confirmed it; 4 when the state of one is unknown: cut
+    its motor supply; 2 when none is configured.
     """
+    from rig.configuration.chosen import ONE_OF, choose_config, configured_rigs
+    from rig.configuration.config import load_config
+    from rig.errors import ExitCode, UsageError
+
+    if config is not None:
+        load_config(config)  # a slip in what was typed is said before anything is tried
+    meant = [choose_config(config, sim)] if config or sim else configured_rigs()
+    if not meant:
+        raise UsageError(
+            "Nothing was stopped: no rig is configured.",
+            "The motors of a rig that is running may be in force. Cut their supply by hand.",
+            ONE_OF,
+        )
+    stopped = [_stopped(path, json) for path in meant]
+    unknown = [rig for rig in stopped if rig["state"] == "unknown"]
+    if json:
+        state = "unknown" if unknown else "disarmed"
+        emit_json({"state": state, "rigs": stopped})
+    return int(ExitCode.SAFETY) if unknown else 0
+
+
+def _stopped(path: Path, json: bool) -> dict[str, Any]:
+    """Disarm one rig; whatever fails, the next one is still stopped."""
     from drivers.errors import DriverError
     from drivers.teensy.driver import TeensyLogger
     from rig.bench.logger import open_logger
     from rig.configuration.config import load_config
-    from rig.errors import ExitCode
+    from rig.errors import RigError
     from rig.machines.choose import machine_of
 
-    settings = load_config(config)
+    name, ending = str(path), None
     try:
+        settings = announced(load_config(path))
+        name = settings.name
+        ending = _released(settings.logger.url)
         with TeensyLogger(open_logger(settings), machine_of(settings).profile) as logger:
             logger.disarm()
-    except DriverError as error:
+    except (DriverError, RigError) as error:
         screen = remarks()
-        screen.print(f"{settings.name}: UNKNOWN. Take the motors for live.", markup=False)
-        for word, text in (("why", f"{error.what} {error.why}"), ("fix", error.fix)):
+        screen.print(f"{name}: UNKNOWN. Treat the motors as live; cut their supply by hand.")
+        why = f"{_ended(ending)} {error.what} {error.why}".strip()
+        for word, text in (("why", why), ("fix", error.fix)):
             screen.print(f"  {word}: {text}", markup=False)
-        if json:
-            emit_json({"state": "unknown", "why": str(error)})
-        return int(ExitCode.SAFETY)
-    results(json).print(f"{settings.name}: disarmed, and it has said so.", markup=False)
-    if json:
-        emit_json({"state": "disarmed"})
-    return 0
+        return {
+            "name": name,
+            "config": path,
+            "state": "unknown",
+            "why": str(error),
+            "holder": plain(ending),
+        }
+    said = f"{name}: disarmed, confirmed by the rig. {_ended(ending)}"
+    results(json).print(said.strip(), markup=False)
+    return {"name": name, "config": path, "state": "disarmed", "holder": plain(ending)}
+
+
+def _released(url: str) -> Ending | None:
+    """Let the session that has the rig, if any, disarm and end.
+
+    Raises:
+        PortBusyError: It is another user's.
+    """
+    from drivers.errors import PortBusyError
+    from rig.bench.holding import holder, let_go
+
+    try:
+        return let_go(url)
+    except PermissionError as error:
+        raise PortBusyError(
+            f"{url} is in use.",
+            f"It is held by PID {holder(url)}, a session of another user.",
+            "Ask that user to end it, or run this command as that user.",
+        ) from error
+
+
+def _ended(ending: Ending | None) -> str:
+    if ending is None:
+        return ""
+    how = "did not end when asked and was killed" if ending.was_killed else "was asked to end"
+    return f"The session that had the rig (PID {ending.pid}) {how}."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.help import GroupedHelp
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
 from rig.output.console import JsonFlag, emit_json, progress, results, show_result
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 study_app = typer.Typer(
     name="study",
     help="Make a paper's results again, on measured or simulated data.",
+    cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
 )

@@ -3,14 +3,17 @@
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
 
 from pydantic import ConfigDict, ValidationError, create_model
 
+from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
 from drivers.registry import CanUse, Driver, drivers, fakes
-from rig.configuration.config import Config, DeviceSection, LoggerSection, is_simulated
+from rig.configuration.config import SHIPPED, Config, DeviceSection, LoggerSection, is_simulated
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
@@ -45,6 +48,7 @@ def problems(config: Config) -> list[Problem]:
         found.append(Problem(LOGGER, what, 'Write driver = "teensy", and a board on USB.'))
     if LOGGER in config.devices:
         found.append(Problem(f"devices.{LOGGER}", "The name is the logger's.", "Choose another."))
+    found += _name_problems(config)
     sound = {n: s for n, s in sections.items() if not any(p.key == _key(n) for p in found)}
     return found + _bus_problems(sound, known)
 
@@ -59,9 +63,30 @@ def refuse_problems(config: Config) -> None:
     if found:
         raise UsageError(
             f"The configuration of {config.name} cannot be used.",
-            " ".join(f"{p.key}: {p.what}" for p in found),
-            " ".join(dict.fromkeys(p.fix for p in found)),
+            "\n".join(f"{p.key}: {p.what}" for p in found),
+            "\n".join(dict.fromkeys(p.fix for p in found)),
         )
+
+
+def _name_problems(config: Config) -> list[Problem]:
+    """Return what names a model or a set of calibrations that is not there."""
+    found = []
+    if config.model_path is not None and not config.model_path.is_file():
+        known = [p.name.removesuffix(".model.toml") for p in SHIPPED.glob("*.model.toml")]
+        found.append(_unknown("model", str(config.model), sorted(known)))
+    calibration = Path(config.calibration)
+    known = sorted(path.stem for path in SHIPPED_CALIBRATIONS.glob("*.toml"))
+    is_there = calibration.is_file() if calibration.suffix == ".toml" else str(calibration) in known
+    if not is_there:
+        found.append(_unknown("calibration", config.calibration, known))
+    return found
+
+
+def _unknown(key: str, name: str, known: list[str]) -> Problem:
+    """Return the problem of a name that is neither a file nor shipped."""
+    near = get_close_matches(name, known, n=1)
+    fix = f"Did you mean {near[0]!r}?" if near else f"Name a file, or one of: {', '.join(known)}."
+    return Problem(key, f"There is no {key} {name!r}: neither a file nor shipped.", fix)
 
 
 def _driver_problems(

@@ -22,6 +22,7 @@ from calibration.linear import CalibrationSet, load_calibration_set, shipped_cal
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
 from calibration.store import CalibrationStore, active_lines, compose, default_folder
 from estimation.recording import Instrument
+from rig.configuration.plausibility import PlausibilitySection
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
@@ -161,9 +162,10 @@ class SafetySection(_Section):
         stall_current_a: Current above which a motor that stands still is stalled.
         stall_motor_angle_rad: Motor shaft angle within which it stands still.
         stall_s: How long it may be stalled.
-        motor_speed_rad_s: Fastest motor shaft.
-        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; none if unset.
-        jaw_open_rad: Jaw angle below which it must not open; none if unset.
+        motor_speed_rad_s: Fastest motor shaft. The shipped protocols need up to 260.
+        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; if unset it
+            follows from the spindle's limit and [plausibility].
+        jaw_open_rad: Jaw angle below which it must not open; likewise.
         saturated_s: How long a torque or current sensor may be at the end of its range.
         stale_s: How long its reading may not change at all.
         watchdog_s: How long this computer may be silent.
@@ -176,7 +178,7 @@ class SafetySection(_Section):
     stall_current_a: Current = 0.55
     stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
     stall_s: float = Field(default=1.0, ge=0, le=600)
-    motor_speed_rad_s: float = Field(default=900.0, gt=0, le=20000)
+    motor_speed_rad_s: float = Field(default=400.0, gt=0, le=20000)
     jaw_closed_rad: Number | None = None
     jaw_open_rad: Number | None = None
     saturated_s: float = Field(default=0.02, ge=0, le=60)
@@ -265,6 +267,7 @@ class Config(_Section):
     controller: ControllerSection
     limits: AnyLimits
     safety: SafetySection = SafetySection()
+    plausibility: PlausibilitySection = PlausibilitySection()
     drift: DriftSection = DriftSection()
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
@@ -321,6 +324,17 @@ class Config(_Section):
             return None
         named = self.calibration_store
         return CalibrationStore(default_folder() if named == "default" else Path(named))
+
+    @property
+    def default_store(self) -> CalibrationStore:
+        """The store where neither the configuration nor a command names one.
+
+        What comes from a simulated rig is kept beside the real calibrations, not among them.
+        """
+        folder = default_folder()
+        if self.is_simulated:
+            folder = folder.with_name(f"{folder.name}-simulated")
+        return CalibrationStore(folder)
 
     def calibration_set(self) -> CalibrationSet:
         """Return the calibrations in use: the set, with the store's active lines in place of its.
@@ -385,7 +399,8 @@ def load_config(path: Path | None = None) -> Config:
     """
     path = SIMULATED if path is None else _found(path)
     try:
-        return Config.model_validate(tomllib.loads(path.read_text()))
+        text = path.read_text()
+        return Config.model_validate(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(
             f"The configuration {path} cannot be read.",
@@ -396,7 +411,7 @@ def load_config(path: Path | None = None) -> Config:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:
         raise UsageError(
-            f"{path} is not a configuration.", explain(error, _keys(Config))
+            f"{path} is not a configuration.", explain(error, _keys(Config), text)
         ) from error
 
 

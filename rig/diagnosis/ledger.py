@@ -13,7 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from estimation.diagnosis.split import Sealed, samples_hash
-from estimation.files import write_text_atomic
+from estimation.file_kinds import LEDGER
+from estimation.files import OutputError, check_output, write_text_atomic
 from estimation.recording import Recording
 from rig.errors import DataError
 
@@ -58,8 +59,19 @@ class Ledger:
         looked_at = {run for look in self._looks() for run in look}
         return frozenset(r.name for r in recordings if samples_hash(r) in looked_at)
 
+    def check(self) -> None:
+        """Refuse a ledger that could not be written, before the work of a diagnosis.
+
+        Raises:
+            LedgerError: It cannot be written.
+        """
+        try:
+            check_output(self.path, LEDGER)
+        except OutputError as error:
+            raise self._unwritable(error) from error
+
     def write(self, recordings: Sequence[Recording], sealed: Sealed) -> None:
-        """Write down a look before the confirm runs are opened.
+        """Write down a look, before its result is shown.
 
         Raises:
             LedgerError: The ledger cannot be read or written.
@@ -76,12 +88,15 @@ class Ledger:
         try:
             before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
             write_text_atomic(self.path, before + json.dumps(look) + "\n")
-        except OSError as error:
-            raise LedgerError(
-                f"The ledger of diagnoses {self.path} cannot be written.",
-                f"{error}. Without it a second look at the same runs would pass as a first.",
-                "Name another place with --ledger or RIG_STATE_DIR.",
-            ) from error
+        except (OSError, OutputError) as error:
+            raise self._unwritable(error) from error
+
+    def _unwritable(self, error: Exception) -> LedgerError:
+        return LedgerError(
+            f"The ledger of diagnoses {self.path} cannot be written.",
+            f"{error} Without it a second look at the same runs would pass as a first.",
+            "Name another place with --ledger or RIG_STATE_DIR.",
+        )
 
     def _looks(self) -> list[list[str]]:
         if not self.path.exists():

@@ -18,7 +18,7 @@ from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.run import Diagnosed, run_diagnosis
+from rig.diagnosis.run import Diagnosed, remember, run_diagnosis
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.protocols.protocol import Protocol, load_protocol, protocol_toml
@@ -142,6 +142,7 @@ def run_loop(
             quick=quick,
             on_stage=lambda what, n=number: on_stage(f"round {n}: {what}"),  # type: ignore[misc]
         )
+        remember(done, ledger)
         spent = number == budget.rounds or clock() - began > 60.0 * budget.minutes
         stopped = _settled(done.diagnosis) or (SPENT if spent else "")
         yield Round(number, protocol.name, place, runs, done, stopped)

@@ -1,4 +1,8 @@
-"""A diagnosis of a campaign: read the runs, seal the split, search, confirm, remember the look."""
+"""A diagnosis of a campaign: read the runs, seal the split, search, confirm.
+
+The caller writes the files it was asked for, then calls `remember`, then shows the result: the
+held-out runs count as used once there is a result to see, and not before.
+"""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -33,6 +37,7 @@ class Diagnosed:
         recordings: The runs.
         sealed: The split.
         seen: Confirm runs that an earlier look held.
+        looked_at: All runs as they were read, for the ledger.
     """
 
     diagnosis: Diagnosis
@@ -40,6 +45,16 @@ class Diagnosed:
     recordings: tuple[Recording, ...]
     sealed: Sealed
     seen: tuple[str, ...]
+    looked_at: tuple[Recording, ...]
+
+
+def remember(done: Diagnosed, ledger: Ledger) -> None:
+    """Write the runs of a diagnosis into the ledger: a later one on them is exploratory.
+
+    Raises:
+        LedgerError: The ledger cannot be read or written.
+    """
+    ledger.write(done.looked_at, done.sealed)
 
 
 def run_diagnosis(
@@ -57,16 +72,18 @@ def run_diagnosis(
     Args:
         campaign: The recordings.
         models: Declared models, one a balance.
-        ledger: Remembers the look.
+        ledger: Names the runs that earlier diagnoses used; it is not written here.
         seed: Seed of the split and of everything random.
         executor: Runs work in parallel.
         quick: A first answer, held against surrogates only, without simulated twins.
         on_stage: Told what begins.
 
     Raises:
+        LedgerError: The ledger cannot be read or written.
         DataError: A recording cannot be read.
         EstimationError: Nothing can be decided; says why.
     """
+    ledger.check()
     on_stage("reading the recordings")
     whole, lost = steady(evidence(campaign))
     for reason in lost:
@@ -92,7 +109,6 @@ def run_diagnosis(
         executor=executor,
         twins=None if quick else twins.makers,
         on_stage=on_stage,
-        on_open=lambda: ledger.write(whole, sealed),
     )
     notes = (*lost, *diagnosis.notes)
     if len(whole) == PATHS:
@@ -109,4 +125,4 @@ def run_diagnosis(
         noise_floor=noise_floors(stories, recordings),
         next_experiment=propose(diagnosis, stories, recordings, twins.twin),
     )
-    return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen)
+    return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen, tuple(whole))

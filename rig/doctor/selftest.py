@@ -15,6 +15,7 @@ from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Trip
 from rig.bench.devices import openers
+from rig.bench.holding import holding
 from rig.bench.logger import open_logger
 from rig.configuration.config import Config
 from rig.doctor.finding import Level
@@ -60,7 +61,10 @@ def _on_the_board(
     name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
 ) -> Check:
     try:
-        with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
+        with (
+            holding(config.logger.url),
+            TeensyLogger(open_logger(config), machine_of(config).profile) as logger,
+        ):
             logger.identify()
             logger.start()
             passed, detail = check(logger, config)

@@ -1,6 +1,6 @@
 """The simulated grasper's board, as the simulated logger opens it."""
 
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.grasper_guard import GRASPER_LOGIC
@@ -29,4 +29,4 @@ def grasper_board(simulation: SimulationSection) -> tuple[Board, float]:
     tick_s = GRASPER.tick_us * 1e-6
     if uses_firmware(simulation):
         return FirmwareBoard(bench, profile=GRASPER), tick_s
-    return TeensyFake(bench, logic=GRASPER_LOGIC), tick_s
+    return PythonBoard(bench, logic=GRASPER_LOGIC), tick_s

@@ -21,6 +21,7 @@ from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.log.streams import GRASPER_COUNTS
 from rig.machines.machine import FloatArray, MachinePlan
+from rig.machines.plausible_counts import jump_limit, loop_limits
 from rig.machines.safety import InCounts, check_setpoints, ticks_of
 from rig.protocols import trajectory
 from rig.protocols.joints import JointPlan
@@ -93,16 +94,25 @@ class GrasperMachine:
             angle = f"{axis}_angle_rad"
             low, high = counts.ends(angle, -given[angle], given[angle])
             force = f"{axis}_force_n"
+            max_motor_step = counts.size(motor, safety.motor_speed_rad_s * tick_s)
+            loop = {
+                "motor": motor,
+                "followed": angle,
+                "current": current,
+                "command": f"{axis}_command_ratio",
+            }
             return AxisLimits(
                 max_current=counts.size(current, given[current]),
                 max_force=counts.ends(force, None, given[force])[1],
                 min_motor=low,
                 max_motor=high,
-                max_motor_step=counts.size(motor, safety.motor_speed_rad_s * tick_s),
+                max_motor_step=max_motor_step,
+                max_motor_jump=jump_limit(max_motor_step),
                 continuous_current=counts.size(current, safety.continuous_current_a),
                 i2t=counts.heat(current, safety.heat_a2_s),
                 stall_current=counts.size(current, safety.stall_current_a),
                 stall_motion=counts.size(motor, safety.stall_motor_angle_rad),
+                **loop_limits(config.plausibility, calibrations, loop, given[current], tick_s),
             )
 
         yaw, jaw_1, jaw_2 = (axis_limits(axis) for axis in AXES)

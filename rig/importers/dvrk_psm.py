@@ -1,10 +1,13 @@
 """Import measured motion of a da Vinci Research Kit patient-side manipulator.
 
-The text format of WPI-AIM/dvrk_dynamics_identification: 21 columns without a header or a time,
-200 Hz: positions, velocities and torques of seven joints, joint 7 being the jaw. Joints 5 to 7 are
-logged in motor coordinates; they become dVRK joint coordinates here: q = M q_motor, and from equal
-power tau_motor = M^T tau, so tau = M^-T tau_motor (Y. Wang et al., "A Convex Optimization-Based
-Dynamic Model Identification Package for the da Vinci Research Kit", RA-L 4(4), 2019).
+The text format of WPI-AIM/dvrk_dynamics_identification: 21 columns without a header or a time:
+positions, velocities and torques of seven joints, joint 7 being the jaw. The format states no
+sample rate; most files have 200 Hz, some 100 Hz, and the file's own velocities show which.
+
+Joints 5 to 7 are logged in motor coordinates; they become dVRK joint coordinates here:
+q = M q_motor, and from equal power tau_motor = M^T tau, so tau = M^-T tau_motor (Y. Wang et al., "A
+Convex Optimization-Based Dynamic Model Identification Package for the da Vinci Research Kit",
+RA-L 4(4), 2019).
 
 Torque is motor current times nominal constants: the arm has no torque sensor.
 """
@@ -19,8 +22,10 @@ import numpy as np
 from estimation.campaign import Campaign, Run
 from estimation.recording import FloatArray, Instrument, Recording
 from rig.errors import DataError
+from rig.importers.derivatives import Relation, relation
 
-SAMPLE_RATE_HZ = 200.0
+USUAL_RATE_HZ = 200.0
+RATES_HZ = (50.0, 100.0, 125.0, 200.0, 250.0, 500.0, 1000.0)
 JOINTS = 7
 COLUMNS = 3 * JOINTS
 PRISMATIC_JOINT = 3
@@ -42,7 +47,7 @@ class PsmImporter:
     """Importer of the dVRK patient-side manipulator's text format."""
 
     name = "dvrk-psm"
-    description = "dVRK arm motion, 200 Hz: 21 columns without a header, .csv or .csv.xz"
+    description = "dVRK arm motion: 21 columns without a header, .csv or .csv.xz"
 
     def recognises(self, path: Path) -> bool:
         """Say whether the path is, or holds, text of 21 numeric columns without a header."""
@@ -75,6 +80,7 @@ def load_run(path: Path) -> Recording:
         DataError: The file is damaged; names the file, the line and what was expected.
     """
     values = _numbers(path, _content(path))
+    rate_hz, remark = _sample_rate(path, values)
     position, velocity, torque = values.reshape(3, JOINTS, -1)
     for motion in (position, velocity):
         motion[WRIST] = MOTOR_TO_JOINT @ motion[WRIST]
@@ -90,13 +96,48 @@ def load_run(path: Path) -> Recording:
             columns[f"joint_{joint}_{unit}"] = block[joint - 1]
     return Recording(
         name=_stem(path),
-        time_s=np.arange(values.shape[1]) / SAMPLE_RATE_HZ,
+        time_s=np.arange(values.shape[1]) / rate_hz,
         columns=columns,
         rig="dVRK patient-side manipulator",
         instrument=Instrument(),
-        notes=NOTES,
+        notes=f"{NOTES} {remark}",
         source=str(path),
     )
+
+
+def _sample_rate(path: Path, values: FloatArray) -> tuple[float, str]:
+    """Return the rate at which positions change as the velocities state, Hz, and how it was found.
+
+    Raises:
+        DataError: The joints imply different rates, or one that no such log has.
+    """
+    time_s = np.arange(values.shape[1]) / USUAL_RATE_HZ
+    found: dict[int, Relation] = {}
+    for joint, (position, velocity) in enumerate(
+        zip(values[:JOINTS], values[JOINTS : 2 * JOINTS], strict=True), 1
+    ):
+        pair = Recording("pair", time_s, {"angle_rad": position, "velocity_rad_s": velocity})
+        one = relation(pair, "angle_rad", "velocity_rad_s")
+        if one is not None:
+            found[joint] = one
+    if not found:
+        return USUAL_RATE_HZ, (
+            f"The motion does not show the sample rate; the usual {USUAL_RATE_HZ:g} Hz is assumed."
+        )
+    implied_hz = {joint: USUAL_RATE_HZ / abs(one.ratio) for joint, one in found.items()}
+    middle_hz = float(np.median(list(implied_hz.values())))
+    rate_hz = min(RATES_HZ, key=lambda rate: abs(np.log(rate / middle_hz)))
+    off = [joint for joint, one in found.items() if not one.allows(USUAL_RATE_HZ / rate_hz)]
+    if off:
+        joints = ", ".join(f"joint {joint} {implied_hz[joint]:.1f} Hz" for joint in off)
+        raise DataError(
+            f"{path}: the velocities imply different sample rates: {joints}, where the median is "
+            f"{middle_hz:.1f} Hz.",
+            f"Expected one of {', '.join(f'{rate:g}' for rate in RATES_HZ)} Hz in every joint. The "
+            "format states no rate, so nothing of the file was imported.",
+            "Restore the file from its source.",
+        )
+    return rate_hz, f"Sample rate by the file's own velocities: {rate_hz:g} Hz."
 
 
 def _opened(path: Path) -> BinaryIO:

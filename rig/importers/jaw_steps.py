@@ -1,70 +1,188 @@
-"""Find steps of the jaw's zero between the runs of a campaign: a cable that slipped, a re-index.
+"""Find steps of the jaw's zero between the runs of a campaign, and count them out.
 
-A single run cannot show such a step, so this is a remark on the campaign, made by walking it.
+A cable that slips on its pulley, or a re-index, moves the zero of the jaw's encoder; every later
+run is off by the step. A single run does not show it. Runs under the same conditions do, since they
+should leave the jaw at the same mean angle:
+
+    mean angle of run k = level of its conditions + zero of its segment.
+
+Segments of consecutive runs are found by binary segmentation with the Bayesian information
+criterion (J. Bai, P. Perron, "Estimating and testing linear models with multiple structural
+changes", Econometrica 66 (1998); Y.-C. Yao, "Estimating the number of change-points via Schwarz'
+criterion", Statistics & Probability Letters 6 (1988)).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.campaign import Campaign
-from estimation.recording import Recording
+from estimation.campaign import Campaign, Run
+from estimation.recording import FloatArray, Recording
 
+JAW = "jaw_angle_rad"
 STEP_LIMIT_RAD = float(np.deg2rad(0.3))
 """On the reference rig, equal runs repeat within 0.22 deg and steps are 0.35 to 0.63 deg."""
-ALIKE = (
-    "load_command_a",
-    "jaw_stop_index",
-    "trajectory_centre_rad",
-    "trajectory_amplitude_rad",
-    "wrist_roll_rad",
-    "wrist_pitch_rad",
-)
-"""Runs that agree in these conditions should leave the jaw at the same mean angle."""
+ALIKE = {
+    "load_command_a": 0.01,
+    "jaw_stop_index": 1.0,
+    "trajectory_centre_rad": 0.1,
+    "trajectory_amplitude_rad": 0.1,
+    "wrist_roll_rad": 0.01,
+    "wrist_pitch_rad": 0.01,
+}
+"""Conditions under which the jaw's mean angle repeats, and how closely they must agree."""
 
 
 @dataclass(frozen=True, slots=True)
 class JawStep:
-    """A step of the jaw's mean angle between two runs that should agree.
+    """A step of the jaw's zero.
 
     Attributes:
-        run: The later run.
-        compared_with: The nearest earlier run under the same conditions.
-        step_rad: Change of the mean jaw angle, rad, closing positive.
+        run: The first run after it.
+        step_rad: Change of the zero, rad, closing positive.
     """
 
     run: str
-    compared_with: str
     step_rad: float
 
 
-def jaw_steps(campaign: Campaign, limit_rad: float = STEP_LIMIT_RAD) -> tuple[JawStep, ...]:
-    """Compare each run's mean jaw angle with the last earlier run under the same conditions.
+@dataclass(frozen=True)
+class JawZeros:
+    """The jaw's zero in every run of a campaign.
+
+    Attributes:
+        runs: Names of the runs.
+        zero_rad: Zero of each run's segment, counted from that of the last run, shape (runs,).
+    """
+
+    runs: tuple[str, ...]
+    zero_rad: FloatArray
+
+    @property
+    def steps(self) -> tuple[JawStep, ...]:
+        """The steps, in order."""
+        changes = np.diff(self.zero_rad)
+        return tuple(JawStep(self.runs[k + 1], float(changes[k])) for k in np.flatnonzero(changes))
+
+    def taken_off(self, campaign: Campaign) -> Campaign:
+        """Return the campaign with every jaw angle counted from the last run's zero."""
+        zeros = dict(zip(self.runs, self.zero_rad, strict=True))
+        runs = [
+            replace(run, load=partial(_shifted, run, float(zeros[run.name])))
+            if zeros.get(run.name)
+            else run
+            for run in campaign.runs
+        ]
+        return Campaign(tuple(runs))
+
+
+def jaw_zeros(campaign: Campaign, limit_rad: float = STEP_LIMIT_RAD) -> JawZeros:
+    """Find the jaw's zero in every run by comparing runs under the same conditions.
 
     The load stretches the cable and so moves the jaw by degrees; only runs of the same load, wrist,
     trajectory and instrument are compared. Flagged samples are left out. One run is held at a time.
+    A campaign that repeats no condition shows no step.
 
     Args:
         campaign: Runs with `jaw_angle_rad`, in the order they were taken.
-        limit_rad: Smaller changes are not reported, rad.
+        limit_rad: Smaller steps are not reported, rad.
 
     Raises:
         MissingChannelError: A run has no `jaw_angle_rad`.
     """
-    last: dict[tuple[object, ...], tuple[str, float]] = {}
-    found = []
+    names, means, keys = [], [], []
     for recording in campaign.evidence:
-        if not recording.valid.any():
-            continue
-        mean_rad = float(recording["jaw_angle_rad"][recording.valid].mean())
-        key = _alike(recording)
-        if key in last:
-            name, before_rad = last[key]
-            if abs(mean_rad - before_rad) > limit_rad:
-                found.append(JawStep(recording.name, name, mean_rad - before_rad))
-        last[key] = recording.name, mean_rad
-    return tuple(found)
+        if recording.valid.any():
+            names.append(recording.name)
+            means.append(float(recording[JAW][recording.valid].mean()))
+            keys.append(_alike(recording))
+    levels = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+    if len(levels) == len(keys):
+        return JawZeros(tuple(names), np.zeros(len(names)))
+    level_of = np.array([levels[key] for key in keys])
+    zeros = _segmented(np.array(means), level_of, limit_rad)
+    return JawZeros(tuple(names), zeros - zeros[-1])
+
+
+def with_one_zero(campaign: Campaign, target: str) -> tuple[Campaign, tuple[JawStep, ...]]:
+    """Return a campaign to estimate the jaw's angle on, with its zero where the last run has it.
+
+    Args:
+        campaign: The runs, in the order they were taken.
+        target: Channel that is estimated; of any other the campaign is returned as it is.
+
+    Returns:
+        The campaign, and the steps that were taken off.
+    """
+    if target != JAW:
+        return campaign, ()
+    zeros = jaw_zeros(campaign)
+    return zeros.taken_off(campaign), zeros.steps
+
+
+def sentence(steps: Sequence[JawStep]) -> list[str]:
+    """Return one sentence for a person on the steps taken off; nothing where there is none."""
+    if not steps:
+        return []
+    each = ", ".join(f"{np.rad2deg(s.step_rad):+.2f} deg before run {s.run}" for s in steps)
+    return [
+        f"The zero of the jaw's encoder steps between runs: {each}. All runs, also those reported"
+        " on, are counted from the zero of the last run."
+    ]
+
+
+def _segmented(means: FloatArray, level_of: NDArray[np.int_], limit_rad: float) -> FloatArray:
+    """Return the zero of each run's segment, shape (runs,)."""
+    count = len(means)
+    free = int(level_of.max()) + 1
+    cuts: list[int] = []
+    zeros, cost = _fitted(means, level_of, cuts)
+    while True:
+        best: tuple[float, list[int], FloatArray, float] | None = None
+        places = [place for place in range(1, count) if place not in cuts]
+        for more in [*((place,) for place in places), *combinations(places, 2)]:
+            trial = sorted([*cuts, *more])
+            left = count - free - 2 * len(trial)
+            if left < 2:
+                continue
+            found, squares = _fitted(means, level_of, trial)
+            # what the levels have taken is no evidence; a cut costs its place and its height
+            gain = left * np.log(cost / squares) - 2 * len(more) * np.log(count)
+            steps = np.abs(np.diff(found)[np.array(trial) - 1])
+            if gain > 0 and steps.min() > limit_rad and (best is None or gain > best[0]):
+                best = float(gain), trial, found, squares
+        if best is None:
+            return zeros
+        _, cuts, zeros, cost = best
+
+
+def _fitted(
+    means: FloatArray, level_of: NDArray[np.int_], cuts: Sequence[int]
+) -> tuple[FloatArray, float]:
+    """Fit levels and segments by least squares; return the zeros and the squares left."""
+    count, segments = len(means), np.searchsorted(cuts, np.arange(len(means)), "right")
+    table = np.zeros((count, int(level_of.max()) + 1 + len(cuts)))
+    table[np.arange(count), level_of] = 1.0
+    later = segments > 0
+    table[np.flatnonzero(later), level_of.max() + segments[later]] = 1.0
+    values = np.linalg.lstsq(table, means, rcond=None)[0]
+    left = means - table @ values
+    heights = np.concatenate([[0.0], values[int(level_of.max()) + 1 :]])
+    return heights[segments], max(float(left @ left), 1e-18)
+
+
+def _shifted(run: Run, zero_rad: float) -> Recording:
+    recording = run.load()
+    return recording.with_columns(**{JAW: recording[JAW] - zero_rad})
 
 
 def _alike(recording: Recording) -> tuple[object, ...]:
-    return (recording.instrument, *(recording.conditions.get(name) for name in ALIKE))
+    parts: list[object] = [recording.instrument]
+    for name, width in ALIKE.items():
+        value = recording.conditions.get(name)
+        parts.append(round(value / width) if isinstance(value, float) else value)
+    return tuple(parts)

@@ -6,12 +6,11 @@ from pathlib import Path
 from estimation.campaign import Campaign, Run
 from estimation.recording import Recording
 from rig.errors import DataError
+from rig.log.attempts import heads_of, is_unfinished, run_name, standing, started_ns
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
 from rig.log.reader import LogFile, damaged, read_log
-from rig.log.repair import repaired_path
 from rig.log.streams import SAMPLE
-from rig.log.writer import PART_SUFFIX
 
 
 @dataclass(frozen=True)
@@ -22,10 +21,11 @@ class LogImporter:
     named after both, `round-2/003-sine`.
 
     In a folder the runs stand in the order they were started, those without a recorded start by
-    file name before them. A repaired log stands in for its original. A log whose recorder did not
-    close it is opened too, excluded from evidence with the reason. Where a run was tried again, its
-    earlier attempts are left out: a log that ended as planned stands for all of that run's logs
-    that did not, and where none did, the last one stands.
+    file name before them. A repaired log stands in for the file it was made from, and for no other:
+    the repair record names it. A log whose recorder did not close it is opened too, excluded from
+    evidence with the reason. Where a run was tried again, its earlier attempts are left out: a log
+    that ended as planned stands for all of that run's logs that did not, and where none did, the
+    last one stands.
     """
 
     name: str = "log"
@@ -41,16 +41,16 @@ class LogImporter:
         Raises:
             DataError: There is no log, or one of them is damaged beyond its unfinished end.
         """
-        paths = [item for item in _logs(path) if not repaired_path(item).exists()]
+        paths = _logs(path)
         if not paths:
             raise DataError(
                 f"There is no log in {path}.",
                 "Looked for files named NAME.mcap and NAME.mcap.part.",
             )
-        heads = [_head(item) for item in paths]
-        heads.sort(key=lambda log: (log.run.started_at_ns or 0) if log.run else 0)
+        read = heads_of(paths)
+        heads = [_sound(log) for log in sorted(standing(read), key=started_ns)]
         several = len({log.path.parent for log in heads}) > 1
-        return Campaign(tuple(_run(log, several) for log in _last_attempts(heads)))
+        return Campaign(tuple(_run(log, several) for log in heads))
 
 
 def _logs(path: Path) -> list[Path]:
@@ -63,45 +63,23 @@ def _logs(path: Path) -> list[Path]:
     ]
 
 
-def _head(path: Path) -> LogFile:
-    """Read what is known about a log without its samples."""
-    log = read_log(path, topics=(), tolerant=True, checksums=False)
+def _sound(log: LogFile) -> LogFile:
+    """Return the head of a log, or refuse one that is damaged beyond its unfinished end."""
     if log.run is None:
         raise DataError(
-            f"{path} does not say which run it holds.",
+            f"{log.path} does not say which run it holds.",
             "The record of the run is missing: the file is damaged, or not written by rig.",
-            f"Run `rig log check {path}`.",
+            f"Run `rig log check {log.path}`.",
         )
-    if log.damage and not _unfinished(log):
+    if log.damage and not is_unfinished(log):
         raise damaged(log)
     return log
 
 
-def _last_attempts(heads: list[LogFile]) -> list[LogFile]:
-    """Leave out the logs of runs that were tried again."""
-    attempts: dict[tuple[Path, str], list[LogFile]] = {}
-    for log in heads:
-        attempts.setdefault((log.path.parent, _name(log)), []).append(log)
-    kept = []
-    for same in attempts.values():
-        planned = [log for log in same if not _unfinished(log) and log.end and log.end.clean]
-        kept += planned or same[-1:]
-    return [log for log in heads if log in kept]
-
-
-def _name(log: LogFile) -> str:
-    return log.run.name if log.run else log.path.stem
-
-
-def _unfinished(log: LogFile) -> bool:
-    """Whether its recorder did not finish the log."""
-    return log.end is None or log.path.suffix == PART_SUFFIX
-
-
 def _run(head: LogFile, several: bool) -> Run:
     path = head.path
-    unfinished = _unfinished(head)
-    name = f"{path.parent.name}/{_name(head)}" if several else _name(head)
+    unfinished = is_unfinished(head)
+    name = f"{path.parent.name}/{run_name(head)}" if several else run_name(head)
 
     def load() -> Recording:
         topics = None if unfinished else (SAMPLE,)

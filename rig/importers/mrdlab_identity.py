@@ -58,8 +58,8 @@ def identify(folder: str, stem: str, header: str) -> Identity:
         conditions["jaw_stop_index"] = float(stem[0])
     if named is None:
         remarks.append(
-            f"The folder name {folder!r} does not follow Tool_<n>_<model>_<L|R>: wrist and side "
-            "are unknown, and the signs are those of a left jaw."
+            f"The folder name {folder!r} does not follow Tool_<n>_<model>_<L|R>: the wrist is "
+            "unknown."
         )
         tool, lot = (in_header["tool"], in_header["lot"]) if in_header else (None, None)
         return Identity(
@@ -69,8 +69,6 @@ def identify(folder: str, stem: str, header: str) -> Identity:
         )
     if named["joint"]:
         remarks += _wrist(named["joint"], int(named["step"]), conditions)
-    if named["side"] == "R":
-        remarks.append("Signs were established on left jaws; check them on this right one.")
     lot = None
     if in_header and in_header["tool"] == named["tool"]:
         lot = in_header["lot"]

@@ -9,6 +9,7 @@ taken from a whole run carries that run's mean load into every sample:
   stretches the cable, so it falls with the load; compare runs of equal load (`jaw_steps`).
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from estimation.recording import FloatArray, Recording, Stretch, read_only
 from rig.importers import mrdlab_text as raw
 from rig.importers.mrdlab_flags import missing, runaways, saturated
 from rig.importers.mrdlab_identity import identify
+from rig.importers.mrdlab_side import follows, side_of
 from rig.importers.sine_fit import Sine, fit_sine
 
 SPINDLE_RAD = 2 * np.pi / 8192
@@ -26,7 +28,9 @@ TORQUE_N_M = 0.000039811
 GEAR_RATIO = 35.0
 
 CLOSING_SIGN = {raw.SPINDLE: -1.0, raw.COMMAND: -1.0, raw.DISTAL: -1.0, raw.TARGET: -1.0}
-"""Raw channels that fall on closing (left jaw). Motor, jaw, current and proximal torque rise."""
+"""Raw channels that fall on closing (left jaw). Motor, jaw, current and proximal torque rise.
+
+All of them turn on a right jaw (`mrdlab_side`)."""
 
 TARGET_UNITS = {"counts": SPINDLE_RAD, "rad": 1.0}
 TARGET_TOLERANCE_RATIO = 2.0
@@ -59,9 +63,11 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     """
     text = raw.read_text(path)
     identity = identify(path.parent.name, path.stem, text.header)
-    remarks = list(identity.remarks)
+    side = side_of(path, identity.instrument.side, text.header, text.columns)
+    remarks = [*identity.remarks, *side.remarks]
+    text.columns[raw.MIRRORED] *= side.sign
     time_s = read_only(text.columns[raw.TIME])  # a copy: the text's block can be freed
-    columns = _channels(text.columns)
+    columns = _channels(text.columns, remarks)
     target = _target(text.columns, remarks)
     if target is not None:
         columns["target_angle_rad"] = target
@@ -82,7 +88,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
         columns=columns,
         conditions=conditions,
         rig="MRDLab",
-        instrument=identity.instrument,
+        instrument=replace(identity.instrument, side=side.name),
         notes="\n".join([*_duration_remark(time_s), *remarks, *([companions] * bool(companions))]),
         source=source,
     )
@@ -91,7 +97,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     return recording
 
 
-def _channels(columns: FloatArray) -> dict[str, FloatArray]:
+def _channels(columns: FloatArray, remarks: list[str]) -> dict[str, FloatArray]:
     scales = {
         "spindle_angle_rad": (raw.SPINDLE, SPINDLE_RAD),
         "motor_angle_rad": (raw.MOTOR, MOTOR_RAD),
@@ -102,10 +108,20 @@ def _channels(columns: FloatArray) -> dict[str, FloatArray]:
         "motor_command_ratio": (raw.COMMAND, 1.0),
         "load_command_a": (raw.LOAD, 1.0),
     }
-    return {
+    channels = {
         name: columns[index] * (CLOSING_SIGN.get(index, 1.0) * scale)
         for name, (index, scale) in scales.items()
     }
+    for name in ("motor_angle_rad", "jaw_angle_rad"):
+        if not follows(channels["spindle_angle_rad"], channels[name]):
+            channels[name] *= -1.0
+            remarks.append(
+                f"{name} was logged with the opposite sign and turned: it is geared to the spindle."
+            )
+    if float(columns[raw.LOAD].mean()) < 0:
+        channels["load_command_a"] *= -1.0
+        remarks.append("The load command was logged negative and turned: a load opens the jaw.")
+    return channels
 
 
 def _target(columns: FloatArray, remarks: list[str]) -> FloatArray | None:
@@ -162,8 +178,6 @@ def _conditions(
     moved = float(centred @ centred)
     slope = float(centred @ jaw) / moved if moved > 0 else 0.0
     conditions["jaw_zero_offset_rad"] = float(jaw.mean() - slope * spindle.mean())
-    if slope < 0:
-        remarks.append("The jaw opens where the spindle closes: the signs of this rig differ.")
     return conditions
 
 

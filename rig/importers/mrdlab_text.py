@@ -24,6 +24,8 @@ COLUMNS = (
 )
 """Name of each column, the word that tells it apart in a header, and its largest credible value."""
 TIME, SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, LOAD, COMMAND, MOTOR, TARGET = range(10)
+MIRRORED = [SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, COMMAND, MOTOR, TARGET]
+"""Columns whose sign on a right jaw is opposite to that on a left one."""
 
 MAX_BYTES = 1 << 30
 STEP_S = 1e-3

@@ -1,15 +1,22 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
 An importer is an object in the entry point group `rig.importers`. It says whether a path looks like
-its format without reading the samples, and opens it as a campaign of run handles.
+its format without reading the samples, and opens it as a campaign of run handles. Whatever the
+format, a run that is read is checked for channels that contradict their derivatives.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from estimation.campaign import Campaign
+from estimation.recording import Recording
 from rig.errors import DataError, UsageError
+from rig.importers.derivatives import checked
+from rig.importers.one_rig import of_one_rig
 
 
 @runtime_checkable
@@ -65,14 +72,28 @@ def _loaded(entry: EntryPoint) -> Importer:
 def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
     """Open recordings of any known format.
 
+    The runs are of one rig and one instrument: reading one that is not raises MixedRunsError.
+
     Args:
         path: File, folder or archive.
         format_name: Importer to use; guessed from the path when None.
 
     Raises:
         UsageError: The path does not exist, or the format is not known.
-        DataError: No importer recognises the path, or the one that does finds damage.
+        DataError: No importer recognises the path, or the one that does finds damage. Reading a
+            run raises it where a channel and its derivative differ by a factor, a sign or a shift.
     """
+    campaign = _opened(path, format_name)
+    return replace(
+        campaign, runs=tuple(replace(run, load=partial(_read, run.load)) for run in campaign.runs)
+    )
+
+
+def _read(load: Callable[[], Recording]) -> Recording:
+    return checked(load())
+
+
+def _opened(path: Path, format_name: str | None) -> Campaign:
     if not path.exists():
         raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
     known = importers()
@@ -81,10 +102,10 @@ def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
             raise UsageError(
                 f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
             )
-        return known[format_name].open(path)
+        return of_one_rig(known[format_name].open(path))
     for importer in known.values():
         if importer.recognises(path):
-            return importer.open(path)
+            return of_one_rig(importer.open(path))
     raise DataError(
         f"No importer recognises {path}.",
         f"Tried: {', '.join(known)}.",

@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 TARE, MARK, RECORD, LEAVE = "t", "m", "r", "q"
 HELP = "t tare  m mark  r record  q leaves"
@@ -40,7 +40,10 @@ def pressed_keys() -> Iterator[Keys | None]:
     def pressed() -> str:
         keys = ""
         while select.select([handle], [], [], 0)[0]:
-            key = os.read(handle, 1)
+            try:
+                key = os.read(handle, 1)
+            except OSError:  # the terminal is gone; SIGHUP ends the session
+                break
             if not key:
                 break
             keys += key.decode("ascii", "ignore").lower()
@@ -50,4 +53,5 @@ def pressed_keys() -> Iterator[Keys | None]:
         tty.setcbreak(handle)
         yield pressed
     finally:
-        termios.tcsetattr(handle, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # a terminal that is gone needs nothing back
+            termios.tcsetattr(handle, termios.TCSADRAIN, before)

@@ -47,6 +47,12 @@ def repaired_path(path: Path) -> Path:
     return path.with_name(f"{name}.repaired.mcap")
 
 
+def repaired_from(log: LogFile) -> Path | None:
+    """Return the log that a repaired one was made from, beside it; None if it is no repair."""
+    originals = [data["original"] for name, data in log.metadata if name == REPAIR_RECORD]
+    return log.path.with_name(originals[-1]) if originals else None
+
+
 def repair_log(path: Path, out: Path | None = None) -> RepairReport:
     """Write what is readable of a log to a new file and read that back.
 

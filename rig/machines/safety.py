@@ -11,6 +11,7 @@ from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
 from rig.configuration.config import Config, LimitsSection
 from rig.errors import SafetyTripError
+from rig.machines.plausible_counts import jaw_ends_rad, jump_limit, loop_limits, pair_limits
 from rig.machines.reading import Reading
 
 TICK_S = 1e-3
@@ -59,7 +60,19 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
     min_spindle, max_spindle = ends(
         "spindle_angle_rad", -limits.spindle_angle_rad, limits.spindle_angle_rad
     )
-    min_jaw, max_jaw = ends("jaw_angle_rad", safety.jaw_open_rad, safety.jaw_closed_rad)
+    open_rad, closed_rad = jaw_ends_rad(config.plausibility, limits.spindle_angle_rad)
+    min_jaw, max_jaw = ends(
+        "jaw_angle_rad",
+        open_rad if safety.jaw_open_rad is None else safety.jaw_open_rad,
+        closed_rad if safety.jaw_closed_rad is None else safety.jaw_closed_rad,
+    )
+    max_motor_step = size("motor_angle_rad", safety.motor_speed_rad_s * TICK_S)
+    loop = {
+        "motor": "motor_angle_rad",
+        "followed": "spindle_angle_rad",
+        "current": "motor_current_a",
+        "command": "motor_command_ratio",
+    }
     return Limits(
         max_current=size("motor_current_a", limits.motor_current_a),
         max_load_ma=size("load_command_a", limits.load_command_a),
@@ -69,11 +82,14 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
         max_spindle=max_spindle,
         min_jaw=min_jaw,
         max_jaw=max_jaw,
-        max_motor_step=size("motor_angle_rad", safety.motor_speed_rad_s * TICK_S),
+        max_motor_step=max_motor_step,
+        max_motor_jump=jump_limit(max_motor_step),
         continuous_current=size("motor_current_a", safety.continuous_current_a),
         i2t=counts.heat("motor_current_a", safety.heat_a2_s),
         stall_current=size("motor_current_a", safety.stall_current_a),
         stall_motion=size("motor_angle_rad", safety.stall_motor_angle_rad),
+        **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, TICK_S),
+        **pair_limits(config.plausibility, calibrations),
         stall_ticks=ticks_of(safety.stall_s, TICK_S),
         saturated_ticks=ticks_of(safety.saturated_s, TICK_S),
         stale_ticks=ticks_of(safety.stale_s, TICK_S),

@@ -32,9 +32,7 @@ def results(json: bool) -> "Console":
 
     A pipe has no width: tables keep their columns there.
     """
-    from rich.console import Console
-
-    screen = Console(stderr=json, highlight=False, soft_wrap=True)
+    screen = _console(stderr=json)
     if not screen.is_terminal:
         screen.width = PIPE_WIDTH
     return screen
@@ -42,9 +40,14 @@ def results(json: bool) -> "Console":
 
 def remarks() -> "Console":
     """Return the console for progress and remarks: stderr."""
+    return _console(stderr=True)
+
+
+def _console(stderr: bool) -> "Console":
+    """Return a console that prints text as it is: brackets in a note or a path are no markup."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return Console(stderr=stderr, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def progress() -> "Progress":
@@ -62,7 +65,7 @@ def progress() -> "Progress":
 
     screen = remarks()
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -95,12 +98,12 @@ def show_result(
 
     screen = results(json)
     for line in lines:
-        screen.print(line, markup=False)
+        screen.print(line)
     for table in tables:
         screen.print(to_rich(table))
     if out is not None:
         write_text_atomic(out, markdown())
-        screen.print(f"Markdown: {out}", markup=False)
+        screen.print(f"Markdown: {out}")
 
 
 def plain(value: Any) -> Any:

@@ -37,15 +37,17 @@ def to_markdown(table: TextTable) -> str:
 
 
 def to_rich(table: TextTable) -> "RichTable":
-    """Return a table for the terminal."""
-    from rich.markup import escape
+    """Return a table for the terminal; brackets in a cell are no markup."""
     from rich.table import Table
+    from rich.text import Text
 
     shown = Table(
-        title=escape(table.title), caption=escape(table.note) or None, title_justify="left"
+        title=Text(table.title, "table.title"),
+        caption=Text(table.note, "table.caption") if table.note else None,
+        title_justify="left",
     )
     for index, column in enumerate(table.columns):
-        shown.add_column(escape(column), justify="left" if index == 0 else "right")
+        shown.add_column(Text(column), justify="left" if index == 0 else "right")
     for row in table.rows:
-        shown.add_row(*map(escape, row))
+        shown.add_row(*map(Text, row))
     return shown

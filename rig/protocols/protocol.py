@@ -322,9 +322,10 @@ def load_protocol(name_or_path: str) -> Protocol:
             "Name a TOML file, or one of the shipped protocols.",
         )
     try:
-        return TypeAdapter(Protocol).validate_python(tomllib.loads(path.read_text()))
+        text = path.read_text()
+        return TypeAdapter(Protocol).validate_python(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:
         known = {name for table in TABLES for name in table.model_fields} | {"kind", "runs"}
-        raise UsageError(f"{path} is not a protocol.", explain(error, known)) from error
+        raise UsageError(f"{path} is not a protocol.", explain(error, known, text)) from error

@@ -22,7 +22,8 @@ from rig.reports.diagnosis_words import display, next_sentence, other_sentences,
 
 CONFIDENCE = (
     "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
-    " gain is real and general; on known cases it was too sure (docs/results/blind.md)."
+    " gain is real and general; on known cases it was too sure:"
+    " docs/results/diagnosis-versions.md."
 )
 
 FUNCTIONS = (

@@ -1,6 +1,6 @@
 """Open the simulated logger: plant, board and a transport in virtual time."""
 
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
@@ -48,7 +48,7 @@ def reference_board(simulation: SimulationSection) -> tuple[Board, float]:
     plant, sensors, effects = plant_and_sensors(simulation)
     bench = SimulatedBench(plant, sensors, effects, simulation.seed)
     firmware = uses_firmware(simulation)
-    return FirmwareBoard(bench) if firmware else TeensyFake(bench), REFERENCE.tick_us * 1e-6
+    return FirmwareBoard(bench) if firmware else PythonBoard(bench), REFERENCE.tick_us * 1e-6
 
 
 def plant_and_sensors(

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from drivers.amt21 import protocol
 from drivers.amt21.driver import Amt21, open_amt21
 from drivers.amt21.fake import Amt21Fake
+from drivers.amt21.turning import turns_at
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
 from drivers.transport.simulated import SimulatedTransport
 
@@ -20,6 +22,13 @@ def test_the_check_bits_are_those_of_known_answers(value: int, word: int) -> Non
     reply = word.to_bytes(2, "little")
     assert protocol.encode_reply(value) == reply
     assert protocol.decode_reply(reply) == value
+
+
+def test_the_questions_are_those_of_the_makers_sample_code() -> None:
+    """Source: same-sky/AMT21_RS485_Sample_Code_Mega: address, and address + 1 for the turns."""
+    assert protocol.request(0x54) == b"\x54"
+    assert protocol.request(0x54, turns=True) == b"\x55"
+    assert protocol.request(0x4C, turns=True) == b"\x4d"
 
 
 @given(value=st.integers(0, 2**14 - 1), bit=st.integers(0, 15))
@@ -58,6 +67,78 @@ def test_turns_are_signed() -> None:
         total = batch.columns["turns"][0] * 2**14 + batch.columns["angle_rad"][0] * 2**14 / math.tau
         assert total == pytest.approx(-20_000 * second)
     assert batch.columns["turns"][0] == -4
+
+
+class Turning(Amt21Fake):
+    """A shaft that turns between two questions, too: a millisecond on a USB adapter each."""
+
+    def receive(self, data: bytes) -> None:
+        self.count += self._counts_a_tick
+        super().receive(data)
+
+
+@pytest.mark.parametrize("counts_a_tick", [400, -400, 1000])
+def test_turns_and_angle_belong_together_however_the_shaft_turns(counts_a_tick: int) -> None:
+    fake = Turning(counts_a_tick=counts_a_tick, multi_turn=True)
+    device = Amt21(SimulatedTransport(fake), multi_turn=True, rate_hz=200.0)
+    device.start()
+    batches = [device.read(0.1) for _ in range(4000)]
+    angle = np.concatenate([batch.columns["angle_rad"] for batch in batches])
+    turns = np.concatenate([batch.columns["turns"] for batch in batches])
+    steps = np.diff(turns + angle / math.tau)
+    assert len(steps) == 3999
+    assert np.ptp(steps) < 0.25  # a turn counted wrongly is a step of one
+    assert device.counters["crc_errors"] == 0
+
+
+@given(
+    total=st.integers(-(2**27), 2**27 - 1),
+    moved=st.tuples(st.integers(0, 2**12), st.integers(0, 2**12)),
+    sense=st.sampled_from([-1, 1]),
+)
+def test_the_turns_of_an_angle_are_those_when_it_was_read(
+    total: int, moved: tuple[int, int], sense: int
+) -> None:
+    before, after = total - sense * moved[0], total + sense * moved[1]
+    numbers = [place // 2**14 % 2**14 for place in (before, after, total)]
+    assert turns_at(total % 2**14, numbers[0], numbers[1]) == numbers[2]
+
+
+def test_turns_that_lie_further_apart_are_no_reading() -> None:
+    assert turns_at(0, 5, 7) is None
+    assert turns_at(0, 0, 2**13) is None
+
+
+def reader(multi_turn: bool, bad: list[int]) -> Amt21:
+    """A device whose shaft rests at 1000 counts; the answers in `bad` read 9000 counts instead."""
+    fake = Amt21Fake(counts_a_tick=0, multi_turn=multi_turn)
+    fake.count = 1000
+    answers = iter(range(10**6))
+    original = fake.receive
+
+    def receive(data: bytes) -> None:
+        fake.count = 9000 if next(answers) in bad else 1000
+        original(data)
+
+    fake.receive = receive  # type: ignore[method-assign]
+    return Amt21(SimulatedTransport(fake), multi_turn=multi_turn, top_speed_rad_s=100.0)
+
+
+def test_a_damaged_answer_whose_check_bits_fit_is_asked_for_again() -> None:
+    device = reader(multi_turn=False, bad=[3])
+    device.start()
+    batches = [device.read(0.1) for _ in range(6)]
+    angles = [float(batch.columns["angle_rad"][0]) for batch in batches]
+    assert angles == pytest.approx([1000 * math.tau / 2**14] * 6)
+    assert (device.counters["crc_errors"], device.counters["retries"]) == (1, 1)
+
+
+def test_a_jump_that_two_answers_confirm_is_believed() -> None:
+    device = reader(multi_turn=False, bad=[3, 4, 5, 6])
+    device.start()
+    batches = [device.read(0.1) for _ in range(5)]
+    assert batches[3].columns["angle_rad"][0] == pytest.approx(9000 * math.tau / 2**14)
+    assert batches[-1].lost == 0
 
 
 def test_an_echoing_adapter_is_dealt_with_and_seen() -> None:

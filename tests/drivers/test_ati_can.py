@@ -1,6 +1,7 @@
 """NETCANOEM: the manual's operations frame by frame, readings, faults of the sensor."""
 
 import contextlib
+import re
 
 import numpy as np
 import pytest
@@ -73,8 +74,17 @@ def test_old_firmware_is_not_asked_for_units() -> None:
     assert device.identify().firmware == "3.6.0"
     device.start()
     batch = device.read(0.1)
-    assert batch.columns["force_z_n"][0] == pytest.approx(1510 * 100 / 1e6)
+    assert batch.columns["force_z_n"][0] == pytest.approx(1510 * 100 / 1e6, rel=1e-9)
     device.close()
+
+
+def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
+    """Source: ATI 9610-05-1030, commands 7 and 8."""
+    first, *others = set_up()
+    assert first == (frame(0x20F), [frame(0x20F, "03080011")])
+    with ScriptedCanBus([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
+        assert AtiCan(bus).identify().firmware == "3.7.0"
+    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
 
 
 def test_replies_are_paired_among_other_frames_and_stragglers() -> None:
@@ -126,6 +136,7 @@ def test_a_saturated_gauge_makes_the_whole_wrench_invalid() -> None:
                 device.set_bias()
             assert not device.bias.any()
             device.close()
+    assert not protocol.is_saturated(np.array([32_766, -32_767, 0, 0, 0, 0], np.int16))
 
 
 def test_the_status_is_said_in_words_and_flags_what_cannot_be_used() -> None:
@@ -140,6 +151,30 @@ def test_the_status_is_said_in_words_and_flags_what_cannot_be_used() -> None:
     assert protocol.status_words(1 << 9) == ["bit 9 is set"]
     assert protocol.status_words(0) == []
     device.close()
+
+
+@pytest.mark.parametrize(
+    ("bit", "words"),
+    [
+        (0, "watchdog"),
+        (1, "too high"),
+        (2, "too low"),
+        (3, "analog|ground"),
+        (4, "supply too high"),
+        (5, "supply too low"),
+        (6, "active calibration"),
+        (7, "memory"),
+        (8, "configuration"),
+        (11, "temperature too high"),
+        (12, "temperature too low"),
+        (14, "CAN"),
+    ],
+)
+def test_a_status_bit_is_that_of_the_manual(bit: int, words: str) -> None:
+    """Source: ATI 9610-05-1030, status word; bits 1 to 7, 11 and 12 make a reading unusable."""
+    (said,) = protocol.status_words(1 << bit)
+    assert re.search(words, said)
+    assert bool(protocol.UNUSABLE & 1 << bit) == (bit in {1, 2, 3, 4, 5, 6, 7, 11, 12})
 
 
 def test_the_bias_is_taken_off() -> None:
@@ -163,6 +198,53 @@ def test_another_calibration_is_used_or_its_absence_said() -> None:
     missing = AtiCan(SimulatedCanBus([AtiCanFake()]), calibration=7)
     with pytest.raises(FrameError, match="calibration 7"):
         missing.identify()
+
+
+def restarted(silent_s: float) -> tuple[AtiCan, AtiCanFake]:
+    """A device on calibration 1 whose sensor restarts, silent meanwhile for as long."""
+    node = AtiCanFake()
+    bus = SimulatedCanBus([node])
+    device = AtiCan(bus, calibration=1)
+    device.start()
+    for _ in range(300):  # one and a half seconds: it looks more than once
+        assert len(device.read(0.1)) == 1
+    node.restart()
+    if silent_s:
+        answer, node.receive = node.receive, lambda _: None  # type: ignore[method-assign]
+        give_up_s = bus.now_s + silent_s
+        while bus.now_s < give_up_s:
+            assert len(device.read(0.1)) == 0
+        node.receive = answer  # type: ignore[method-assign]
+    return device, node
+
+
+@pytest.mark.parametrize(("silent_s", "samples"), [(0.5, 0), (0.0, 200)])
+def test_a_sensor_that_restarts_and_forgets_its_calibration_is_noticed(
+    silent_s: float, samples: int
+) -> None:
+    device, _ = restarted(silent_s)
+    wrong = 0
+    with pytest.raises(DriverError, match=r"calibration 1 any more.*restarted"):  # noqa: PT012
+        for _ in range(1000):
+            wrong += len(device.read(0.1))
+    assert wrong <= samples
+    with pytest.raises(DriverError, match="restarted"):
+        device.read(0.1)
+    assert device.counters["restarts"] == 1
+    device.start()
+    assert len(device.read(0.1)) == 1
+    for _ in range(300):
+        device.read(0.1)
+    assert device.counters["restarts"] == 1
+
+
+def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it() -> None:
+    node = AtiCanFake()
+    device = AtiCan(SimulatedCanBus([node]))
+    device.start()
+    node.restart()
+    for _ in range(500):
+        assert len(device.read(0.1)) == 1
 
 
 def test_nobody_there_is_a_timeout_that_names_the_base() -> None:

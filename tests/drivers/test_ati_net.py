@@ -13,6 +13,7 @@ from drivers.ati_net.fake import CalibrationFake, RdtFake, fake_calibration
 from drivers.ati_net.protocol import Calibration
 from drivers.ati_net.sequence import RESTART_STEP, RecordSequence
 from drivers.counters import DeviceCounters
+from drivers.device import SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.transport import open_transport
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
@@ -28,6 +29,9 @@ def test_requests_are_the_bytes_of_the_manual() -> None:
     assert protocol.encode_command(protocol.STREAM) == bytes.fromhex("12 34 00 02 00 00 00 00")
     assert protocol.encode_command(protocol.SET_BIAS) == bytes.fromhex("12 34 00 42 00 00 00 00")
     assert protocol.encode_command(protocol.STREAM, 258) == bytes.fromhex("1234 0002 0000 0102")
+    assert protocol.encode_command(protocol.STOP) == bytes.fromhex("12 34 00 00 00 00 00 00")
+    assert protocol.encode_command(protocol.RESET_LATCH) == bytes.fromhex("1234 0041 0000 0000")
+    assert (protocol.RDT_PORT, protocol.CALIBRATION_PORT) == (49152, 49151)
     assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
 
 
@@ -36,11 +40,20 @@ def test_a_record_is_big_endian_and_36_bytes() -> None:
     (record,) = protocol.decode_records(datagram)
     assert record["rdt_sequence"] == 7
     assert record["ft_sequence"] == 49
+    assert record["status"] == 0x80010000
     assert record["counts"].tolist() == [-1, 2, -3, 4, -5, 6]
     assert len(protocol.decode_records(datagram * 5)) == 5
     for size in (0, 35, 37, 8):
         with pytest.raises(FrameError):
             protocol.decode_records((datagram * 2)[:size])
+
+
+def test_a_calibration_is_the_bytes_of_the_manual() -> None:
+    """Source: ATI 9620-05-Net FT, TCP interface: u16 header, two unit codes, two u32, six u16."""
+    answer = bytes.fromhex("1234 02 03 000f4240 0007a120 0001 0002 0003 0004 0005 0106")
+    calibration = Calibration(2, 3, 1_000_000, 500_000, (1, 2, 3, 4, 5, 262))
+    assert protocol.decode_calibration(answer) == calibration
+    assert protocol.encode_calibration(calibration) == answer
 
 
 @given(answer=st.binary(max_size=30))
@@ -73,6 +86,55 @@ def test_counts_become_si_by_what_the_device_says() -> None:
     assert batch.columns["force_x_n"][-1] == pytest.approx(newest[0] / 1000 * 4.4482216152605)
     assert batch.columns["torque_z_n_m"][-1] == pytest.approx(newest[5] / 500 * 0.112984829)
     assert len(batch) == 50
+
+
+@pytest.mark.parametrize(
+    ("bit", "words"),
+    [
+        (30, "processor"),
+        (29, "digital board"),
+        (28, "analog board"),
+        (27, "serial link"),
+        (26, "program memory"),
+        (25, "halted"),
+        (24, "settings"),
+        (23, "calibration"),
+        (22, "network"),
+        (21, "CAN"),
+        (20, "raw data"),
+        (19, "EtherNet/IP"),
+        (18, "DeviceNet"),
+        (17, "saturated"),
+        (16, "threshold"),
+        (14, "watchdog"),
+        (13, "stack"),
+        (12, "settings memory"),
+        (11, "flash"),
+        (10, "analog watchdog"),
+        (9, "excitation too high"),
+        (8, "excitation too low"),
+        (7, "ground"),
+        (6, "supply too high"),
+        (5, "supply too low"),
+        (4, "no data"),
+        (3, "reference"),
+        (2, "temperature"),
+        (1, "web server"),
+    ],
+)
+def test_a_status_bit_is_that_of_the_manual(bit: int, words: str) -> None:
+    """Source: ATI 9620-05-Net FT, status code; only the threshold of bit 16 is no data fault."""
+    (said,) = protocol.status_words(1 << 31 | 1 << bit)
+    assert words in said
+    assert protocol.is_data_fault(np.array([1 << 31 | 1 << bit], np.uint32))[0] == (bit != 16)
+
+
+def test_a_saturated_sensor_flags_its_samples() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    fake.status = 0x80020000
+    assert set(device.read(0.1).flags) == {SampleFlag.SATURATED | SampleFlag.SUSPECT}
 
 
 def test_a_status_is_said_in_words_and_flags_its_samples() -> None:
@@ -148,6 +210,84 @@ def test_an_overtaken_packet_is_dropped_and_counted() -> None:
     assert (np.diff(sequence) > 0).all()
     assert device.counters["late"] == 1
     assert device.counters["lost"] == 1
+
+
+@pytest.mark.parametrize("command", ["set_bias", "reset_latch"])
+@pytest.mark.parametrize("numbers_begin_at", [1, 2**32 - 10])
+def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(
+    command: str, numbers_begin_at: int
+) -> None:
+    device = device_of(RdtFake(numbers_begin_at))
+    device.start()
+    before = device.read(0.1)
+    getattr(device, command)()
+    after = [device.read(0.1) for _ in range(4)]
+    assert sum(map(len, after)) == 200
+    sequence = np.concatenate([before.sequence, *[batch.sequence for batch in after]])
+    assert sequence.tolist() == list(range(250))
+    assert after[-1].lost == 0
+    assert {k for k, count in device.counters.items() if count} == {"frames"}
+
+
+def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
+    sequence = RecordSequence(counters := DeviceCounters())
+    sequence.follow(np.arange(5, 10, dtype=np.uint32))
+    sequence.expect_restart()
+    _, numbers = sequence.follow(np.arange(10, 2010, dtype=np.uint32))
+    assert numbers.tolist() == list(range(5, 2005))
+    kept, _ = sequence.follow(np.array([2008, 2010], np.uint32))  # it is late, and nothing else
+    assert kept.tolist() == [False, True]
+    assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
+
+
+def test_a_request_that_is_lost_is_sent_again() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.identify()
+    fake.deaf = 2  # stop and start
+    device.start()
+    batches = [device.read(0.1) for _ in range(20)]
+    assert sum(map(len, batches)) > 500
+    assert device.counters["retries"] == 1
+    assert batches[-1].lost == 0
+
+
+def test_a_device_that_is_gone_is_said_at_every_reading_until_it_is_back() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    device.read(0.1)
+    fake.receive(protocol.encode_command(protocol.STOP))
+    fake.deaf = 6
+    said = back = 0
+    for _ in range(100):
+        try:
+            back += len(device.read(0.05))
+        except LinkTimeoutError as error:
+            said += "fallen silent" in str(error)
+    assert said > 20
+    assert back > 500
+    assert device.counters["stalls"] == 1
+    assert device.counters["retries"] == 7
+
+
+def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error() -> None:
+    fake = RdtFake()
+    device = device_of(fake)
+    device.start()
+    device.read(0.1)
+    fake.frozen_at = 50
+    said = 0
+    for _ in range(10):
+        try:
+            device.read(0.05)
+        except DriverError as error:
+            said += "frozen" in str(error)
+    assert said >= 7
+    assert device.counters["device_errors"] == 1
+    fake.frozen_at = None
+    assert len(device.read(0.05)) > 0
+    device.close()
 
 
 def test_the_bias_is_set_in_the_device() -> None:

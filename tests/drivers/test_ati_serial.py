@@ -118,7 +118,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")
 
 
-def test_what_no_source_settles_can_be_told_otherwise() -> None:
+def test_what_may_differ_can_be_told_otherwise() -> None:
     fake = AtiSerialFake()
     told = AtiSerial(SimulatedTransport(fake))
     told.start()
@@ -141,6 +141,35 @@ def test_a_sensor_that_does_not_answer_the_lock_still_starts() -> None:
 
     device = AtiSerial(SimulatedTransport(Mute()), assumed=Assumptions(lock_answers=False))
     device.start()
+    assert len(device.read(0.1)) > 100
+
+
+@pytest.mark.parametrize("function", [protocol.STREAM, protocol.STORAGE])
+def test_an_answer_that_is_no_success_is_a_refusal(function: int) -> None:
+    class Refusing(AtiSerialFake):
+        def transmit(self) -> bytes:
+            data = super().transmit()
+            return protocol.encode(function, b"\0") if data[1:2] == bytes([function]) else data
+
+    device = AtiSerial(SimulatedTransport(Refusing()))
+    with pytest.raises(DriverError, match=f"refused function {function:#04x}"):
+        device.start()
+
+
+def test_a_lost_answer_to_the_start_of_the_stream_is_asked_for_again() -> None:
+    cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
+    device = AtiSerial(cable)
+    device.identify()
+
+    def lose(data: bytes) -> bytes:
+        if data[:2] != bytes([protocol.SLAVE, protocol.STREAM]):
+            return data
+        cable.incoming = lambda later: later
+        return b""
+
+    cable.incoming = lose
+    device.start()
+    assert device.counters["retries"] == 1
     assert len(device.read(0.1)) > 100
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from drivers.clock import ClockError, ClockFit, TickUnwrapper, align, arrival_fit
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.simulated import SimulatedTransport
 
@@ -188,7 +188,7 @@ def test_too_little_makes_no_line() -> None:
 
 
 def test_the_loggers_exchanges_make_a_line() -> None:
-    transport = SimulatedTransport(TeensyFake(HandMovedBench(), start_tick_us=WRAP - 10**6))
+    transport = SimulatedTransport(PythonBoard(HandMovedBench(), start_tick_us=WRAP - 10**6))
     logger = TeensyLogger(transport)
     logger.start()
     fit = ClockFit()

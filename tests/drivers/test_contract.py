@@ -11,7 +11,7 @@ from drivers.device import Batch, Device, SampleFlag
 from drivers.errors import DriverError, LinkLostError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.teensy.device import TeensyDevice
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.grasper_guard import GRASPER_LOGIC
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
@@ -42,7 +42,7 @@ def opened(name: str, faults: Faults | None = None) -> Device:
 
 def open_grasper(faults: Faults) -> Device:
     """Open the logger's driver on a grasper's board, its motors turned by hand."""
-    board = TeensyFake(ScriptedGrasper(moving(100_000)), logic=GRASPER_LOGIC)
+    board = PythonBoard(ScriptedGrasper(moving(100_000)), logic=GRASPER_LOGIC)
     link = SimulatedTransport(board, "sim://grasper", tick_s=GRASPER.tick_us * 1e-6)
     return TeensyDevice(FaultyTransport(link, faults), profile=GRASPER)
 

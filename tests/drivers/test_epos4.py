@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from drivers.device import SampleFlag
 from drivers.epos4 import faults, protocol
 from drivers.epos4.canopen_link import CanopenLink, ObjectRefusedError
-from drivers.epos4.driver import Epos4, open_epos4
+from drivers.epos4.drive import Epos4
+from drivers.epos4.driver import open_epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import Feedback, Ratings, State
@@ -90,6 +91,9 @@ def test_what_is_said_to_set_up_and_arm_in_its_order() -> None:
     expected = [
         "0 8001",
         "601 2b17100064000000",
+        "601 2b07600002000000",  # voltage off when the host is lost, and at a fault
+        "601 2b5e600000000000",
+        "601 2f29100100000000",  # and pre-operational, so that objects can be reached
         "601 2300180181010080",  # TPDO1 off, synchronous, mapped, counted, on
         "601 2f00180201000000",
         "601 2f001a0000000000",
@@ -193,7 +197,8 @@ def test_a_drive_that_leaves_operation_by_itself_is_said() -> None:
     assert node.state is State.SWITCH_ON_DISABLED
 
 
-def test_a_silent_host_is_noticed_by_the_drive() -> None:
+def after_a_pause() -> tuple[Epos4Fake, Epos4]:
+    """A drive in force whose host paused for longer than the drive waits."""
     node = Epos4Fake()
     device, _ = armed(node)
     device.set_torque(1e-3)
@@ -201,11 +206,141 @@ def test_a_silent_host_is_noticed_by_the_drive() -> None:
     node.advance(180)  # the host's last beat may be 63 ms old
     assert node.state is State.OPERATION_ENABLED
     node.advance(71)
-    assert node.state is State.FAULT
+    return node, device
+
+
+def test_a_silent_host_is_noticed_by_the_drive_and_raised_at_the_next_sample() -> None:
+    node, device = after_a_pause()
+    assert node.state is State.FAULT  # at once: no ramp along which the motor stays in force
     assert node.torque_n_m == 0.0
-    with pytest.raises(DriveFaultError, match="heartbeat of the host"):
+    with pytest.raises(DriveFaultError, match="heartbeat of the host") as caught:
         device.read(0.1)
+    assert caught.value.code == 0x8130
+    for _ in range(200):  # no sample can come, and that is raised as long as it is so
+        with pytest.raises(DriveFaultError, match="0x8130"):
+            device.read(0.1)
+    with pytest.raises(DriverError, match="not armed"):
+        device.set_torque(1e-3)
+    device.disarm()
     device.close()
+
+
+def test_a_lost_heartbeat_is_cleared_and_the_drive_runs_again() -> None:
+    node, device = after_a_pause()
+    with pytest.raises(DriveFaultError):
+        device.read(0.1)
+    assert device.clear_fault() == 0x8130
+    assert node.state is State.SWITCH_ON_DISABLED
+    assert device.last_error == 0
+    assert device.read(0.1).flags[0] == 0
+    device.arm()
+    device.set_torque(1e-3)
+    device.read(0.1)
+    assert node.torque_n_m == pytest.approx(80 * 12.46e-6)
+    node.advance(251)  # the heartbeat is watched again
+    assert node.state is State.FAULT
+    device.close()
+
+
+def test_another_program_clears_what_the_first_one_left() -> None:
+    node, _ = after_a_pause()
+    device = Epos4(SimulatedCanBus([node]))
+    device.start()
+    with pytest.raises(DriveFaultError, match="heartbeat of the host"):
+        device.arm()
+    assert device.clear_fault()
+    assert not device.clear_fault()
+    device.arm()
+    assert device.read(0.1).flags[0] == 0
+    device.close()
+    assert node.state is State.SWITCH_ON_DISABLED
+
+
+def test_clearing_a_drive_without_a_fault_takes_it_out_of_force() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    device.set_torque(1e-3)
+    device.read(0.1)
+    assert not device.clear_fault()
+    assert node.state is State.SWITCH_ON_DISABLED
+    assert device.read(0.1).columns["command_torque_n_m"][0] == 0.0
+    device.close()
+
+
+def test_a_stopped_node_is_cleared_too() -> None:
+    node = Epos4Fake()
+    node.fail(0x2310, 2)
+    node.receive(CanFrame(0, bytes([0x02, 1])))
+    device = Epos4(SimulatedCanBus([node]))
+    assert device.clear_fault()
+    assert node.state is State.SWITCH_ON_DISABLED
+    device.close()
+
+
+def test_a_fault_is_cleared_before_the_driver_is_started() -> None:
+    node, _ = after_a_pause()
+    device = Epos4(SimulatedCanBus([node]))
+    assert device.clear_fault()
+    assert node.state is State.SWITCH_ON_DISABLED
+    device.close()
+
+
+def test_a_drive_that_somebody_takes_out_of_operation_is_said_at_the_next_heartbeat() -> None:
+    node = Epos4Fake()
+    device, _ = armed(node)
+    device.read(0.1)
+    node.receive(CanFrame(0, bytes([0x80, 1])))  # pre-operational
+    said = 0
+    for _ in range(200):
+        try:
+            device.read(0.1)
+        except DriveFaultError as error:
+            said += "pre-operational" in str(error)
+    assert said > 50
+    device.close()
+    assert node.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_drive_that_restarts_is_said_and_not_commanded_any_more() -> None:
+    node = Epos4Fake()
+    device, bus = armed(node)
+    device.set_torque(1e-3)
+    device.read(0.1)
+    node.receive(CanFrame(0, bytes([0x81, 1])))
+    with pytest.raises(DriveFaultError, match="restarted"):
+        device.read(0.1)
+    assert device.counters["restarts"] == 1
+    bus.sent.clear()
+    with pytest.raises(DriveFaultError, match="restarted"):
+        device.read(0.1)
+    assert not [frame for frame in bus.sent if frame.can_id == 0x201]
+    device.close()
+
+
+def test_an_emergency_of_a_drive_that_is_only_watched_is_raised_too() -> None:
+    node = Epos4Fake()
+    device = Epos4(SimulatedCanBus([node]))
+    device.start()
+    device.read(0.1)
+    node.fail(0x3210, 4)
+    with pytest.raises(DriveFaultError, match="supply voltage is too high"):
+        device.read(0.1)
+    assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
+    device.close()
+
+
+@pytest.mark.parametrize(("index", "subindex"), [(0x6007, 0), (0x605E, 0), (0x1029, 1)])
+def test_a_reaction_that_is_not_held_is_refused_before_the_motor_has_force(
+    index: int, subindex: int
+) -> None:
+    node = Epos4Fake()
+
+    def other(**asked: object) -> int | None:
+        return 3 if (asked["index"], asked["subindex"]) == (index, subindex) else None
+
+    node._node.add_read_callback(other)
+    with pytest.raises(ProtocolMismatchError, match=f"{index:#06x}"):
+        Epos4(SimulatedCanBus([node])).start()
 
 
 def test_a_host_that_only_waits_beats_all_the_same() -> None:
@@ -376,6 +511,24 @@ def test_every_error_says_what_and_what_to_do() -> None:
         assert fix or code == 0
     assert faults.explain(0x5482)[0] == "The drive's hardware failed."
     assert "does not know" in faults.fault(0x1234).what
+
+
+@pytest.mark.parametrize(
+    ("codes", "words"),
+    [
+        ((0x1080, 0x1088), "did not start"),
+        ((0x6180, 0x61F0), "firmware"),
+        ((0xFF11, 0xFF24), "tuning"),
+        ((0x738A,), "Hall"),
+        ((0x738C,), "SSI sensor could not be read"),
+        ((0x738D,), "SSI sensor's frames"),
+        ((0x5282,), "STO card"),
+    ],
+)
+def test_an_error_is_named_as_in_the_specification(codes: tuple[int, ...], words: str) -> None:
+    for code in codes:
+        assert words in faults.explain(code)[0]
+    assert words not in faults.explain(codes[-1] + 1)[0]
 
 
 class Served:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, SafeState, Trip
 from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, Limits
@@ -46,7 +46,7 @@ def sweep(start: int, count: int = 100) -> list[int]:
     return [round(1366 - 500 * np.sin((start + k) / 80)) for k in range(count)]
 
 
-def answers(board: TeensyFake | FirmwareBoard, script: list[Action]) -> list[bytes]:
+def answers(board: PythonBoard | FirmwareBoard, script: list[Action]) -> list[bytes]:
     """Run a script and return the bytes the board gave after each action."""
     given_bytes = []
     for action in script:
@@ -68,7 +68,7 @@ def assert_twins(
     board = FirmwareBoard(make_bench(), start_tick_us=start_tick_us, library=library)
     core = answers(board, script)
     fake = answers(
-        TeensyFake(make_bench(), start_tick_us=start_tick_us, build_hash=board.build_hash), script
+        PythonBoard(make_bench(), start_tick_us=start_tick_us, build_hash=board.build_hash), script
     )
     for index, (ours, theirs) in enumerate(zip(fake, core, strict=True)):
         assert ours == theirs, f"action {index}: {script[index]!r}"
@@ -348,14 +348,14 @@ def test_any_script(library: Path, script: list[Action], start_tick_us: int) -> 
 @given(scripts, st.integers(1, 50))
 def test_the_fake_does_not_depend_on_how_time_is_cut(script: list[Action], cut: int) -> None:
     script = [command(Kind.START, 60000), arm(60001, TIGHT), *script]
-    whole = answers(TeensyFake(PlainBench()), script)
+    whole = answers(PythonBoard(PlainBench()), script)
     pieces: list[Action] = []
     for action in script:
         if isinstance(action, int):
             pieces += [cut] * (action // cut) + [action % cut]
         else:
             pieces.append(action)
-    assert b"".join(answers(TeensyFake(PlainBench()), pieces)) == b"".join(whole)
+    assert b"".join(answers(PythonBoard(PlainBench()), pieces)) == b"".join(whole)
 
 
 def test_a_missing_library_says_what_to_type(tmp_path: Path) -> None:

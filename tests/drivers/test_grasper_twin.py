@@ -13,7 +13,7 @@ from drivers.errors import ProtocolMismatchError
 from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, run_ticks
@@ -99,7 +99,7 @@ def assert_twins(
     core = FirmwareBoard(
         ScriptedGrasper(inputs), start_tick_us=start_tick_us, library=library, profile=GRASPER
     )
-    fake = TeensyFake(
+    fake = PythonBoard(
         ScriptedGrasper(inputs),
         start_tick_us=start_tick_us,
         build_hash=core.build_hash,
@@ -236,7 +236,7 @@ def test_refusals(library: Path) -> None:
     refused.append(arm(1, dataclasses.replace(WIDEST, watchdog_us=4_999)))
     tight = GrasperLimits((AxisLimits(), AxisLimits(min_motor=-5, max_motor=5), AxisLimits()))
     for frame in refused:
-        board = TeensyFake(ScriptedGrasper(moving(9)), logic=GRASPER_LOGIC)
+        board = PythonBoard(ScriptedGrasper(moving(9)), logic=GRASPER_LOGIC)
         board.receive(frame)
         answer = FrameStream(0).feed(board.transmit()).others[0]
         assert answer[5] == Result.BAD_VALUE

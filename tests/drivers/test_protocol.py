@@ -33,7 +33,11 @@ def test_the_text_names_every_kind() -> None:
     assert [line.split(":")[0] for line in lines[2:-3]] == [f"{k} {k.name}" for k in Kind]
 
 
-@given(u16, st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), st.tuples(*[i32] * 19))
+@given(
+    u16,
+    st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5),
+    st.tuples(*[i32] * len(LIMIT_NAMES)),
+)
 def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ...]) -> None:
     payload = REFERENCE.encode_arm(sequence, np.array(gains), Limits(*limits))
     kind, number, fields = REFERENCE.decode(payload)

@@ -16,7 +16,7 @@ from drivers.errors import (
 from drivers.framing import encode_frame
 from drivers.teensy import protocol
 from drivers.teensy.driver import SampleBatch, TeensyLogger
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import Result
 from drivers.teensy.reference import REFERENCE, Limits
@@ -34,7 +34,7 @@ MakeBoard = Callable[..., Board]
 def make_board(request: pytest.FixtureRequest) -> MakeBoard:
     """A board on its bench: the Python fake, and the firmware core."""
     if request.param == "fake":
-        return lambda **options: TeensyFake(PlainBench(), **options)
+        return lambda **options: PythonBoard(PlainBench(), **options)
     library = request.getfixturevalue("library")
     return lambda **options: FirmwareBoard(PlainBench(), library=library, **options)
 
@@ -206,7 +206,7 @@ def test_the_board_refuses_what_must_not_be(make_board: MakeBoard) -> None:
     ],
 )
 def test_setpoints_are_whole_numbers_in_range(targets: np.ndarray, loads: np.ndarray) -> None:
-    logger = logger_of(TeensyFake(PlainBench()))
+    logger = logger_of(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
     with pytest.raises(DriverError):
         logger.queue(targets, loads)
@@ -232,7 +232,7 @@ def test_a_clock_exchange_comes_back_with_the_samples(make_board: MakeBoard) -> 
 
 
 def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
-    board = TeensyFake(PlainBench(), protocol_hash=0xDEADBEEF)
+    board = PythonBoard(PlainBench(), protocol_hash=0xDEADBEEF)
     logger = logger_of(board)
     with pytest.raises(
         ProtocolMismatchError, match=f"deadbeef.*{REFERENCE.protocol_hash:08x}.*rig firmware flash"
@@ -242,7 +242,7 @@ def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
 
 
 def test_a_hello_reply_of_another_layout_is_a_mismatch() -> None:
-    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     cable.incoming = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
     with pytest.raises(ProtocolMismatchError, match="another layout"):
         logger.identify()
@@ -267,7 +267,7 @@ def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
 
 
 def test_a_silent_board_is_a_timeout_after_the_retries() -> None:
-    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     cable.incoming = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="sim://"):
         logger.identify()
@@ -335,7 +335,7 @@ def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: Mak
 
 
 def test_frames_nobody_expected_are_counted() -> None:
-    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.start()
     strange = encode_frame(bytes(42)) + encode_frame(b"\x01\x63ab") + encode_frame(b"\x01\x10ab")
     cable.incoming = once(lambda data: strange + data)
@@ -345,7 +345,7 @@ def test_frames_nobody_expected_are_counted() -> None:
 
 
 def test_disarm_is_not_believed_without_an_answer() -> None:
-    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
     cable.incoming = lambda _: b""
     with pytest.raises(DisarmUnconfirmedError, match=r"not confirmed.*cut its supply"):
@@ -357,7 +357,7 @@ def test_disarm_is_not_believed_without_an_answer() -> None:
 
 
 def test_disarm_is_not_believed_when_the_board_says_it_is_still_armed() -> None:
-    cable, logger = behind_a_bad_cable(TeensyFake(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
 
     def still_armed(data: bytes) -> bytes:
@@ -387,6 +387,6 @@ def test_leaving_the_with_block_disarms(make_board: MakeBoard) -> None:
 
 
 def test_a_disarm_needs_no_matching_protocol() -> None:
-    logger = logger_of(TeensyFake(PlainBench(), protocol_hash=1))
+    logger = logger_of(PythonBoard(PlainBench(), protocol_hash=1))
     logger.disarm()
     logger.close()

@@ -15,7 +15,7 @@ from drivers.teensy.can_device import open_teensy_can
 from drivers.teensy.can_fake import BoardNode
 from drivers.teensy.can_segments import Joiner, Splitter
 from drivers.teensy.can_transport import CanTransport
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.transport.simulated_can import SimulatedCanBus
 from rig.bench.session import Session
 from rig.simulation.bench import SimulatedBench
@@ -90,7 +90,7 @@ def body_of(payload: bytes) -> bytes:
 
 def test_a_session_runs_over_can_unchanged() -> None:
     config = simulated()
-    node = BoardNode(TeensyFake(SimulatedBench()))
+    node = BoardNode(PythonBoard(SimulatedBench()))
     with Session(config, CanTransport(SimulatedCanBus([node]))) as session:
         session.take_zeros(0.3)
         readings = list(session.play(np.linspace(-1.0, -0.9, 300), np.zeros(300)))
@@ -101,7 +101,7 @@ def test_a_session_runs_over_can_unchanged() -> None:
 
 
 def test_a_sample_takes_seven_frames() -> None:
-    node = BoardNode(TeensyFake(PlainBench()))
+    node = BoardNode(PythonBoard(PlainBench()))
     node.board.receive(encode_frame(protocol.encode_command(protocol.Kind.START, 1)))
     node.transmit()
     node.advance(1)

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.teensy import channels
 from drivers.teensy.device import TeensyDevice
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.teensy.reference import SAMPLE_DTYPE
 from drivers.transport.simulated import SimulatedTransport
@@ -47,7 +47,7 @@ def test_the_device_gives_what_is_wired() -> None:
         channels.quadrature("motor_angle_rad", "motor", 4096),
         channels.torque_cell("torque_n_m", "distal", -39.811e-6),
     ]
-    device = TeensyDevice(SimulatedTransport(TeensyFake(HandMovedBench())), wired)
+    device = TeensyDevice(SimulatedTransport(PythonBoard(HandMovedBench())), wired)
     device.start()
     batches = [device.read(0.1) for _ in range(30)]
     angle = np.concatenate([batch.columns["motor_angle_rad"] for batch in batches])

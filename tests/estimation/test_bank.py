@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from estimation.bank.edges import edges
 from estimation.bank.fitting import AS_GOOD, CHOICES, Normal, Pool, Settings, Shape, chosen, solve
 from estimation.bank.states import EFFECTS, NEUTRAL, POSED, RIPPLE, STATES, Bank, closed
 from estimation.campaign import Campaign
@@ -22,6 +23,7 @@ from estimation.estimators.network import NetworkEstimator
 from estimation.networks.network import Network, NetworkError
 from estimation.recording import Instrument, Recording
 from tests.estimation.synthetic import campaign
+from tests.estimation.synthetic import run as synthetic_run
 
 TARGET = "proximal_torque_n_m"
 BANK = Bank("motor_current_a")
@@ -175,6 +177,39 @@ def test_its_interval_holds_on_a_run_it_has_not_seen(runs):
         inside.append(np.abs(error) <= width)
         assert np.all(width > 0)
     assert np.concatenate(inside).mean() > 0.8
+
+
+def test_an_interval_looks_beyond_the_levels_that_were_fitted():
+    # the zero bends with the frequency, which no state shows
+    levels = [0.2 + 0.1 * f for f in range(6)]
+    known = [
+        synthetic_run(
+            f"{f:.1f} {load}", f, load, seed=k, seconds=6.0, offset_n_m=0.2 * (f - 0.45) ** 2
+        )
+        for k, (f, load) in enumerate((f, load) for f in levels for load in (0.05, 0.1))
+    ]
+    rest = [run for run in known if run.conditions["frequency_hz"] < 0.65]
+    silent = [replace(run, conditions={}) for run in rest]
+    plain, looking = (BankRecipe(TARGET, BANK).fit(Campaign.of(part)) for part in (silent, rest))
+    np.testing.assert_array_equal(plain.weights, looking.weights)
+    shares = []
+    for estimator in (plain, looking):
+        errors = np.hstack([closing_error(estimator, run) for run in known[-2:]])
+        shares.append(np.mean(np.abs(errors[0]) <= errors[1]))
+    assert shares[1] > shares[0]
+    assert looking.interval.least > plain.interval.least
+
+
+def test_levels_count_where_they_were_varied_on_purpose():
+    drift = [{"load_command_a": 0.1 * (k % 3), "zero_rad": 0.01 * k} for k in range(12)]
+    found = edges(drift, 5)
+    assert [list(at) for at in found] == [[0, 3, 6, 9], [2, 5, 8, 11]]
+    assert (
+        edges([{**held, "load_command_a": 0.1 * (k % 2)} for k, held in enumerate(drift)], 5) == []
+    )
+    assert edges([*drift, {}], 5) == []
+    assert edges(drift, 9) == []
+    assert edges([], 5) == []
 
 
 def test_samples_beyond_what_was_fitted_are_told(fitted, runs):

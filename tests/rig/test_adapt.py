@@ -57,7 +57,7 @@ def test_replay_refuses_another_instrument_unless_told(folders, states, capsys):
 def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states, tmp_path):
     found, new = tmp_path / "a.json", tmp_path / "new.npz"
     words = ["adapt", str(states), str(folders[1]), "--runs", "01,05"]
-    assert main([*words, "--json", str(found), "--out", str(new)]) == 0
+    assert main([*words, "--json-out", str(found), "--out", str(new)]) == 0
     result = json.loads(found.read_text())
     assert len(result["used"]) == 2
     assert len(result["unused"]) == 7
@@ -79,7 +79,7 @@ def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path,
     path, new = tmp_path / "network.npz", tmp_path / "new.npz"
     NetworkEstimator(network).save(path)
     words = ["adapt", str(path), str(folders[1]), "--runs", "01,05", "--no-scratch"]
-    assert main([*words, "--json", "-", "--out", str(new)]) == 0
+    assert main([*words, "--json", "--out", str(new)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["kind"] == "network"
     assert result["scratch"] is None

@@ -26,6 +26,7 @@ def rig(tmp_path, monkeypatch, capsys):
         text = text.replace("seed = 0", f'seed = 0\nplant = "declared"\nhidden = {hidden}')
         (tmp_path / "rig.toml").write_text(text)
         how = ["--operator", "Ada", "--yes", "--json", "--config", "rig.toml", "--out", "raw"]
+        how += ["--store", "store"]
         return run("calibrate", kind, *words, *how)["records"]
 
     calibrated.run = run
@@ -51,7 +52,7 @@ def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, 
     digest = next(d for d, r in records.items() if r["channel"] != "jaw_angle_rad")
     assert families(rig.run("cal", "diagnose", digest, "--json")) == wanted
     if kind == "encoder":  # the same from the folder of raw logs, as any other recordings
-        assert families(rig.run("diagnose", "raw", "--json", "-", "--ledger", "other")) == wanted
+        assert families(rig.run("diagnose", "raw", "--json", "--ledger", "other")) == wanted
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, 
 )
 def test_a_calibration_that_lacks_nothing_is_told_nothing(rig, kind, words):
     rig(kind, *words)
-    assert families(rig.run("diagnose", "raw", "--json", "-")) == []
+    assert families(rig.run("diagnose", "raw", "--json")) == []
 
 
 def test_a_torque_sensor_with_a_kink_is_told_so(rig, monkeypatch):

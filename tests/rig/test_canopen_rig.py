@@ -10,15 +10,19 @@ from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import State
 from drivers.errors import DriverError
+from drivers.teensy.driver import TeensyLogger
 from drivers.transport.simulated_can import SimulatedCanBus
 from rig.bench.companions import topic
+from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.logger import CanopenLogger
 from rig.canopen.simulated import open_simulated_canopen
+from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
 from rig.log.reader import read_log
+from rig.machines.choose import machine_of
 from rig.protocols.protocol import Protocol
 from rig.recording.campaign import open_campaign_folder, record_campaign
 
@@ -59,7 +63,7 @@ def test_the_spindle_follows_its_target_and_the_drive_ends_without_power() -> No
 def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it() -> None:
     drive = Epos4Fake()
     drive.state = State.OPERATION_ENABLED
-    from drivers.epos4.driver import Epos4
+    from drivers.epos4.drive import Epos4
 
     bus = SimulatedCanBus([drive])
     CanopenLogger(Epos4(bus), bus).close()
@@ -138,3 +142,36 @@ def test_a_campaign_is_recorded_with_the_further_devices_on_the_loggers_time(
         np.testing.assert_allclose(np.diff(rows["time_s"]), 1 / rate_hz, rtol=1e-3)
         assert 0 <= rows["time_s"][0] < 0.02
         assert (rows["flags"] == 0).all()
+
+
+def test_rig_clear_clears_the_fault_of_the_configured_drive(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = Epos4Fake()
+    drive.fail(0x8130, 0x10)
+    monkeypatch.setattr("rig.bench.clearing.open_can", lambda url: SimulatedCanBus([drive], url))
+    assert main(["clear", "-c", "canopen", "--json"]) == 0
+    told = capsys.readouterr()
+    assert '"code": 33072' in told.out
+    assert "heartbeat of the host" in told.err
+    assert drive.state is State.SWITCH_ON_DISABLED
+    assert main(["clear", "-c", "canopen"]) == 0
+    assert "nothing is latched" in capsys.readouterr().out
+
+
+def test_rig_clear_reports_the_trip_of_a_board_that_clears_it_by_arming(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = load_config(Path("simulated"))
+    link = open_logger(settings)
+    machine = machine_of(settings)
+    logger = TeensyLogger(link, machine.profile)
+    limits = machine.untroubled(machine.board_limits(settings, settings.calibration_set()))
+    logger.arm(machine.gains(settings), limits)
+    for _ in range(100):
+        logger.read(0.05)  # nobody beats: the watchdog trips
+    monkeypatch.setattr("rig.bench.clearing.open_logger", lambda _: link)
+    assert main(["clear", "-c", "simulated"]) == 0
+    told = capsys.readouterr().out
+    assert "heard nothing from this computer" in told
+    assert "next arming" in told

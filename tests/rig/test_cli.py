@@ -39,18 +39,57 @@ def test_exit_codes(error, code):
 
 
 def verbs(command, words=()):
-    """Yield every verb of the command line and its options."""
+    """Yield every verb of the command line and its options that take no value."""
     if not getattr(command, "commands", None):
-        yield " ".join(words), {o for p in command.params for o in p.opts}
+        switches = [p for p in command.params if getattr(p, "is_flag", False)]
+        yield " ".join(words), {o for p in switches for o in p.opts}
         return
     for name, part in command.commands.items():
         yield from verbs(part, (*words, name))
 
 
-def test_every_command_speaks_to_machines():
+def test_json_is_a_switch_of_every_command():
     found = dict(verbs(get_command(app)))
     assert {"record", "cal list", "firmware flash", "study zhao"} <= set(found)
-    assert [words for words, options in found.items() if "--json" not in options] == []
+    assert [words for words, switches in found.items() if "--json" not in switches] == []
+
+
+@pytest.mark.parametrize("words", ["", "record", "cal list", "calibrate torque", "study"])
+def test_help_has_a_short_option_too(words, capsys):
+    assert main([*words.split(), "-h"]) == 0
+    short = capsys.readouterr().out
+    assert main([*words.split(), "--help"]) == 0
+    assert capsys.readouterr().out == short
+    assert "..." not in short.replace("COMMAND [ARGS]...", "")
+
+
+def test_the_help_names_what_is_shipped_and_the_default(capsys):
+    main(["record", "-h"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "one of diagnosis, grasper, grasper_fit, quick, reference, thorough, unloaded" in shown
+    assert "If none: diagnosis" in shown
+    main(["fit", "-h"])
+    assert "cable, gearbox, grasper, grip" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ("rig re", {"record", "replay"}),
+        ("rig record --protocol d", {"diagnosis"}),
+        ("rig record --config gra", {"grasper", "grasper_pty"}),
+        ("rig record --config b", {"bench.toml"}),
+        ("rig fit --model gr", {"grasper", "grip"}),
+    ],
+)
+def test_the_shell_completes_commands_and_names(words, wanted, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bench.toml").touch()
+    monkeypatch.setenv("_RIG_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    main([])
+    assert set(capsys.readouterr().out.split()) == wanted
 
 
 RESULTS = ["devices", "cal list", "config check", "config list", "config show", "grasper designs"]

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -19,7 +20,9 @@ def calibrate(tmp_path, monkeypatch, capsys):
 
     def run(*words, yes=True):
         asked = ["--yes"] if yes else []
-        code = main(["calibrate", *words, "--operator", "Ada", *asked, "--json"])
+        code = main(
+            ["calibrate", *words, "--operator", "Ada", *asked, "--json", "--store", "store"]
+        )
         return code, json.loads(capsys.readouterr().out)
 
     return run
@@ -44,7 +47,7 @@ def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, caps
     assert record.operator == "Ada"
     assert record.firmware_hash == "00000000"  # weights hang on the fake, built from no sources
     assert record.figure_svg.startswith("<svg xmlns")
-    assert main(["cal", "check"]) == 0
+    assert main(["cal", "check", "--store", "store"]) == 0
     assert main(["log", "check", "raw"]) == 0
     capsys.readouterr()
     # the same raw logs give the same numbers
@@ -127,6 +130,60 @@ def test_ctrl_c_leaves_nothing(calibrate, tmp_path, monkeypatch):
     monkeypatch.setattr(SimulatedHands, "prepare", interrupted)
     assert main(["calibrate", "torque", "--operator", "Ada", "--yes"]) == 130
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def typed(monkeypatch, tmp_path, capsys):
+    """Answer the questions of a torque session with what is given, one answer a question."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+
+    def run(answers, *words):
+        given = iter(answers)
+        monkeypatch.setattr("builtins.input", lambda: next(given))
+        how = ["--operator", "Ada", "--store", "store", "--masses-g", "50,100,150"]
+        code = main(["calibrate", "torque", *how, *words])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_a_person_sees_each_reading_and_can_go_back(typed):
+    answers = ["", "", "banana", "", "b", *[""] * 5]
+    code, out, err = typed(answers, "--out", "raw")
+    assert code == 0
+    assert err.count("3/7") == 2  # the third step was measured again
+    assert "counts, +0." in err or "counts, -0." in err
+    assert "of the range off the line so far" in err
+    assert "'banana' is none of these" in err
+    assert len(list(Path("raw").glob("*.mcap"))) == 7
+    assert "slope 39.8" in out
+    assert "uN m a count" in out
+    assert "Good" in out
+
+
+def test_a_stopped_session_goes_on_where_it_was(typed):
+    code, _, err = typed(["", "", "", "q"])
+    assert code == 5
+    assert "3 of 7 steps are kept" in err
+    (folder,) = Path("logs").glob("*-unfinished-torque")
+    code, _, err = typed([""] * 4, "--resume", str(folder), "--out", "raw")
+    assert code == 0
+    assert "4/7" in err
+    assert "3/7" not in err
+    assert len(list(Path("raw").glob("*.mcap"))) == 7
+    code, _, err = typed([], "--resume", str(folder), "--arm-mm", "90")
+    assert code == 2
+    assert "other steps" in err
+
+
+@pytest.mark.parametrize(
+    "words", [["--masses-g", "50,100"], ["--sensor", "middle"], ["--operator", " "]]
+)
+def test_what_cannot_be_calibrated_is_said_before_the_first_weight(typed, words):
+    code, _, err = typed([], *words)
+    assert code == 2
+    assert "1/" not in err
 
 
 def test_raw_logs_of_another_kind_are_refused(calibrate):

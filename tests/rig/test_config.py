@@ -150,3 +150,44 @@ def test_config_check_speaks_to_machines(tmp_path, capsys):
     bad.write_text(to_toml(on_one_bus({}, {})))
     assert main(["config", "check", str(bad), "--json"]) == ExitCode.USAGE
     assert len(json.loads(capsys.readouterr().out)["problems"]) == 2
+
+
+def test_each_problem_names_its_line(tmp_path, capsys):
+    text = SIMULATED.read_text()
+    text = text.replace("kp = 20.0", "kpp = 20.0").replace("motor_current_a = 0.6", "")
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    assert main(["config", "check", str(path)]) == ExitCode.USAGE
+    said = capsys.readouterr().err.splitlines()
+    lines = text.splitlines()
+    slip = next(line for line in said if "kpp" in line)
+    assert f"line {lines.index('kpp = 20.0') + 1}, controller.kpp" in slip
+    missing = next(line for line in said if "motor_current_a" in line)
+    assert f"line {lines.index('[limits]') + 1}, limits.motor_current_a" in missing
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "meant"),
+    [
+        ('model = "simulated_grip"', 'model = "simulated_gripp"', "simulated_grip"),
+        ('calibration = "reference"', 'calibration = "refrence"', "reference"),
+    ],
+)
+def test_a_model_or_calibration_that_is_not_there_is_a_problem(tmp_path, capsys, old, new, meant):
+    path = tmp_path / "bad.toml"
+    path.write_text(SIMULATED.read_text().replace(old, new))
+    assert main(["config", "check", str(path)]) == ExitCode.USAGE
+    assert f"Did you mean {meant!r}" in capsys.readouterr().out
+
+
+def test_a_configuration_is_begun_for_the_board_that_is_plugged_in(tmp_path, monkeypatch, capsys):
+    from rig.doctor.ports import Port
+
+    board = Port("/dev/ttyACM0", "16c0:0483:1234567", "USB Serial")
+    monkeypatch.setattr("rig.doctor.ports.serial_ports", lambda: [board])
+    path = tmp_path / "rig.toml"
+    assert main(["config", "init", str(path)]) == 0
+    assert load_config(path).logger.url == "usb:16c0:0483:1234567"
+    assert main(["config", "check", str(path)]) == 0
+    assert main(["config", "init", str(path)]) == ExitCode.USAGE
+    assert "already" in capsys.readouterr().err

@@ -37,7 +37,7 @@ def campaign(monkeypatch):
 def run(folder: Path, *words: str) -> dict:
     out = folder / "diagnosis.json"
     ledger = str(folder / "looks.jsonl")
-    whole = ["diagnose", str(folder), "--json", str(out), "--ledger", ledger, *words]
+    whole = ["diagnose", str(folder), "--json-out", str(out), "--ledger", ledger, *words]
     assert main(whole) == 0
     return json.loads(out.read_text())
 

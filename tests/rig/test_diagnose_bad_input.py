@@ -1,5 +1,6 @@
 """What `rig diagnose` says of recordings it can decide nothing of: what, why, and never a name."""
 
+import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -81,7 +82,7 @@ CASES: dict[str, tuple[Spoil, str]] = {
 def diagnosed(monkeypatch, folder: Path, recordings: list[Recording]) -> dict[str, Any]:
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
-    words += ["--ledger", str(folder / "looks.jsonl"), "--json", str(folder / "diagnosis.json")]
+    words += ["--ledger", str(folder / "looks.jsonl"), "--json-out", str(folder / "diagnosis.json")]
     assert main(words) == 0
     found: dict[str, Any] = json.loads((folder / "diagnosis.json").read_text())
     return found
@@ -110,9 +111,59 @@ def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     ledger, out = tmp_path / "looks.jsonl", tmp_path / "diagnosis.json"
     words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick"]
-    assert main([*words, "--ledger", str(ledger), "--json", str(out)]) == 5
+    assert main([*words, "--ledger", str(ledger), "--json-out", str(out)]) == 5
     said = capsys.readouterr().err
     assert reason in " ".join(said.split())
     assert "spring" not in said
     assert not ledger.exists()
     assert not out.exists()
+
+
+@pytest.mark.parametrize("option", ["--json-out", "--report", "--model-out", "--protocol-out"])
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(option, tmp_path, capsys):
+    """The held-out runs would be used up, and nobody would have seen the result."""
+    ledger = tmp_path / "looks.jsonl"
+    words = ["diagnose", str(tmp_path / "no such recordings"), "--ledger", str(ledger)]
+    assert main([*words, option, "/dev/null/x"]) == 2
+    assert "/dev/null/x" in capsys.readouterr().err
+    assert not ledger.exists()
+
+
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(monkeypatch, tmp_path, capsys):
+    recordings = runs(spring, count=9, seconds=2.0)
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+    out = tmp_path / "diagnosis.json"
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--json-out", str(out)]
+    assert main([*words, "--ledger", "/dev/null/x"]) == 5
+    assert "reading the recordings" not in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_diagnosis_that_leaves_nothing_does_not_use_up_the_runs(monkeypatch, tmp_path):
+    """A fault while its page is made, after the held-out runs were opened."""
+
+    def broken(*_: object) -> str:
+        raise ValueError("no page")
+
+    recordings = runs(spring, count=9, seconds=2.0)
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+    monkeypatch.setattr("rig.reports.diagnosis.page", broken)
+    ledger = tmp_path / "looks.jsonl"
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--ledger", str(ledger)]
+    assert main([*words, "--report", str(tmp_path)]) == 70
+    assert not ledger.exists()
+
+
+def test_a_reader_that_leaves_early_has_the_files(monkeypatch, tmp_path):
+    class Left(io.StringIO):
+        def write(self, text: str) -> int:
+            raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stdout", Left())
+    recordings = runs(spring, count=9, seconds=2.0)
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+    out, ledger = tmp_path / "diagnosis.json", tmp_path / "looks.jsonl"
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--ledger", str(ledger)]
+    main([*words, "--json-out", str(out)])
+    assert json.loads(out.read_text())["schema"] == "rig.diagnosis/1"
+    assert len(ledger.read_text().splitlines()) == 1

@@ -10,7 +10,7 @@ import pytest
 from drivers.device import Batch, Device, SampleFlag
 from drivers.registry import fakes
 from drivers.teensy.device import TeensyDevice
-from drivers.teensy.fake import TeensyFake
+from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.faulty import Fault, Faults
 from drivers.transport.simulated import SimulatedTransport
@@ -50,7 +50,7 @@ def test_a_bad_cable_is_a_warning_with_numbers() -> None:
 
 
 def test_another_firmware_is_told_with_the_command_that_fixes_it() -> None:
-    board = TeensyFake(HandMovedBench(), protocol_hash=0xDEADBEEF)
+    board = PythonBoard(HandMovedBench(), protocol_hash=0xDEADBEEF)
     (finding,) = device_findings("logger", lambda: TeensyDevice(SimulatedTransport(board)))
     assert (finding.check, finding.level) == ("firmware", Level.ERROR)
     assert finding.fix == "Run: rig firmware flash"

@@ -46,6 +46,7 @@ def diagnosed(monkeypatch):
         return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1])
 
     monkeypatch.setattr(looping, "run_diagnosis", stand_in)
+    monkeypatch.setattr(looping, "remember", lambda *_: None)
     return told
 
 

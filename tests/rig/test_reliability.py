@@ -92,6 +92,54 @@ def test_a_part_that_was_not_measured_here_keeps_its_rows(
     assert "not measured" in page.written({}, "")
 
 
+def measured(
+    words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> dict[str, str | None]:
+    """Run the command on made-up measurements and return the pages it has written."""
+    names = ("STATE", "TABLE", "SHORT_STATE", "SHORT_TABLE")
+    paths = {name: folder / name.lower() for name in names}
+    for name, path in paths.items():
+        monkeypatch.setattr(page, name, path)
+    paths["TABLE"].write_text("the committed table")
+    figures = {"count": 200, "most_lost_s": 0.1, "median_lost_s": 0.1}
+    monkeypatch.setattr(page, "_MEASURES", {"kills": lambda _: figures, "fuzz": lambda _: {}})
+    monkeypatch.setattr(page.fuzz, "STATE", folder / "fuzz.json")
+    monkeypatch.setattr("sys.argv", ["reliability", *words])
+    assert page.main() == 0
+    pages = (paths["TABLE"], paths["SHORT_TABLE"])
+    return {path.name: path.read_text() if path.exists() else None for path in pages}
+
+
+def test_a_short_run_leaves_the_committed_table_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = measured(["kills", "--kills", "3"], tmp_path, monkeypatch)
+    assert pages["table"] == "the committed table"
+    assert "200 recorders killed" in str(pages["short_table"])
+    assert not (tmp_path / "state").exists()
+
+
+def test_a_full_run_writes_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = measured(["kills"], tmp_path, monkeypatch)
+    assert "200 recorders killed" in str(pages["table"])
+    assert pages["short_table"] is None
+
+
+def test_a_fuzz_run_that_is_not_done_keeps_the_rows_of_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fuzz, "STATE", tmp_path / "fuzz.json")
+    tallies = fuzz.load(fuzz.STATE)
+    tallies[TARGETS[0].name].inputs = 3000
+    fuzz.save(fuzz.STATE, tallies)
+    earlier = page.TABLE.read_text()
+    rows = [line for line in earlier.splitlines() if line.startswith("| ")]
+    assert [line for line in page.written({}, earlier).splitlines() if line in rows] == rows
+    tallies[TARGETS[0].name].failures.append((1, "00", "x"))
+    fuzz.save(fuzz.STATE, tallies)
+    assert "3000 inputs" in page.written({}, earlier)
+
+
 @pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="needs /proc (Linux)")
 def test_what_listens_is_seen_and_told_from_what_does_not() -> None:
     before = listening.listening(os.getpid())

@@ -48,7 +48,7 @@ def test_limits_reach_the_board_in_its_own_counts():
     assert limits.max_current == 600
     assert limits.i2t == 500_000  # 0.5 A^2 s at 1 mA a count
     assert (limits.min_jaw, limits.max_jaw) == (-318, 637)
-    assert limits.max_motor_step == 587  # 0.9 rad a tick
+    assert limits.max_motor_step == 261  # 0.4 rad a tick
     assert limits.stale_ticks == TOP
     assert limits.safe_state == SafeState.HOLD
     assert limits.min_spindle == -limits.max_spindle == -3911
@@ -141,7 +141,7 @@ def test_a_value_that_is_no_number_is_beyond_every_limit():
         check_samples(config.limits, dataclasses.replace(reading, columns=columns))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_second_ctrl_c_does_not_break_into_the_way_out(number):
     """The second comes while the board is being disarmed, which must go on all the same."""
     config = simulated()

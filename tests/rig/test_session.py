@@ -67,17 +67,18 @@ def test_the_rig_is_disarmed_whatever_ends_the_session(error):
     assert not is_armed(link.board)
 
 
-def test_sigterm_takes_the_way_out_of_ctrl_c():
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_sigterm_and_a_lost_terminal_take_the_way_out_of_ctrl_c(number):
     config = simulated()
     link = transport(config)
-    before = signal.getsignal(signal.SIGTERM)
+    before = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), Session(config, link) as session:  # noqa: PT012
         next(session.play(HOLD, LOAD))
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), number)
         for _ in session.watch():
             pass
     assert not is_armed(link.board)
-    assert signal.getsignal(signal.SIGTERM) is before
+    assert signal.getsignal(number) is before
 
 
 def test_a_crossed_limit_disarms_and_says_which():

@@ -7,8 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from rig.cli.study import study_app
+from rig.output.provenance import Provenance
 from rig.studies.delsol import study as delsol
-from rig.studies.delsol.diagnosis import PULLS
+from rig.studies.delsol.diagnosis import PULLS, Named
+from rig.studies.delsol.page import lead
+from rig.studies.delsol.study import DelSolStudy
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
@@ -30,6 +33,23 @@ def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):
     assert ours["impact_n"] < paper["impact_n"]
     assert "| paper | 26.10 | 12.98 | 6.81 |" in out.read_text()
     assert found["outcomes"][delsol.DISCARDED] != found["outcomes"][delsol.PAPER]
+
+
+def named(joint, family, *alternatives):
+    return Named(joint, family, "identified", alternatives, 2.0, 1.0)
+
+
+def test_the_page_begins_with_every_false_name():
+    arms = (
+        (named(1, "spring.position"), named(3, "hysteresis.presliding")),
+        (named(3, "coupling.kinematic"), named(2, "unknown")),
+        (named(1, "spring.end_stop", "spring.position"), named(2, "spring.position")),
+    )
+    study = DelSolStudy("", (0, 1, 2), {}, arms, Provenance.now(0))
+    said = lead(study)
+    assert "joint 1 of 1 of 3 arms" in said
+    assert "Of 6 names on 15 joints 2 are false" in said
+    assert "coupling.kinematic on joint 3, spring.position on joint 2" in said
 
 
 def test_a_points_condition_is_that_of_its_own_rows():

@@ -49,8 +49,8 @@ def test_every_run_is_held_out_once_and_the_claims_are_shares(study):
 
 def test_an_unseen_frequency_is_harder_than_an_unseen_run(study):
     by = {r.job.protocol: r for r in study.rows if r.job.surrogate == "current"}
-    assert by["lofo"].score.rmse > 0
-    assert by["lofo"].inside < 1.0  # its speed was never fitted
+    assert by["lofo"].score.rmse > by["run-wise"].score.rmse
+    assert by["lofo"].inside < by["run-wise"].inside  # its speed was never fitted
 
 
 def test_what_an_effect_brings_is_seen_by_leaving_it_out(study):

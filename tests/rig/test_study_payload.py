@@ -15,6 +15,7 @@ from rig.arm.payload import find_payload
 from rig.arm.simulated import draw_arm
 from rig.cli.main import main
 from rig.cli.study import study_app
+from rig.errors import DataError
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
@@ -78,6 +79,12 @@ def test_a_mass_is_found_at_any_speed_even_where_a_run_repeats_only_twice():
         low, high = found.interval_kg
         assert found.mass_kg == pytest.approx(true, rel=0.03, abs=0.002), run.name
         assert low < true < high, run.name
+
+
+def test_a_mass_mounted_elsewhere_is_refused_and_not_misread():
+    fitted = made_run("without", 40.0, 8.0)
+    with pytest.raises(DataError, match=r"one19_parallel_105g.*parallel.*not modelled"):
+        find_payload(fitted, [made_run("one19_parallel_105g", 30.0, 5.0, 0.1)], 0.535, 0.005)
 
 
 def test_a_run_named_twice_is_refused(capsys):

@@ -40,6 +40,8 @@ class Mps2Hardware {
     ReferenceProfile::Inputs sample() { return plant_.sample(); }
     void drive(const ReferenceProfile::Outputs& outputs) { plant_.step(outputs); }
 
+    void feed() {}  // no watchdog: it runs in the host's time
+
     std::size_t read(std::uint8_t* out, std::size_t room) {
         std::size_t count = 0;
         for (; count < room && unread_ != 0; --unread_) out[count++] = get();

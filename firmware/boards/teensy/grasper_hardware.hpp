@@ -10,6 +10,20 @@
 #include "link.hpp"
 #include "wiring41_grasper.hpp"
 
+namespace rig {
+
+// Needs nothing that a fault may have broken.
+inline void motors_off() {
+    for (int pin : wiring::kEnablePin) {
+        pinMode(pin, OUTPUT);
+        digitalWrite(pin, LOW);
+    }
+}
+
+}  // namespace rig
+
+#include "watch.hpp"
+
 #if defined(ARDUINO_TEENSY35)
 #error "The grasper needs three hardware decoders: a Teensy 4.1"
 #endif
@@ -24,10 +38,8 @@ class GrasperHardware : public TeensyLink {
 
     // Motors off first, whatever else fails.
     void begin() {
-        for (int pin : wiring::kEnablePin) {
-            pinMode(pin, OUTPUT);
-            digitalWrite(pin, LOW);
-        }
+        motors_off();
+        take_faults();
         analogWriteResolution(wiring::kSetBits);
         for (int pin : wiring::kSetPin) analogWriteFrequency(pin, wiring::kPwmHz);
         drive(Outputs());
@@ -40,6 +52,9 @@ class GrasperHardware : public TeensyLink {
         }
         Serial.begin(115200);  // the rate has no effect on USB
     }
+
+    void begin_watch() { watch_.begin(); }
+    void feed() { watch_.feed(); }
 
     Inputs sample() {
         Inputs counts;
@@ -71,6 +86,7 @@ class GrasperHardware : public TeensyLink {
     QuadEncoder encoders_[Profile::kMotors] = {{1, wiring::kMotorA[0], wiring::kMotorB[0]},
                                                {2, wiring::kMotorA[1], wiring::kMotorB[1]},
                                                {3, wiring::kMotorA[2], wiring::kMotorB[2]}};
+    ChipWatch watch_;
     std::uint32_t enabled_ticks_ = 0;
 };
 

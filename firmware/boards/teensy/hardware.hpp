@@ -16,6 +16,20 @@
 
 namespace rig {
 
+// Needs nothing that a fault may have broken.
+inline void motors_off() {
+    for (int pin : {wiring::kDriveEnablePin, wiring::kLoadEnablePin}) {
+        pinMode(pin, OUTPUT);
+        digitalWrite(pin, LOW);
+    }
+}
+
+}  // namespace rig
+
+#include "watch.hpp"
+
+namespace rig {
+
 class ReferenceHardware : public TeensyLink {
   public:
     using Profile = ReferenceProfile;
@@ -24,10 +38,8 @@ class ReferenceHardware : public TeensyLink {
 
     // Motors off first, whatever else fails.
     void begin() {
-        for (int pin : {wiring::kDriveEnablePin, wiring::kLoadEnablePin}) {
-            pinMode(pin, OUTPUT);
-            digitalWrite(pin, LOW);
-        }
+        motors_off();
+        take_faults();
         analogWriteResolution(wiring::kSetBits);
         if constexpr (wiring::kPwmHz > 0) {
             for (int pin : {wiring::kDriveSetPin, wiring::kLoadSetPin}) {
@@ -41,6 +53,9 @@ class ReferenceHardware : public TeensyLink {
         encoders_.begin();
         Serial.begin(115200);  // the rate has no effect on USB
     }
+
+    void begin_watch() { watch_.begin(); }
+    void feed() { watch_.feed(); }
 
     Inputs sample() {
         Inputs counts;
@@ -77,6 +92,7 @@ class ReferenceHardware : public TeensyLink {
     }
 
     Counters encoders_;
+    ChipWatch watch_;
     std::uint32_t enabled_ticks_ = 0;
 };
 

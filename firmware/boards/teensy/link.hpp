@@ -33,9 +33,10 @@ class TeensyLink {
     std::size_t write(const std::uint8_t* data, std::size_t size) {
         const int fits = Serial.availableForWrite();
         const std::size_t room = fits > 0 ? static_cast<std::size_t>(fits) : 0;
-        const std::size_t count = Serial.write(data, size < room ? size : room);
+        const std::size_t asked = size < room ? size : room;
+        const std::size_t count = Serial.write(data, asked);
         Serial.send_now();
-        return count;
+        return count <= asked ? count : 0;  // the core gives -1, as a size, where USB is not there
     }
 };
 

@@ -23,7 +23,9 @@ void sample() { app.tick(); }
 void setup() {
     hardware.begin();
     timer.priority(rig::wiring::kSamplePriority);
-    timer.begin(sample, static_cast<int>(Hardware::Profile::kTickUs));
+    hardware.begin_watch();
+    // without a timer no tick feeds the watchdog, and the chip starts anew
+    if (!timer.begin(sample, static_cast<int>(Hardware::Profile::kTickUs))) rig::motors_off();
 }
 
 void loop() { app.exchange(); }

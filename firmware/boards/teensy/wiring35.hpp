@@ -25,6 +25,7 @@ constexpr int kTorqueZero = 2048;  // counts of a cell's amplifier at mid-scale
 constexpr int kDriveSetPin = A21, kLoadSetPin = A22;
 constexpr int kDriveEnablePin = 24, kLoadEnablePin = 25;
 constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
+constexpr int kAlivePin = 28;  // toggles while the chip is alive
 constexpr float kPwmHz = 0.0F;  // none
 constexpr int kSetBits = 12;
 constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "../escon.hpp"
+#include "crossbar41.hpp"
 
 namespace rig::wiring {
 
@@ -11,7 +12,9 @@ constexpr char kSerial[] = "TEENSY41-0001";
 // Three of the four hardware decoders. 3.3 V logic: an AMT102 (5 V) needs a level shifter.
 constexpr int kMotorA = 0, kMotorB = 1;
 constexpr int kSpindleA = 2, kSpindleB = 3;
-constexpr int kJawA = 5, kJawB = 7;
+constexpr int kJawA = 7, kJawB = 8;
+static_assert(inputs_are_exclusive({kMotorA, kMotorB, kSpindleA, kSpindleB, kJawA, kJawB}),
+              "two encoder pins share an input of the crossbar, or one reaches no decoder");
 
 constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
 
@@ -22,8 +25,10 @@ constexpr int kTorqueZero = 2048;  // counts of a cell's amplifier at mid-scale
 
 // This board has no DAC: set values are PWM, 10 to 90 % duty.
 constexpr int kDriveSetPin = 22, kLoadSetPin = 23;
-constexpr int kDriveEnablePin = 24, kLoadEnablePin = 25;
+// Not pins 24 and 25: they are LPUART1, which the processor's boot ROM may drive.
+constexpr int kDriveEnablePin = 28, kLoadEnablePin = 29;
 constexpr int kDriveReadyPin = 26, kLoadReadyPin = 27;
+constexpr int kAlivePin = 31;  // toggles while the chip is alive
 constexpr float kPwmHz = 5000.0F;
 constexpr int kSetBits = 12;
 constexpr double kDriveFullScaleA = 2.0;  // current of a full command; a positive command opens

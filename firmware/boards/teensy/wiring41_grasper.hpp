@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "../escon.hpp"
+#include "crossbar41.hpp"
 
 namespace rig::wiring {
 
@@ -14,8 +15,11 @@ constexpr char kSerial[] = "TEENSY41-GRASPER-0001";
 constexpr std::size_t kMotors = 3;
 
 // Three of the four hardware decoders; 3.3 V logic.
-constexpr int kMotorA[kMotors] = {0, 2, 5};
-constexpr int kMotorB[kMotors] = {1, 3, 7};
+constexpr int kMotorA[kMotors] = {0, 2, 7};
+constexpr int kMotorB[kMotors] = {1, 3, 8};
+static_assert(inputs_are_exclusive({kMotorA[0], kMotorB[0], kMotorA[1], kMotorB[1], kMotorA[2],
+                                    kMotorB[2]}),
+              "two encoder pins share an input of the crossbar, or one reaches no decoder");
 
 constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
 
@@ -25,8 +29,10 @@ constexpr int kAdcBits = 12;
 
 // This board has no DAC: set values are PWM, 10 to 90 % duty.
 constexpr int kSetPin[kMotors] = {22, 23, 33};
-constexpr int kEnablePin[kMotors] = {24, 25, 26};
-constexpr int kReadyPin[kMotors] = {27, 28, 29};
+// Not pins 24 and 25: they are LPUART1, which the processor's boot ROM may drive.
+constexpr int kEnablePin[kMotors] = {28, 29, 30};
+constexpr int kReadyPin[kMotors] = {26, 27, 32};
+constexpr int kAlivePin = 31;  // toggles while the chip is alive
 constexpr float kPwmHz = 5000.0F;
 constexpr int kSetBits = 12;
 constexpr double kFullScaleA = 2.0;  // current of a full command; a positive command closes

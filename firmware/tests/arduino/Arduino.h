@@ -45,10 +45,12 @@ struct FakeSerial {
     }
     int availableForWrite() const { return room; }
     std::size_t write(const std::uint8_t* data, std::size_t size) {
+        if (detached) return static_cast<std::size_t>(-1);
         out.insert(out.end(), data, data + size);
         return size;
     }
     void send_now() {}
+    bool detached = false;  // the core then gives -1, as a size
 };
 inline FakeSerial Serial;
 
@@ -56,11 +58,12 @@ struct IntervalTimer {
     void (*function)() = nullptr;
     int level = 128;
     int period_us = 0;
+    bool works = true;
     void priority(int asked) { level = asked; }
     bool begin(void (*called)(), int every_us) {
         function = called;
         period_us = every_us;
-        return true;
+        return works;
     }
 };
 
@@ -71,4 +74,26 @@ constexpr std::uint32_t PORT_PCR_MUX(std::uint32_t function) { return function <
 inline volatile std::uint32_t PORTA_PCR12, PORTA_PCR13, PORTB_PCR18, PORTB_PCR19;
 inline volatile std::uint32_t FTM1_MODE, FTM1_SC, FTM1_CNTIN, FTM1_MOD, FTM1_CNT, FTM1_QDCTRL;
 inline volatile std::uint32_t FTM2_MODE, FTM2_SC, FTM2_CNTIN, FTM2_MOD, FTM2_CNT, FTM2_QDCTRL;
+
+// the registers of the chip's watchdog: what was written last, and how often
+struct FakeRegister {
+    std::uint32_t value = 0;
+    int writes = 0;
+    FakeRegister& operator=(std::uint32_t written) {
+        value = written;
+        ++writes;
+        return *this;
+    }
+    FakeRegister& operator|=(std::uint32_t bits) { return *this = value | bits; }
+    operator std::uint32_t() const { return value; }
+};
+inline FakeRegister CCM_CCGR5, WDOG3_CS, WDOG3_CNT, WDOG3_TOVAL;
+inline FakeRegister WDOG_UNLOCK, WDOG_TOVALH, WDOG_TOVALL, WDOG_PRESC, WDOG_STCTRLH, WDOG_REFRESH;
+constexpr std::uint32_t CCM_CCGR_ON = 3, WDOG_CS_STOP = 1, WDOG_CS_WAIT = 2, WDOG_CS_UPDATE = 1U << 5;
+constexpr std::uint32_t WDOG_CS_EN = 1U << 7, WDOG_CS_CMD32EN = 1U << 13;
+constexpr std::uint32_t CCM_CCGR5_WDOG3(std::uint32_t gate) { return gate << 4; }
+constexpr std::uint32_t WDOG_CS_CLK(std::uint32_t source) { return source << 8; }
+constexpr std::uint32_t WDOG_UNLOCK_SEQ1 = 0xC520, WDOG_UNLOCK_SEQ2 = 0xD928;
+constexpr std::uint32_t WDOG_STCTRLH_WDOGEN = 1, WDOG_STCTRLH_ALLOWUPDATE = 16;
+constexpr std::uint32_t WDOG_STCTRLH_STOPEN = 64, WDOG_STCTRLH_WAITEN = 128;
 inline void NVIC_SET_PRIORITY(int line, int level) { board.priorities[line] = level; }

@@ -37,6 +37,9 @@ HIGHEST_HZ = 5.0
 PULLS = ("spring.position", "friction.position")
 """What the catalogue calls the pull and the rub of hoses or wires."""
 
+MEMORY = ("hysteresis.presliding", "hysteresis.bouc_wen")
+"""What the catalogue calls friction with memory, which every joint has."""
+
 JOINTS = len(HYDRAULIC.reach)
 NAMES = tuple(JointNames(k + 1, prismatic=False) for k in range(JOINTS))
 

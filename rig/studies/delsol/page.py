@@ -8,7 +8,7 @@ import numpy as np
 from estimation.recording import FloatArray
 from rig.output.figures import paired_bars, write_svgs
 from rig.output.table import TextTable, to_markdown
-from rig.studies.delsol.diagnosis import JOINTS, PULLS, RUNS, Named
+from rig.studies.delsol.diagnosis import JOINTS, MEMORY, PULLS, RUNS, Named
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 from rig.studies.delsol.study import (
     DISCARDED,
@@ -45,16 +45,29 @@ NAMED_NOTE = (
 )
 
 
+def is_false(finding: Named) -> bool:
+    """Return whether a finding names what its simulated joint does not have.
+
+    Every joint has friction with memory; joint 1 has the hoses' pull too. Of a finding with
+    alternatives, one true name among them will do. A finding without a name claims nothing.
+    """
+    true = {*MEMORY, *(PULLS if finding.joint == 1 else ())}
+    return finding.family != "unknown" and true.isdisjoint({finding.family, *finding.alternatives})
+
+
 def lead(study: DelSolStudy) -> str:
-    """Return on how many arms the hoses were found, and on how many joints without any."""
+    """Return on how many arms the hoses were found, and how many names were false."""
+    found = [f for arm in study.named for f in arm]
     there = sum(any(f.joint == 1 and f.family in PULLS for f in arm) for arm in study.named)
-    false = sum(f.joint != 1 and f.family in PULLS for arm in study.named for f in arm)
-    pull = [f for arm in study.named for f in arm if f.joint == 1 and f.family in PULLS]
+    pull = [f for f in found if f.joint == 1 and f.family in PULLS]
     gain = [100 * (1 - f.after_n_m / f.before_n_m) for f in pull]
     said = f", with {np.median(gain):.0f} % less error on runs set aside (median)" if gain else ""
+    false = [f for f in found if is_false(f)]
+    which = sorted({f"{f.family} on joint {f.joint}" for f in false})
     return (
         f"The diagnosis named the hoses' pull on joint 1 of {there} of {len(study.seeds)} arms"
-        f"{said}, and a pull on {false} of {(JOINTS - 1) * len(study.seeds)} joints without hoses."
+        f"{said}. Of {len(found)} names on {JOINTS * len(study.seeds)} joints {len(false)} are"
+        f" false{': ' + ', '.join(which) if which else ''}."
     )
 
 

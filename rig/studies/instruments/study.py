@@ -14,8 +14,9 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.estimator import Recipe
 from estimation.estimators.adaptation import adapted_states, evidence, reduced
-from estimation.estimators.bank import BankEstimator, BankRecipe, RunEvidence
+from estimation.estimators.bank import BankEstimator, BankRecipe
 from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.networks.training import Settings, has_torch
 from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance

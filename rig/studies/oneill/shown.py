@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.bank.states import Bank
-from estimation.estimators.bank import RunEvidence, fit_runs
+from estimation.estimators.bank import fit_runs
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.recording import FloatArray
 from rig.studies.oneill import fits
 

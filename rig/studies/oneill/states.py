@@ -19,10 +19,10 @@ from estimation.estimators.bank import (
     EVERY,
     BankEstimator,
     Estimates,
-    RunEvidence,
     fit_runs,
     rows_of,
 )
+from estimation.estimators.run_evidence import RunEvidence
 from estimation.recording import FloatArray, Recording
 from rig.studies.oneill.data import pose_runs
 from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
@@ -192,7 +192,8 @@ def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[Ru
         kept = np.flatnonzero(run.valid)[::EVERY]
         truths = np.column_stack([run.truth[target][kept] for target in TARGETS])
         rows = run.rows[bank.surrogate, filters][kept]
-        for target, evidence in zip(TARGETS, RunEvidence.of_rows(bank, rows, truths), strict=True):
+        reduced = RunEvidence.of_rows(bank, rows, truths, run.conditions)
+        for target, evidence in zip(TARGETS, reduced, strict=True):
             found[target].append(evidence)
     return found
 

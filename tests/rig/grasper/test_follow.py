@@ -91,7 +91,7 @@ def test_a_master_that_sends_nothing_is_told(potentiometers):
 
 
 def test_three_motors_go_where_the_master_goes(link, capsys):
-    code = main(["grasper", "follow", "--duration", "3", "--scale", "0.3", "--json"])
+    code = main(["grasper", "follow", "--sim", "--duration", "3", "--scale", "0.3", "--json"])
     assert code == ExitCode.OK
     assert not is_armed(link.board, GRASPER)
     told = json.loads(capsys.readouterr().out)
@@ -117,7 +117,7 @@ def test_the_firmware_process_follows_in_real_time(library, capsys):
 
 
 def test_a_master_that_asks_for_too_much_trips_the_grasper(link, capsys):
-    code = main(["grasper", "follow", "--duration", "6", "--scale", "1"])
+    code = main(["grasper", "follow", "--sim", "--duration", "6", "--scale", "1"])
     assert code == ExitCode.SAFETY
     assert "force" in capsys.readouterr().err
     assert not is_armed(link.board, GRASPER)
@@ -155,7 +155,7 @@ def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
             yield piece
 
     monkeypatch.setattr(following, "setpoints", asked)
-    assert main(["grasper", "follow"]) == ExitCode.INTERRUPTED
+    assert main(["grasper", "follow", "--sim"]) == ExitCode.INTERRUPTED
     assert len(pieces) == 20
     assert not is_armed(link.board, GRASPER)
     assert "safe" in capsys.readouterr().err

@@ -23,7 +23,7 @@ def diagnosed(folder, *, pulley_ratio, seed=3):
     assert main(["grasper", "record", *words]) == 0
     told = folder.with_suffix(".json")
     ledger = folder.with_suffix(".ledger")
-    assert main(["diagnose", str(folder), "--json", str(told), "--ledger", str(ledger)]) == 0
+    assert main(["diagnose", str(folder), "--json-out", str(told), "--ledger", str(ledger)]) == 0
     return json.loads(told.read_text())
 
 

@@ -16,6 +16,8 @@ TOOL_LINE = (
     "%Used left spindle of tool number 4 Lot N10150901 729 with a 9.99 Hz Sine wave was "
     "implemented with and amplitude of 30.00 degrees, and a reaction torque of 99.00 percent torque"
 )
+MIRRORED = [1, 2, 3, 4, 5, 7, 8, 9]
+"""Columns whose sign is another on a right jaw: all but time and the load's command."""
 
 
 @dataclass
@@ -31,6 +33,8 @@ class Log:
     motor_zero: int = -5888
     time_scale: float = 1.0
     first_s: float = 0.0
+    mirrored: bool = False
+    """Written as a right jaw's rig does: every measured and commanded sign turned."""
     edit: Callable[[np.ndarray], None] = field(default=lambda rows: None)
 
     def rows(self) -> np.ndarray:
@@ -39,7 +43,8 @@ class Log:
         # raw: the spindle starts open at 1365 counts and falls while the jaw closes
         spindle = np.rint(682.67 * (1 + np.cos(2 * np.pi * self.frequency_hz * t)))
         closing = 1365.33 - spindle
-        torque = np.rint(2 * closing)
+        # a spring and friction
+        torque = np.rint(2 * closing + 800 * np.sign(np.gradient(closing)))
         target = {
             "counts": spindle,
             "rad": spindle * 2 * np.pi / 8192,
@@ -62,6 +67,8 @@ class Log:
             ]
         )
         self.edit(rows)
+        if self.mirrored:
+            rows[:, MIRRORED] *= -1
         rows[:, 0] *= self.time_scale
         return rows
 

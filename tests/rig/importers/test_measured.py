@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from estimation.campaign import Campaign
 from estimation.recording import Flag
 from rig.importers.dvrk_psm import IMPORTER as PSM
-from rig.importers.jaw_steps import jaw_steps
+from rig.importers.jaw_steps import jaw_zeros
 from rig.importers.mrdlab import IMPORTER
 
 pytestmark = pytest.mark.measured
@@ -102,11 +103,24 @@ def test_good_runs_are_not_flagged(reference):
     assert [r.name for r in reference if not r.valid.all()] == ["07", "39"]
 
 
-def test_jaw_steps_are_found_at_runs_40_to_42(reference):
-    steps = {step.run: np.rad2deg(step.step_rad) for step in jaw_steps(reference)}
-    assert {"40", "41", "42"} <= set(steps)
-    assert all(0.4 < steps[name] < 0.7 for name in ("40", "41", "42"))
-    assert set(steps) <= {"39", "40", "41", "42", "49"}
+def test_the_jaws_zero_steps_before_run_39_and_back_before_run_43(reference):
+    first, second = jaw_zeros(reference).steps
+    assert (first.run, second.run) == ("39", "43")
+    assert np.rad2deg(first.step_rad) == pytest.approx(0.54, abs=0.1)
+    assert np.rad2deg(second.step_rad) == pytest.approx(-0.56, abs=0.1)
+
+
+@pytest.mark.parametrize("folder", ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"])
+def test_a_jaw_that_keeps_its_zero_has_no_step(campaign, folder):
+    runs = campaign(folder)
+    assert jaw_zeros(runs).steps == ()
+    slipped = [
+        recording.with_columns(jaw_angle_rad=recording["jaw_angle_rad"] + 0.02 * (k >= 12))
+        for k, recording in enumerate(runs)
+    ]
+    (step,) = jaw_zeros(Campaign.of(slipped)).steps
+    assert step.run == runs.names[12]
+    assert step.step_rad == pytest.approx(0.02, abs=0.004)
 
 
 def test_older_folders_target_in_rad_coarse_command_wrong_header(campaign):

@@ -1,15 +1,19 @@
 """Folders and archives of MRDLab logs: which runs, in which order, how named, read when asked."""
 
 import io
+import json
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from estimation.campaign import Campaign
+from rig.cli.main import main
 from rig.errors import DataError
 from rig.importers import archive
-from rig.importers.jaw_steps import jaw_steps
+from rig.importers.jaw_steps import jaw_zeros
 from rig.importers.mrdlab import IMPORTER
 
 FOLDERS = ("Tool_4_Maryland_L_Pitch_1", "Tool_4_Maryland_L_Roll_1")
@@ -173,22 +177,49 @@ def test_recognises_logs_and_nothing_else(one, several, tmp_path):
     assert not IMPORTER.recognises(broken)
 
 
-def test_a_jaw_step_is_found_between_runs_of_the_same_load(tmp_path, make_log):
-    def step(rows):
-        rows[:, 4] += 6  # 0.54 deg
-
+@pytest.fixture
+def slipped(tmp_path, make_log):
+    """Ten runs of two loads; the jaw's zero steps by 0.54 deg before the seventh."""
     folder = tmp_path / "Tool_4_Maryland_L_4"
     folder.mkdir()
-    loads = (0.1, 0.9)
-    for i, stem in enumerate(("00", "01", "10", "11", "20", "21")):
+    for i in range(10):
         # the load stretches the cable: runs of different load are not compared
         def edit(rows, i=i):
-            rows[:, 4] -= 100 * (i % 2)
-            if i == 4:
-                step(rows)
+            rows[:, 4] += 6 * (i >= 6) + i % 3 - 100 * (i % 2)
 
-        log = make_log(seconds=2.5, load_a=loads[i % 2], edit=edit)
-        (folder / f"{stem}.TXT").write_text(log.text())
-    (found,) = jaw_steps(IMPORTER.open(folder))
-    assert (found.run, found.compared_with) == ("20", "10")
-    assert found.step_rad == pytest.approx(np.deg2rad(0.54), rel=1e-3)
+        log = make_log(seconds=4.0, load_a=(0.1, 0.9)[i % 2], edit=edit)
+        (folder / f"{i:02d}.TXT").write_text(log.text())
+    return folder
+
+
+def test_a_jaw_step_is_found_between_runs_of_the_same_load_and_taken_off(slipped):
+    campaign = IMPORTER.open(slipped)
+    zeros = jaw_zeros(campaign)
+    (step,) = zeros.steps
+    assert step.run == "06"
+    assert np.rad2deg(step.step_rad) == pytest.approx(0.54, abs=0.15)
+    whole = list(zeros.taken_off(campaign))
+    mean = np.array([np.rad2deg(r["jaw_angle_rad"].mean()) for r in whole])
+    assert np.ptp(mean[::2]) < 0.4
+    assert np.ptp(mean[1::2]) < 0.4
+    np.testing.assert_array_equal(
+        whole[9]["jaw_angle_rad"], campaign.runs[9].recording()["jaw_angle_rad"]
+    )
+
+
+def test_runs_that_share_no_condition_show_no_step(slipped):
+    campaign = IMPORTER.open(slipped)
+    alone = Campaign.of(
+        [replace(r, conditions={"load_command_a": 0.1 * k}) for k, r in enumerate(campaign)]
+    )
+    assert jaw_zeros(alone).steps == ()
+
+
+def test_a_fit_of_the_jaws_angle_states_the_steps(slipped, capsys):
+    words = ["fit", str(slipped), "--model", "states", "--target", "jaw_angle_rad", "--json"]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert [step["run"] for step in json.loads(said.out)["jaw_steps"]] == ["06"]
+    assert "deg before run 06" in said.err
+    assert main([*words[:-2], "proximal_torque_n_m", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["jaw_steps"] == []

@@ -1,14 +1,23 @@
 """The verbs as they are typed."""
 
 import json
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer
 
+from estimation.recording import Recording
 from rig.cli.log import log_app
+from rig.configuration.config import load_config
 from rig.errors import ExitCode, UsageError
-from rig.log.writer import LogExistsError
+from rig.log.convert import write_recording
+from rig.log.run import RunEnd, RunInfo
+from rig.log.streams import COUNTS_STREAM
+from rig.log.writer import LogExistsError, LogWriter
+from rig.protocols.protocol import Protocol
+from rig.recording.campaign import open_campaign_folder
 
 
 @pytest.fixture
@@ -31,6 +40,20 @@ def test_info_for_people(rig, log):
     for words in ("run of bench 1", "load_command_a = 0.3", "/rig/sample", "1000.00", "rig.toml"):
         assert words in out
     assert "2026-09-21T" in out
+
+
+def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
+    name, notes = "br[ack]et :x:", "jaw [/] cleaned [red]twice[/red] :warning:"
+    run, end = RunInfo(name, rig="bench [1]", notes=notes), RunEnd(clean=False, reason="[limits] a")
+    folder = tmp_path / name
+    folder.mkdir()
+    with LogWriter(folder / "a.mcap", run, [COUNTS_STREAM]) as writer:
+        writer.close(end)
+    code, out, err = rig("info", folder)
+    assert (code, err) == (0, "")
+    for words in (str(folder / "a.mcap"), name, notes, "bench [1]", "[limits] a"):
+        assert words in out
+    assert str(folder / "a.mcap") in rig("check", folder)[1]
 
 
 def test_info_for_machines(rig, log):
@@ -57,6 +80,37 @@ def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path, make_log):
     assert code == out["exit_code"] == ExitCode.DATA
     assert [log["verdict"] for log in out["logs"]] == ["complete", "incomplete", "damaged"]
     assert out["logs"][1]["topics"][0]["gaps"][0]["samples"] == 2
+
+
+def test_check_does_not_count_what_was_recorded_again(rig, tmp_path, make_log):
+    data = make_log(tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "a.aborted-1.mcap.part").write_bytes(data[: data.find(b"rig.end") - 20])
+    (tmp_path / "b.mcap").write_bytes(make_log(tmp_path / "b.mcap").read_bytes())
+    code, out, _ = rig("check", tmp_path)
+    assert code == ExitCode.OK
+    assert f"superseded  {tmp_path / 'a.aborted-1.mcap.part'}" in out
+    last = out.splitlines()[-1]
+    assert last == "2 of 2 runs complete, 2400 of 2400 samples; 1 superseded log not counted."
+    (tmp_path / "a.mcap").unlink()
+    code, out, _ = rig("check", tmp_path, "--json")
+    assert code == ExitCode.DATA
+    assert out["superseded"] == []
+
+
+def test_check_names_the_runs_of_a_campaign_that_are_missing(rig, tmp_path):
+    protocol = Protocol.model_validate(
+        {"name": "p", "runs": [{"kind": "sine", "frequencies_hz": [1.0], "loads_a": [0.1, 0.2],
+                                "duration_s": 1.0}]}
+    )  # fmt: skip
+    config = load_config(Path("simulated"))
+    first, second = open_campaign_folder(tmp_path, protocol, config, resume=False)
+    time_s = np.arange(1000) / 1000
+    made = Recording(first.name, time_s, {"motor_current_a": time_s})
+    write_recording(tmp_path / f"{first.name}.mcap", made)
+    code, out, _ = rig("check", tmp_path)
+    assert code == ExitCode.FAILED
+    assert f"missing     {second.name}. Record it: rig record --resume {tmp_path}" in out
+    assert out.splitlines()[-1].startswith("1 of 2 runs complete")
 
 
 def test_repair_says_what_was_saved_and_lost(rig, log):

@@ -204,6 +204,26 @@ def test_the_attempt_that_ended_as_planned_stands_for_the_run(tmp_path, make_log
     assert run.excluded is None
 
 
+def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_path, make_log):
+    first = kill(make_log(tmp_path / "sine.mcap", samples=300))
+    repair_log(first)
+    first.rename(tmp_path / "sine.aborted-1.mcap.part")  # as a resumed recording does
+    make_log(tmp_path / "sine.mcap", samples=600)
+    (run,) = IMPORTER.open(tmp_path).runs
+    assert run.source == tmp_path / "sine.mcap"
+    assert len(run.recording()) == 600
+
+
+def test_the_repair_of_a_closed_log_stands_in_for_it(tmp_path, make_log):
+    log = make_log(tmp_path / "sine.mcap")
+    data = bytearray(log.read_bytes())
+    data[data.find(b"zstd") + 60] ^= 1
+    log.write_bytes(data)
+    repaired = repair_log(log).repaired
+    (run,) = IMPORTER.open(tmp_path).runs
+    assert run.source == repaired
+
+
 def test_two_whole_logs_of_one_name_are_refused(tmp_path):
     write_recording(tmp_path / "a.mcap", simple("twin"))
     write_recording(tmp_path / "b.mcap", simple("twin"))

@@ -1,0 +1,94 @@
+"""Whether a Net F/T's stream is alive: it is asked for again when silent, and an error when dead.
+
+UDP may lose the request for the stream as well as a record of it, so a stream that does not come
+is requested again. A device that is gone sends nothing, and one whose sensor has stopped sends the
+same internal sample for ever: neither shows in the numbers of the records.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.counters import DeviceCounters
+from drivers.errors import DriverError, LinkTimeoutError
+
+ASK_AGAIN_S = 0.5
+"""Silence after which the stream is requested again, and at every such time from then on."""
+DEAD_S = 1.0
+"""Silence that is an error."""
+FROZEN_S = 0.1
+"""Time for which the internal sample number may stay: 500 samples of the slowest sensor's."""
+LEAST_REPEATS = 5
+
+
+class StreamWatch:
+    """The life of one stream.
+
+    Args:
+        url: Name for messages.
+        rate_hz: Records a second.
+        counters: Where requests sent again and frozen sensors are counted.
+    """
+
+    def __init__(self, url: str, rate_hz: float, counters: DeviceCounters) -> None:
+        self._url = url
+        self._counters = counters
+        self._most_repeats = max(LEAST_REPEATS, round(FROZEN_S * rate_hz))
+        self._heard_s = self._asked_s = 0.0
+        self._internal: int | None = None
+        self._repeats = 0
+        self._frozen = False
+
+    def restart(self, now_s: float) -> None:
+        """Expect a stream that was requested now."""
+        self._heard_s = self._asked_s = now_s
+        self._internal = None
+        self._repeats = 0
+        self._frozen = False
+
+    def is_to_be_asked_again(self, now_s: float) -> bool:
+        """Return whether the stream has been silent long enough to be requested now."""
+        if now_s - max(self._heard_s, self._asked_s) < ASK_AGAIN_S:
+            return False
+        self._asked_s = now_s
+        self._counters.retries += 1
+        return True
+
+    def follow(self, internal: NDArray[np.uint32], now_s: float) -> None:
+        """Take the internal sample numbers of the records that came, shape (n,), n from 0.
+
+        Raises:
+            LinkTimeoutError: Nothing has come for `DEAD_S`; every call says so while it lasts.
+            DriverError: The sensor repeats one internal sample; likewise.
+        """
+        if len(internal) == 0:
+            self._require_life(now_s)
+            return
+        self._heard_s = now_s
+        before = internal[0] if self._internal is None else np.uint32(self._internal)
+        moved = np.flatnonzero(np.diff(internal, prepend=before))
+        if self._internal is None:
+            self._repeats = -1  # the first record repeats nothing
+        self._repeats = (
+            len(internal) - 1 - int(moved[-1]) if len(moved) else self._repeats + len(internal)
+        )
+        self._internal = int(internal[-1])
+        if self._repeats < self._most_repeats:
+            self._frozen = False
+            return
+        if not self._frozen:
+            self._counters.device_errors += 1
+        self._frozen = True
+        raise DriverError(
+            f"The force/torque sensor at {self._url} is frozen.",
+            f"Its last {self._repeats} records carry one and the same internal sample.",
+            "Check the cable between transducer and Net Box, then switch the device off and on.",
+        )
+
+    def _require_life(self, now_s: float) -> None:
+        if now_s - self._heard_s <= DEAD_S:
+            return
+        raise LinkTimeoutError(
+            f"The force/torque sensor at {self._url} has fallen silent.",
+            f"No record came for {now_s - self._heard_s:.1f} s; the stream was requested again.",
+            "Check its power and the network cable; another program may have taken the stream.",
+        )

@@ -1,0 +1,1 @@
+"""ROBOTIS Dynamixel X servo drive."""

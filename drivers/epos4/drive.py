@@ -1,0 +1,340 @@
+"""The driver of an EPOS4: torque commanded and position and torque read once a SYNC.
+
+Nothing runs in the background. While the host reads, it sends its heartbeat; when it stops, the
+drive notices and takes its power stage out of force by itself.
+"""
+
+from typing import TYPE_CHECKING
+
+from drivers.counters import DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity
+from drivers.epos4 import protocol
+from drivers.epos4.cycle import Cycle
+from drivers.epos4.faults import DriveFaultError, fault
+from drivers.epos4.identity import identify
+from drivers.epos4.node import HOST_NODE, Node
+from drivers.epos4.power_stage import PowerStage
+from drivers.epos4.protocol import Feedback, Ratings, State
+from drivers.epos4.samples import batch_of, channels_of
+from drivers.epos4.setup import set_up
+from drivers.errors import (
+    DisarmUnconfirmedError,
+    DriverError,
+)
+from drivers.polling import PollSchedule
+from drivers.transport.can_bus import CanBus
+
+if TYPE_CHECKING:
+    from drivers.epos4.canopen_link import CanopenLink
+
+
+class Epos4:
+    """One drive on a CAN bus of its own, or one that this host masters.
+
+    Args:
+        bus: The bus; the device closes it.
+        node_id: The drive's node number.
+        rate_hz: How often SYNC is sent.
+        host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
+        late_s: How late a SYNC may be and still be sent; later ones are counted as lost. Late ones
+            follow each other at a higher rate until the schedule is met again.
+    """
+
+    name = "epos4"
+
+    def __init__(
+        self,
+        bus: CanBus,
+        node_id: int = 1,
+        rate_hz: float = 1000.0,
+        host_timeout_ms: int = 250,
+        late_s: float = 0.0,
+    ) -> None:
+        if not 1 <= node_id < HOST_NODE:
+            raise ValueError(f"a drive's node number lies in 1..{HOST_NODE - 1}, not {node_id}")
+        if not rate_hz > 0:
+            raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
+        if not 0 <= host_timeout_ms <= 65535:
+            raise ValueError(f"a host time-out lies in 0..65535 ms, not {host_timeout_ms}")
+        self._bus = bus
+        self._node_id = node_id
+        self._rate_hz = rate_hz
+        self._host_timeout_ms = host_timeout_ms
+        self._late_s = late_s
+        self._link = _link(bus, node_id)
+        self._counters = DeviceCounters()
+        self._node = Node(self._link, host_timeout_ms, self._counters)
+        self._power = PowerStage(self._link, self._node)
+        self._cycle = Cycle(self._link, rate_hz, late_s, self._counters)
+        self._schedule = PollSchedule(rate_hz, self._counters)
+        self._ratings: Ratings | None = None
+        self._armed = False
+        self._may_be_armed = False
+        self._target = 0
+        self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Position, torque and current of the motor, and the torque commanded."""
+        return channels_of(self._ratings, self._rate_hz)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened to this drive's frames, and to the bus itself."""
+        counters = self._counters.as_dict()
+        counters["retries"] += self._link.retries
+        counters["timeouts"] += self._link.timeouts
+        bus = self._bus.counters
+        return counters | {"error_frames": bus.error_frames, "overruns": bus.overruns}
+
+    @property
+    def last_error(self) -> int:
+        """Error code of the newest emergency frame, 0 after the error is gone."""
+        return self._node.last_error
+
+    @property
+    def ratings(self) -> Ratings:
+        """The drive's motor data.
+
+        Raises:
+            DriverError: They have not been read yet.
+        """
+        if self._ratings is None:
+            raise DriverError("The drive's motor data are not known.", fix="Call start first.")
+        return self._ratings
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there, and read the motor data.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            ProtocolMismatchError: It is not maxon's, or has no cyclic torque mode.
+        """
+        identity, self._ratings = identify(self._link)
+        return identity
+
+    def start(self) -> None:
+        """Set up reactions, heartbeats and process data, check them, and let it answer SYNC.
+
+        The power stage stays as it is.
+
+        Raises:
+            ProtocolMismatchError: The drive does not hold what was written.
+        """
+        if self._ratings is None:
+            self.identify()
+        if not self._node.started:
+            self._set_up()
+        self._idle(0.0)
+        self._schedule.restart(self._bus.now_s)
+
+    def arm(self) -> None:
+        """Put the power stage in force with a target torque of 0.
+
+        Raises:
+            DriveFaultError: The drive has a fault; `clear_fault` first.
+            LinkTimeoutError: It does not reach operation in time.
+        """
+        if not self._node.started:
+            raise DriverError("The drive is not started.", fix="Call start first.")
+        self._node.require_well()
+        self._target = 0
+        self._may_be_armed = True
+        self._power.enable()
+        self._cycle.drop_late()
+        self._armed = True
+
+    def set_torque(self, torque_n_m: float) -> float:
+        """Command a motor torque, sent at the next reading and at every one from then on.
+
+        Returns:
+            The torque that is sent: the nearest multiple of `ratings.resolution_n_m`.
+
+        Raises:
+            DriverError: Not armed, not finite, or beyond the drive's current limit.
+        """
+        per_mille = self.ratings.per_mille(torque_n_m)
+        if not self._armed:
+            raise DriverError("The drive is not armed.", fix="Call arm first.")
+        self._target = per_mille
+        return self.ratings.torque_n_m(per_mille)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Send command and SYNC when due and return what the drive answers, if it does.
+
+        Raises:
+            DriveFaultError: The drive has sent an emergency, or an armed one has left operation;
+                each is raised once. Or it has left operation of the network, so that no sample
+                comes; every reading raises that.
+            LinkTimeoutError: The drive's heartbeat is missing; every reading says so while it is.
+        """
+        ratings = self.ratings
+        self._idle(min(self.wait_s, timeout_s))
+        if self.wait_s > 0 or not self._node.started:
+            return self._batch(ratings, None)
+        self._schedule.skip_missed(self._bus.now_s - self._late_s)
+        if self._node.in_trouble:
+            self._armed = False  # it is not commanded any more
+        feedback = self._cycle.exchange(self._target if self._armed else None)
+        if feedback is None:
+            self._schedule.lose()
+            self._counters.timeouts += 1
+        else:
+            self._schedule.asked += 1
+            self._counters.frames += 1
+        if self._node.in_trouble:
+            self._armed = False
+            self._node.require_well()
+        if feedback is None:
+            self._node.require_answers()
+        else:
+            self._require_operation(feedback)
+        return self._batch(ratings, feedback)
+
+    @property
+    def wait_s(self) -> float:
+        """Time until the next SYNC is due, 0 when it is."""
+        return self._schedule.wait_s(self._bus.now_s)
+
+    def idle(self, wait_s: float) -> None:
+        """Serve the bus for a while, the host's heartbeat among it.
+
+        Raises:
+            LinkLostError: The bus is gone.
+        """
+        self._idle(wait_s)
+
+    def clear_fault(self) -> int:
+        """Reset a fault whose cause is gone; the power stage stays off.
+
+        After a lost heartbeat a drive ignores the reset of its fault until its communication was
+        reset. That forgets heartbeats and process data, which are therefore set up again, before
+        the edge of the reset: a controlword counts for certain in the operational state only.
+
+        Returns:
+            The fault's error code, 0 when the drive had none.
+
+        Raises:
+            DisarmUnconfirmedError: The drive has not confirmed that its power stage is off.
+            LinkTimeoutError: The fault stays.
+        """
+        self._node.command(protocol.NMT_PRE_OPERATIONAL)  # a stopped node has no objects
+        if self._ratings is None:
+            self.identify()
+        self.disarm()
+        code = self._power.fault_code()
+        self._node.reset_communication()
+        self._set_up()
+        if code:
+            self._power.reset_fault()
+        self._node.forget_error()
+        return code
+
+    def disarm(self) -> None:
+        """Take the motor out of force: target torque 0, voltage off, read back.
+
+        Returns only when the drive has said that its power stage is off.
+
+        Raises:
+            DisarmUnconfirmedError: It has not said so; its state is unknown.
+        """
+        self._armed = False
+        self._target = 0
+        try:
+            if self._node.started:
+                self._cycle.command(protocol.DISABLE_VOLTAGE, 0)
+            self._power.disable()
+        except DriverError as error:
+            raise DisarmUnconfirmedError(
+                f"The drive, node {self._node_id} on {self._bus.url}, has not confirmed that its"
+                " power stage is off.",
+                str(error),
+                "Take the motor for live and cut its supply."
+                + (
+                    f" A working drive stops by itself {self._host_timeout_ms} ms after the host's"
+                    " last heartbeat."
+                    if self._host_timeout_ms
+                    else ""
+                ),
+            ) from error
+        self._may_be_armed = False
+
+    def stop(self) -> None:
+        """Disarm where the drive may be armed, and let it answer no more SYNC.
+
+        Raises:
+            DisarmUnconfirmedError: The drive's state is unknown.
+        """
+        if self._may_be_armed:
+            self.disarm()
+        if not self._node.started:
+            return
+        self._node.started = False
+        if self._host_timeout_ms:
+            self._link.write(0x1016, 1, 0)  # the host may fall silent now
+        self._node.command(protocol.NMT_PRE_OPERATIONAL)
+
+    def close(self) -> None:
+        """Disarm where the drive may be armed, and let go of the bus.
+
+        Raises:
+            DisarmUnconfirmedError: The bus is closed, but the drive's state is unknown.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.stop()
+        except DisarmUnconfirmedError:
+            raise
+        except DriverError:
+            pass  # it is gone already, and was not armed
+        finally:
+            self._bus.close()
+
+    # every cycle
+
+    def _idle(self, wait_s: float) -> None:
+        """Let time pass; an answer that comes is to a SYNC that was given up."""
+        self._node.idle(wait_s)
+        self._cycle.drop_late()
+
+    def _set_up(self) -> None:
+        set_up(self._link, self._node, self._host_timeout_ms)
+        self._node.started = True
+
+    def _require_operation(self, feedback: Feedback) -> None:
+        """Raise, once, when an armed drive is not in operation any more."""
+        if not self._armed:
+            return
+        state = protocol.state_of(feedback.statusword)
+        if state is State.OPERATION_ENABLED:
+            return
+        self._armed = False
+        if state in (State.FAULT, State.FAULT_REACTION):
+            self._node.reported()
+            raise fault(self.last_error or self._power.error_code())
+        raise DriveFaultError(
+            f"The drive has left operation by itself and is in {state.value!r}.",
+            "Its enable or STO input changed, or somebody else commands it.",
+            "Find out why, then arm again.",
+        )
+
+    def _batch(self, ratings: Ratings, feedback: Feedback | None) -> Batch:
+        now_s, number = self._bus.now_s, self._schedule.asked - 1
+        return batch_of(ratings, feedback, self._target, now_s, number, self._schedule.lost)
+
+
+def _link(bus: CanBus, node_id: int) -> "CanopenLink":
+    """Return the link; the `canopen` library is an extra, loaded only here.
+
+    Raises:
+        LinkError: It is not installed.
+    """
+    try:
+        from drivers.epos4.canopen_link import CanopenLink
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            "An EPOS4 needs the canopen library.", f"{error}.", "can"
+        ) from error
+    return CanopenLink(bus, node_id)

@@ -1,0 +1,1 @@
+"""mjbots moteus brushless controller, through an fdcanusb."""

@@ -1,0 +1,54 @@
+"""What a fit of physical states takes of one run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimation.bank.fitting import Normal
+from estimation.bank.states import Bank
+from estimation.recording import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RunEvidence:
+    """Samples of one run to fit: every fourth valid closing one.
+
+    Attributes:
+        design: The bank's products, shape (n, size).
+        truth: The target without lag, shape (n,).
+        normal: The run's share in the normal equations.
+        ranges: Lowest and highest value of each judged channel, shape (2, judged).
+        conditions: What was held constant in the run; the interval looks beyond their levels.
+    """
+
+    design: FloatArray
+    truth: FloatArray
+    normal: Normal
+    ranges: FloatArray
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+
+    @classmethod
+    def of_rows(
+        cls,
+        bank: Bank,
+        rows: FloatArray,
+        truths: FloatArray,
+        conditions: Mapping[str, float | str] | None = None,
+    ) -> "list[RunEvidence]":
+        """Return the evidence for each target; they share what is made of the rows.
+
+        Args:
+            bank: The states and products.
+            rows: Filtered channels of the samples to fit, shape (n, channels).
+            truths: The targets, shape (n, targets).
+            conditions: Conditions of the run, if it states any.
+        """
+        design = bank.design(rows)
+        judged = rows[:, : bank.judged]
+        ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
+        whole = Normal.of(design, truths)
+        return [
+            cls(design, truth, whole.only(k), ranges, conditions or {})
+            for k, truth in enumerate(np.ascontiguousarray(truths.T))
+        ]

@@ -1,0 +1,36 @@
+"""Least squares within bounds from normal equations, for fits and for each of their replicates."""
+
+import numpy as np
+from scipy import linalg, optimize
+
+from estimation.recording import FloatArray
+
+LEAST_SHARE = 1e-12
+"""Directions whose eigenvalue is a smaller share of the largest are not determined by the data."""
+
+
+def solve_within(
+    normal: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return the x within bounds that has the least squared error.
+
+    Args:
+        normal: Products of the columns with one another, shape (n, n).
+        right: Products of the columns with the target, shape (n,).
+        low: Lower bounds, shape (n,).
+        high: Upper bounds, above the lower ones, shape (n,).
+
+    Returns:
+        Shape (n,). Where bounds are active the others are the best beside them.
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    scaled, aim = normal / np.outer(scale, scale), right / scale
+    free: FloatArray = linalg.lstsq(scaled, aim, check_finite=False)[0] / scale
+    if np.all(free >= low) and np.all(free <= high):
+        return free
+    sizes, axes = linalg.eigh(scaled)
+    kept = sizes > LEAST_SHARE * sizes[-1]
+    roots = np.sqrt(sizes[kept])
+    columns, target = roots[:, None] * axes[:, kept].T, (axes[:, kept].T @ aim) / roots
+    found = optimize.lsq_linear(columns, target, (low * scale, high * scale), method="bvls")
+    return np.clip(found.x / scale, low, high)

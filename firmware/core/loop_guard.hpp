@@ -1,0 +1,137 @@
+// Whether one motor's position loop can be believed: its encoder does not jump, is not frozen while the
+// current changes, follows the target, and the current is the one that was commanded. Counts and ticks.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+#include "crossing.hpp"
+
+namespace rig {
+
+constexpr std::int64_t kEnableUs = 20000;  // a motor controller acts within 8 ms of its enable
+
+// In the order of the wire.
+struct LoopLimits {
+    std::int32_t max_jump = 0;            // motor counts in one tick
+    std::int32_t max_following = 0;       // counts of the encoder that is followed
+    std::int32_t following_ticks = 1;     // how long it may be farther
+    std::int32_t full_scale_current = 0;  // counts at a command of 10000, signed; 0 where it is not known
+    std::int32_t current_offset = 0;      // counts at a command of 0
+    std::int32_t max_current_error = 0;   // counts, of the mean over the time below
+    std::int32_t current_ticks = 1;
+    std::int32_t frozen_current = 0;  // counts the current may change while the motor is within
+    std::int32_t frozen_motion = 0;   // so many counts
+
+    void read(Reader& reader) {
+        for (std::int32_t* limit :
+             {&max_jump, &max_following, &following_ticks, &full_scale_current, &current_offset,
+              &max_current_error, &current_ticks, &frozen_current, &frozen_motion}) {
+            *limit = reader.i32();
+        }
+    }
+
+    bool valid() const {
+        for (std::int32_t size : {max_jump, max_following, max_current_error, frozen_current,
+                                  frozen_motion}) {
+            if (size < 0) return false;
+        }
+        return following_ticks >= 1 && current_ticks >= 1;
+    }
+};
+
+// Numbers of the channels a crossing names.
+struct LoopChannels {
+    std::uint8_t followed;
+    std::uint8_t motor;
+    std::uint8_t current;
+};
+
+class LoopGuard {
+  public:
+    void prime(std::int32_t motor, std::int32_t current) {
+        last_motor_ = anchor_ = motor;
+        still_mean_ = anchor_current_ = kFine * current;
+    }
+
+    // What the tick asked for; the next one is held against it.
+    void drove(std::int32_t target, std::int32_t command_e4) {
+        target_ = target;
+        command_e4_ = command_e4;
+        ++driven_ticks_;
+    }
+
+    void begin_to_hold() { far_ticks_ = 0; }
+
+    // Whether the motor has not moved for a while; then its current is the torque it holds.
+    bool still() const { return still_ticks_ >= kRestTicks; }
+    // Mean of the current over some ticks, counts.
+    std::int64_t mean_current() const { return still_mean_ / kFine; }
+
+    Crossing check(const LoopLimits& limits, std::int64_t tick_us, std::int32_t followed,
+                   std::int32_t motor, std::int32_t current, const LoopChannels& channels) {
+        const std::int64_t step = std::int64_t{motor} - last_motor_;
+        last_motor_ = motor;
+        if (exceeds(step, limits.max_jump)) {
+            return {kEncoderJump, channels.motor, step, limits.max_jump, 0};
+        }
+        const Crossing frozen = check_frozen(limits, tick_us, motor, current, channels.motor);
+        if (frozen.code != kNoTrip || driven_ticks_ == 0) return frozen;
+        const std::int64_t behind = std::int64_t{target_} - followed;
+        far_ticks_ = exceeds(behind, limits.max_following) ? far_ticks_ + 1 : 0;
+        if (far_ticks_ >= limits.following_ticks) {
+            return {kFollowingError, channels.followed, behind, limits.max_following,
+                    far_ticks_ * tick_us};
+        }
+        return check_current(limits, tick_us, current, channels.current);
+    }
+
+  private:
+    static constexpr std::int64_t kFine = 256;       // parts of a count, for means of whole numbers
+    static constexpr std::int64_t kStillTicks = 5;  // mean of the current, against its noise
+    static constexpr std::int64_t kRestTicks = 20;
+
+    // A motor whose count stays while the current goes from one value to quite another.
+    Crossing check_frozen(const LoopLimits& limits, std::int64_t tick_us, std::int32_t motor,
+                          std::int32_t current, std::uint8_t channel) {
+        still_mean_ += (kFine * current - still_mean_) / kStillTicks;
+        if (magnitude(std::int64_t{motor} - anchor_) > limits.frozen_motion) {
+            anchor_ = motor;
+            anchor_current_ = still_mean_;
+            still_ticks_ = 0;
+        }
+        ++still_ticks_;
+        const std::int64_t change = (still_mean_ - anchor_current_) / kFine;
+        if (exceeds(change, limits.frozen_current)) {
+            return {kEncoderFrozen, channel, change, limits.frozen_current, still_ticks_ * tick_us};
+        }
+        return {};
+    }
+
+    Crossing check_current(const LoopLimits& limits, std::int64_t tick_us, std::int32_t current,
+                           std::uint8_t channel) {
+        if (limits.full_scale_current == 0 || driven_ticks_ * tick_us <= kEnableUs) return {};
+        const std::int64_t commanded =
+            limits.current_offset + std::int64_t{limits.full_scale_current} * command_e4_ / 10000;
+        error_mean_ += (kFine * (current - commanded) - error_mean_) / limits.current_ticks;
+        const std::int64_t error = error_mean_ / kFine;
+        if (exceeds(error, limits.max_current_error)) {
+            return {kCurrentMismatch, channel, error, limits.max_current_error,
+                    limits.current_ticks * tick_us};
+        }
+        return {};
+    }
+
+    std::int64_t last_motor_ = 0;
+    std::int64_t anchor_ = 0;
+    std::int64_t anchor_current_ = 0;  // in parts of a count, as both means
+    std::int64_t still_mean_ = 0;
+    std::int64_t still_ticks_ = 0;
+    std::int64_t error_mean_ = 0;
+    std::int64_t far_ticks_ = 0;
+    std::int64_t driven_ticks_ = 0;
+    std::int32_t target_ = 0;
+    std::int32_t command_e4_ = 0;
+};
+
+}  // namespace rig

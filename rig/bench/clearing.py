@@ -1,0 +1,80 @@
+"""Clear what the rig has latched: a drive's fault, or the trip of a logger board.
+
+A latch is cleared by a person's command, never on the way to something else: whoever clears it has
+looked at the cause. The power stage stays off.
+"""
+
+from dataclasses import dataclass
+
+from drivers.epos4.drive import Epos4
+from drivers.epos4.faults import explain
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Trip
+from drivers.transport.can_bus import CanBus
+from drivers.transport.python_can import open_can
+from rig.bench.logger import VIRTUAL_CAN_URL, open_logger
+from rig.bench.trips import WORDS
+from rig.configuration.config import Config
+from rig.machines.choose import machine_of
+
+
+@dataclass(frozen=True, slots=True)
+class Latch:
+    """What was latched, and what became of it.
+
+    Attributes:
+        what: The fault or trip in words; empty when nothing was latched.
+        code: Its code, 0 for none.
+        is_cleared: Whether nothing is latched any more.
+        then: What is left to do; may be empty.
+    """
+
+    what: str
+    code: int
+    is_cleared: bool
+    then: str
+
+
+def clear_latch(config: Config) -> Latch:
+    """Take the configured rig out of force and clear its fault or trip.
+
+    Raises:
+        DisarmUnconfirmedError: The rig has not confirmed that it is out of force.
+        DriverError: It cannot be reached, or its fault stays.
+    """
+    return _clear_drive(config) if config.logger.driver == "epos4" else _clear_board(config)
+
+
+def _clear_drive(config: Config) -> Latch:
+    bus = _bus(config)
+    try:
+        drive = Epos4(bus, **{"node_id": 1, **config.logger.options})
+    except BaseException:
+        bus.close()
+        raise
+    try:
+        code = drive.clear_fault()
+    finally:
+        drive.close()
+    return Latch(explain(code)[0] if code else "", code, True, "")
+
+
+def _bus(config: Config) -> CanBus:
+    if not config.is_simulated:
+        return open_can(config.logger.url)
+    from rig.canopen.simulated import open_live_bus, open_simulated_bus
+
+    is_live = config.logger.url == VIRTUAL_CAN_URL
+    return open_live_bus(config) if is_live else open_simulated_bus(config)
+
+
+def _clear_board(config: Config) -> Latch:
+    """Disarm a logger board and read its trip; its protocol clears a trip by arming alone."""
+    with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
+        logger.identify()
+        logger.disarm()
+        report = logger.trip()
+    if report.code is Trip.NONE:
+        return Latch("", 0, True, "")
+    what, fix = WORDS[report.code]
+    return Latch(f"{what}.", int(report.code), False, f"{fix} The next arming clears it.")

@@ -1,0 +1,79 @@
+"""What a guided calibration shows a person: each step's reading, and the result in words."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration.linear import CalibrationSet
+from calibration.procedure import Measurement, Procedure, Result
+from calibration.record import CalibrationRecord
+from estimation.channels import UnknownUnitError, unit_of
+
+SHOWN = ("proximal_torque_n_m", "distal_torque_n_m", "motor_current_a", "fsr_v", "force_z_n")
+"""Channels of a reading, those that a step has."""
+
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "u"))
+
+
+def reading(procedure: Procedure, measured: Sequence[Measurement], lines: CalibrationSet) -> str:
+    """Return what the last step read: the procedure's own words, else mean and spread."""
+    own = getattr(procedure, "reading", None)
+    if own is not None:
+        return str(own(measured, lines))
+    recording = measured[-1].recording
+    parts = [
+        f"{name} {with_unit(float(np.mean(values)), unit_of(name))}"
+        f" +- {with_unit(float(np.std(values)), unit_of(name))}"
+        for name, values in recording.columns.items()
+        if name in SHOWN
+    ]
+    return ", ".join([f"{len(recording)} samples", *parts])
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Return a number with its unit, in thousandths or millionths where that reads better."""
+    if unit == "1" or not unit:
+        return f"{value:.4g}"
+    size = abs(value)
+    factor, prefix = next((p for p in PREFIXES if size >= p[0]), PREFIXES[-1 if size else 0])
+    return f"{value / factor:.4g} {prefix}{unit}"
+
+
+def parameter_lines(result: Result | CalibrationRecord) -> list[str]:
+    """Return a result's parameters with their units and standard deviations, a line each."""
+    deviations = [row[k] ** 0.5 for k, row in enumerate(result.fit.covariance)]
+    lines = []
+    for k, (name, value) in enumerate(result.fit.parameters.items()):
+        unit = _unit_of_parameter(name, result)
+        spread = f" +- {with_unit(deviations[k], unit)}" if deviations else ""
+        lines.append(f"{name} {with_unit(value, unit)}{spread}")
+    if result.fit.residual_rms is not None:
+        rms = with_unit(result.fit.residual_rms, _unit(result.channel))
+        lines.append(f"residual {rms} rms")
+    return lines
+
+
+def _unit_of_parameter(name: str, result: Result | CalibrationRecord) -> str:
+    """Return the unit of a parameter: of a line's slope and zero from what it reads and gives."""
+    if name == "slope":
+        read = _unit(result.input) or "count"
+        return f"{_unit(result.channel)} a {read}"
+    if name == "zero":
+        return _unit(result.input) or "counts"
+    return _unit(name)
+
+
+def _unit(name: str) -> str:
+    try:
+        return unit_of(name)
+    except UnknownUnitError:
+        return ""
+
+
+def found_line(name: str, value: float | str) -> str:
+    """Return another number of a session, or words on what was not measured, as a line."""
+    if isinstance(value, str):
+        return f"{name.removesuffix('_ratio')}: {value}"
+    if name.endswith("_ratio"):
+        return f"{name.removesuffix('_ratio')} {100 * value:.3g} %"
+    return f"{name} {with_unit(value, _unit(name))}"

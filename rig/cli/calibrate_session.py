@@ -1,0 +1,268 @@
+"""A guided calibration as a person carries it out: asked, measured, shown, kept, gone on with."""
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.cli.rig_options import chosen_rig
+from rig.output.console import emit_json, remarks, results
+
+if TYPE_CHECKING:
+    from calibration.linear import CalibrationSet
+    from calibration.procedure import Answer, Operator, Procedure, Step
+    from drivers.device import Device
+    from rig.calibrate.run import Kept
+    from rig.cli.calibrate import Keeping
+    from rig.configuration.config import Config
+
+QUESTION = "Enter when done, b to measure the step before again, q to stop: "
+
+
+def conduct(procedure: "Procedure", how: "Keeping") -> None:
+    """Measure a calibration, or read its raw logs; conclude, keep and show it.
+
+    Raises:
+        UsageError: The options ask for something that cannot be.
+        CalibrationError: The session was stopped, or its data cannot carry a calibration.
+    """
+    from datetime import datetime
+
+    from calibration.store import CalibrationStore
+    from rig.calibrate.raw import read_raw
+    from rig.calibrate.run import Signature, keep
+    from rig.errors import UsageError
+
+    if not how.operator.strip():
+        raise UsageError("Who calibrates is not known.", fix="Give --operator NAME.")
+    settings = chosen_rig(how.config, how.sim)
+    _refuse_idle_force_sensor(procedure, settings, how)
+    _ = settings.reference_limits  # the procedures are of its sensors and its motor
+    if how.seed is not None:
+        settings = settings.changed(simulation={"seed": how.seed})
+    if how.raw is not None:
+        kind, measurements, lines = read_raw(how.raw)
+        if kind != procedure.kind:
+            raise UsageError(
+                f"{how.raw} holds a calibration of {kind}.", fix=f"Type `rig calibrate {kind}`."
+            )
+    else:
+        lines = settings.calibration_set()
+        measurements = _measure(procedure, settings, how)
+    own = settings.store or settings.default_store
+    store = CalibrationStore(how.store) if how.store else own
+    folder = (
+        how.out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-calibrate-{procedure.kind}"
+    )
+    signature = Signature(
+        operator=how.operator,
+        days=how.days,
+        instrument=settings.instrument.serial or "",
+        serials=settings.serials,
+        notes=how.notes,
+    )
+    kept = keep(procedure, measurements, lines, signature, store, folder)
+    if how.use:
+        for digest in kept.records:
+            store.use(digest, _now(), how.operator)
+    _show(kept, how, store.folder)
+
+
+def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "Keeping") -> None:
+    """Refuse a force sensor that the session would not read."""
+    from rig.errors import UsageError
+
+    if how.force_sensor is None:
+        return
+    if how.raw is not None:
+        why = "With --from nothing is measured."
+    elif "force_sensor" not in procedure.devices:
+        why = f"A calibration of {procedure.kind} reads no force sensor."
+    elif settings.is_simulated:
+        why = "The simulated rig has a simulated force sensor."
+    else:
+        return
+    raise UsageError(f"--force-sensor {how.force_sensor} would not be used.", why, "Leave it out.")
+
+
+def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list[Any]:
+    from calibration.procedure import AbortedError, carry_out
+    from rig.bench.logger import open_logger
+    from rig.calibrate.bench import RigBench
+    from rig.calibrate.shown import reading
+
+    screen = remarks()
+    operator: Operator
+    lines = settings.calibration_set()
+    measured = _begun(procedure, how.resume)
+    if settings.is_simulated:
+        from rig.calibrate.hands import SimulatedHands
+
+        hands = SimulatedHands(settings)
+        bench = RigBench(settings, procedure.devices, hands.open_logger, hands.open_force_sensor)
+        operator = hands if how.yes else Asking(hands)
+    else:
+        force = _force_sensor(how.force_sensor, procedure.devices)
+        bench = RigBench(settings, procedure.devices, lambda: open_logger(settings), force)
+        operator = Unasked() if how.yes else Asking(None)
+
+    def tell(step: "Step", number: int, total: int) -> None:
+        screen.print(f"{number + 1}/{total} {step.name}", markup=False)
+
+    def show(step: "Step", so_far: list[Any]) -> None:
+        screen.print(f"  {reading(procedure, so_far, lines)}", markup=False)
+
+    try:
+        return carry_out(procedure, operator, bench, tell, show, measured)
+    except (KeyboardInterrupt, AbortedError):
+        kept = _kept_for_later(procedure, measured, lines, how)
+        screen.print(f"\nStopped; the rig is safe. {kept}", markup=False)
+        raise
+
+
+def _begun(procedure: "Procedure", folder: Path | None) -> list[Any]:
+    """Return the measurements of a session that was stopped; none for a new one."""
+    from rig.calibrate.raw import read_raw
+    from rig.errors import UsageError
+
+    if folder is None:
+        return []
+    kind, measured, _ = read_raw(folder)
+    steps = procedure.steps()[: len(measured)]
+    there = [(m.recording.name, dict(m.recording.conditions)) for m in measured]
+    if kind != procedure.kind or there != [(s.name, dict(s.conditions)) for s in steps]:
+        raise UsageError(
+            f"{folder} holds other steps than this session has.",
+            "A session goes on with the options it was begun with.",
+            "Type the same command as then, with --resume.",
+        )
+    return measured
+
+
+def _kept_for_later(
+    procedure: "Procedure", measured: list[Any], lines: "CalibrationSet", how: "Keeping"
+) -> str:
+    """Keep what a person set up before a session was stopped; return what to tell of it."""
+    from datetime import datetime
+
+    from rig.calibrate.raw import whole_folder, write_raw
+
+    if how.yes or not measured:
+        return "Nothing was kept."
+    folder = Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-unfinished-{procedure.kind}"
+    with whole_folder(folder) as part:
+        write_raw(part, procedure.kind, measured, lines)
+    total = len(procedure.steps())
+    return (
+        f"{len(measured)} of {total} steps are kept. Go on with the same command and"
+        f" --resume {folder}"
+    )
+
+
+class Asking:
+    """A person at the terminal; hands in the simulated world then do what the person confirms."""
+
+    def __init__(self, hands: "Operator | None") -> None:
+        from sys import stdin
+
+        from rig.errors import UsageError
+
+        if not stdin.isatty():
+            raise UsageError(
+                "A guided calibration asks, and this is no terminal.",
+                fix="Run it in a terminal, or on the simulated rig with --yes.",
+            )
+        self._hands = hands
+
+    def prepare(self, step: "Step") -> "Answer":
+        """Show the instruction and wait for Enter; `b` goes back a step, `q` ends the session."""
+        from calibration.procedure import AbortedError, Answer
+
+        if step.instruction:
+            screen = remarks()
+            screen.print(step.instruction, markup=False)
+            answer = self._asked()
+            if answer == "q":
+                raise AbortedError("The calibration was stopped.")
+            if answer == "b":
+                return Answer.BACK
+        if self._hands is not None:
+            self._hands.prepare(step)
+        return Answer.DONE
+
+    def _asked(self) -> str:
+        """Return the answer to the question, asked again until it is one of its answers."""
+        while True:
+            remarks().print(
+                "Enter when done, b to measure the step before again, q to stop: ", end=""
+            )
+            try:
+                answer = input().strip().lower()
+            except EOFError:
+                return "q"
+            if answer in ("", "b", "q"):
+                return answer
+            remarks().print(f"{answer!r} is none of these.")
+
+
+class Unasked:
+    """Nobody: right for steps the rig does alone."""
+
+    def prepare(self, step: "Step") -> None:
+        """Refuse a step that needs hands."""
+        from rig.errors import UsageError
+
+        if step.instruction:
+            raise UsageError(
+                f"The step {step.name} needs hands: {step.instruction}",
+                "With --yes nobody is asked, and a real rig has no hands.",
+                "Leave --yes away.",
+            )
+
+
+def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
+    from drivers.registry import open_device
+    from rig.errors import UsageError
+
+    if "force_sensor" not in devices:
+        return None
+    driver, _, url = (words or "").partition("=")
+    if not url:
+        raise UsageError(
+            "This calibration needs a force sensor.",
+            fix="Name it: --force-sensor ati-net=udp:192.168.1.1:49152",
+        )
+
+    def opened() -> "Device":
+        return open_device(driver, url)
+
+    return opened
+
+
+def _now() -> str:
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _show(kept: "Kept", how: "Keeping", store: Path) -> None:
+    from rig.calibrate.shown import found_line, parameter_lines
+
+    screen = results(how.json)
+    for digest, record in kept.records.items():
+        screen.print(f"{digest}  {record.channel} from {record.input}", markup=False)
+        for line in parameter_lines(record):
+            screen.print(f"  {line}", markup=False)
+    for name, found in kept.conclusion.found.items():
+        screen.print(f"  {found_line(name, found)}", markup=False)
+    screen.print("Good: the data passed every check of this kind of calibration.")
+    screen.print(f"Raw logs: {kept.folder}", markup=False)
+    if not how.use:
+        for digest in kept.records:
+            by = shlex.quote(how.operator)
+            screen.print(f"Use it: rig cal use {digest} --by {by} --store {store}", markup=False)
+    if how.json:
+        records = {
+            digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
+            for digest, r in kept.records.items()
+        }
+        emit_json({"folder": kept.folder, "records": records, "found": kept.conclusion.found})

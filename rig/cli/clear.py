@@ -1,0 +1,30 @@
+"""`rig clear`: clear a latched fault or trip, with the rig out of force."""
+
+from rig.cli.doctor import ConfigOption
+from rig.output.console import JsonFlag, emit_json, results
+
+
+def clear(config: ConfigOption = None, json: JsonFlag = False) -> int:
+    """Clear the rig's latched fault or trip; the motors stay out of force.
+
+    Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
+    up again, and its fault is cleared. A logger board is disarmed and its trip is reported; such a
+    board clears it when it is armed next.
+    """
+    from rig.bench.clearing import clear_latch
+    from rig.configuration.config import load_config
+
+    settings = load_config(config)
+    latch = clear_latch(settings)
+    if not latch.code:
+        text = "nothing is latched."
+    elif latch.is_cleared:
+        text = f"cleared: {latch.what} (code {latch.code:#06x})"
+    else:
+        text = f"latched: {latch.what} (code {latch.code}) {latch.then}"
+    screen = results(json)
+    screen.print(f"{settings.name}: out of force; {text}", markup=False)
+    if json:
+        latched = {"what": latch.what, "code": latch.code} if latch.code else None
+        emit_json({"state": "disarmed", "latched": latched, "cleared": latch.is_cleared})
+    return 0

@@ -1,0 +1,84 @@
+"""`rig effects [NAME]`: the physical effects a diagnosis can name, from their own descriptions."""
+
+import inspect
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.output.console import JsonFlag, emit_json, results
+
+if TYPE_CHECKING:
+    from estimation.effects import Effect
+
+
+def effects(
+    name: Annotated[
+        str | None, typer.Argument(help="Effect, such as ripple.motor, or a family's beginning.")
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """List the effects a diagnosis can name, or describe one with its equation and source.
+
+    With the beginning of names, such as `friction`, lists those.
+    """
+    from estimation.effects import catalogue, effect
+
+    known = catalogue()
+    listed = {key: one for key, one in known.items() if name is None or key.startswith(f"{name}.")}
+    if name is not None and (name in known or not listed):
+        listed = {}
+        one = effect(name)
+        if json:
+            emit_json(_described(one))
+        else:
+            _show(one)
+        return
+    if json:
+        emit_json({"effects": [_described(one) for one in listed.values()]})
+        return
+    screen = results(json)
+    width = max(map(len, listed))
+    for key, one in listed.items():
+        screen.print(f"{key:{width}}  {_summary(one)}")
+    screen.print(f"{len(listed)} effects. More on one: rig effects NAME", style="dim")
+
+
+def _summary(one: "Effect") -> str:
+    """Return the first sentence of an effect's description."""
+    return _text(one).split("\n\n")[0].replace("\n", " ")
+
+
+def _text(one: "Effect") -> str:
+    return inspect.cleandoc(type(one).__doc__ or "")
+
+
+def _described(one: "Effect") -> dict[str, Any]:
+    return {
+        "id": one.id,
+        "family": one.family,
+        "description": _text(one),
+        "equations": list(one.balances),
+        "inputs": dict(one.roles),
+        "parameters": [*one.amplitudes, *one.shape],
+        "confused_with": one.confused_with,
+        "told_apart_by": one.told_apart_by,
+    }
+
+
+def _show(one: "Effect") -> None:
+    screen = results(json=False)
+    screen.print(one.id, style="bold")
+    screen.print(_text(one))
+    screen.print("")
+    for parameter in (*one.amplitudes, *one.shape):
+        bounds = f"{parameter.lower:g} to {parameter.upper:g}"
+        screen.print(
+            f"parameter {parameter.name}: {parameter.description} ({parameter.unit}; {bounds})"
+        )
+    channels = ", ".join(f"{role} = {channel}" for role, channel in one.roles.items())
+    screen.print(f"reads: {channels or 'nothing'}")
+    screen.print(f"searched in: {', '.join(one.balances) or 'no equation; it is declared only'}")
+    if one.confused_with:
+        screen.print(f"confused with: {', '.join(one.confused_with)}")
+    if one.told_apart_by:
+        screen.print(f"told apart by: {one.told_apart_by}")

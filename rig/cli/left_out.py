@@ -1,0 +1,18 @@
+"""What a command that reads recordings leaves out of them, named for the person who typed it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.output.console import remarks
+
+if TYPE_CHECKING:
+    from estimation.campaign import Campaign
+
+
+def say_left_out(path: Path, campaign: "Campaign") -> None:
+    """Name on stderr the files and runs at a path that a campaign leaves out, and why."""
+    from rig.importers.left_out import left_out
+
+    screen = remarks()
+    for line in left_out(path, campaign):
+        screen.print(line)

@@ -1,0 +1,49 @@
+"""Names of what comes with the program, for the help and for the shell's completion."""
+
+from pathlib import Path
+
+import estimation
+import rig
+
+
+def _names(folder: Path, ending: str = ".toml") -> list[str]:
+    return sorted(path.name.removesuffix(ending) for path in folder.glob(f"*{ending}"))
+
+
+def config_names() -> list[str]:
+    """Return the names of the shipped configurations."""
+    names = _names(Path(rig.__file__).parent / "configuration" / "shipped")
+    return [name for name in names if not name.endswith(".model")]
+
+
+def protocol_names() -> list[str]:
+    """Return the names of the shipped protocols."""
+    return _names(Path(rig.__file__).parent / "protocols")
+
+
+def model_names() -> list[str]:
+    """Return the names of the shipped declared models."""
+    return _names(Path(estimation.__file__).parent / "models")
+
+
+def _matching(names: list[str], start: str) -> list[str]:
+    """Return the names and the TOML files that begin with what was typed."""
+    typed = Path(start or ".")
+    folder = typed if start.endswith("/") or not start else typed.parent
+    files = [str(path) for path in folder.glob("*.toml")] if folder.is_dir() else []
+    return [name for name in (*names, *sorted(files)) if name.startswith(start)]
+
+
+def complete_config(incomplete: str) -> list[str]:
+    """Complete a configuration: a shipped name or a file."""
+    return _matching(config_names(), incomplete)
+
+
+def complete_protocol(incomplete: str) -> list[str]:
+    """Complete a protocol: a shipped name or a file."""
+    return _matching(protocol_names(), incomplete)
+
+
+def complete_model(incomplete: str) -> list[str]:
+    """Complete a declared model: a shipped name or a file."""
+    return _matching(model_names(), incomplete)

@@ -1,0 +1,79 @@
+"""Which rig a command is about: named, configured for this folder or person, or the simulated one.
+
+Nobody types the configuration in an emergency, and nobody is to believe that a simulated rig was
+the real one. So a rig is looked for in three places, and the simulated one must be asked for.
+"""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from rig.configuration.config import SIMULATED, Config, load_config
+from rig.errors import UsageError
+
+ENVIRONMENT = "RIG_CONFIG"
+FILE = "rig.toml"
+
+ONE_OF = (
+    f"Set {ENVIRONMENT} to a configuration, keep one as ./{FILE} or as ~/.config/rig/{FILE}, "
+    "or name it with --config. --sim asks for the simulated rig."
+)
+"""What to do where no rig is configured."""
+
+
+def own_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder of a person's configurations, `~/.config/rig`."""
+    base = environment.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "rig"
+
+
+def default_config(environment: Mapping[str, str] = os.environ) -> Path | None:
+    """Return the configuration that counts where none is named; None without one.
+
+    The first of: `$RIG_CONFIG` (a file or a shipped name), `./rig.toml`, `~/.config/rig/rig.toml`.
+    """
+    if named := environment.get(ENVIRONMENT):
+        return Path(named)
+    places = (Path(FILE), own_folder(environment) / FILE)
+    return next((place for place in places if place.is_file()), None)
+
+
+def configured_rigs(environment: Mapping[str, str] = os.environ) -> list[Path]:
+    """Return every configuration somebody may mean: the defaults, and all of `~/.config/rig`."""
+    named = environment.get(ENVIRONMENT)
+    found = [Path(named)] if named else []
+    found += [Path(FILE)] if Path(FILE).is_file() else []
+    found += sorted(own_folder(environment).glob("*.toml"))
+    return list({path.resolve() if path.is_file() else path: path for path in found}.values())
+
+
+def choose_config(config: Path | None, sim: bool) -> Path:
+    """Return the configuration a command is about.
+
+    Args:
+        config: What `--config` names.
+        sim: Whether `--sim` asks for the simulated rig.
+
+    Raises:
+        UsageError: Both are given, or neither and no rig is configured.
+    """
+    if sim:
+        if config is not None:
+            raise UsageError(
+                "--sim asks for the simulated rig and --config for another one.",
+                fix="Give one of them.",
+            )
+        return SIMULATED
+    chosen = config or default_config()
+    if chosen is None:
+        raise UsageError("No rig is configured.", "There is no default.", ONE_OF)
+    return chosen
+
+
+def choose_rig(config: Path | None, sim: bool) -> Config:
+    """Return the configuration a command is about, read and checked.
+
+    Raises:
+        UsageError: As `choose_config`; or the file cannot be read, or a key is wrong.
+    """
+    return load_config(choose_config(config, sim))

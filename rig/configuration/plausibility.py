@@ -1,0 +1,69 @@
+"""How far the rig's encoders and its measured current may contradict one another before it trips.
+
+The firmware core holds these limits. The board in Python, which is for simulation where there is no
+compiler, does not.
+"""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Window = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Ratio = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class PlausibilitySection(BaseModel):
+    """What is believed of the drive train; defaults are those of the reference rig.
+
+    Each window is wider than what the shipped protocols need on simulated rigs whose parameters
+    vary by 15 % and that have one hidden effect (docs/decisions/0111).
+
+    Attributes:
+        following_rad: Farthest the followed encoder may be from its target.
+        following_s: How long it may be farther.
+        command_full_scale_a: Motor current of a full command.
+        command_offset_a: Motor current at a command of 0.
+        current_window_a: Largest difference of measured and commanded current, averaged over
+            `current_s`. The controller's limit must lie below the motor controller's own.
+        current_s: Time of that average.
+        frozen_current_a: Change of the current behind which a motor that did not move has a dead
+            encoder; half of the current limit if unset.
+        frozen_motor_rad: Motor shaft angle within which it did not move.
+        torque_constant_n_m_a: Torque at the spindle a motor current, at rest.
+        still_torque_n_m: Largest torque of a motor that does not move by its encoder which the
+            torque sensor does not find: its friction. Beyond it the encoder is dead.
+        gear_ratio: Motor turns a turn of the spindle; 0 for no comparison.
+        gear_stiffness_n_m_rad: Stiffness of the gearhead's twist, at the spindle.
+        twist_window_rad: Largest span of what motor and spindle differ by besides that twist, at
+            the spindle: backlash, friction, and a stiffness that is not quite right.
+        jaw_ratio: Jaw angle a spindle angle; 0 for no comparison.
+        jaw_zero_rad: Jaw angle at spindle angle zero.
+        cable_stiffness_n_m_rad: Stiffness of the cable's stretch, at the jaw.
+        stretch_window_rad: Largest span of what jaw and spindle differ by besides that stretch, at
+            the jaw.
+        spindle_jump_rad: Farthest the spindle may turn in one sample.
+        jaw_jump_rad: Farthest the jaw may turn in one sample.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    following_rad: Window = 0.5
+    following_s: Annotated[float, Field(gt=0, le=60)] = 0.2
+    command_full_scale_a: Window = 2.06
+    command_offset_a: Number = -0.019
+    current_window_a: Window = 0.05
+    current_s: Annotated[float, Field(gt=0, le=1)] = 0.02
+    frozen_current_a: Window | None = None
+    frozen_motor_rad: Window = 0.008
+    torque_constant_n_m_a: Window = 0.897
+    still_torque_n_m: Window = 0.15
+    gear_ratio: Ratio = 35.0
+    gear_stiffness_n_m_rad: Window = 5.4
+    twist_window_rad: Window = 0.08
+    jaw_ratio: Ratio = 0.913
+    jaw_zero_rad: Number = 1.272
+    cable_stiffness_n_m_rad: Window = 0.751
+    stretch_window_rad: Window = 0.3
+    spindle_jump_rad: Window = 0.1
+    jaw_jump_rad: Window = 0.1

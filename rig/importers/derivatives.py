@@ -1,0 +1,199 @@
+"""Compare a channel with the channel of the same recording that is its derivative.
+
+A wrong sample rate, a scale, a sign or a column that was shifted leaves every number of a file
+plausible. Where a file holds both an angle and its velocity, the two expose it: over a span 2h the
+displacement over time must be the mean of the velocity,
+
+    (x(t + h) - x(t - h)) / 2h = ratio * mean of v(t + lag) over the span,   ratio = 1, lag = 0.
+
+A velocity that a device filters lags by some milliseconds; it never leads.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import correlate
+
+from estimation.channels import UnknownUnitError, unit_of
+from estimation.recording import FloatArray, Recording
+from rig.errors import DataError
+
+DERIVATIVE = {"rad": "rad/s", "rad/s": "rad/s^2", "m": "m/s", "m/s": "m/s^2", "N m": "N m/s"}
+"""Unit of the derivative of a channel, by the channel's unit."""
+QUANTITIES = ("angle", "position", "velocity", "speed", "rate", "acceleration", "torque")
+
+SPANS_S = (0.05, 0.2, 0.6)
+"""Spans that are tried; the one with the highest correlation counts."""
+LONGEST_S = 60.0
+SEARCH_S = 1.0
+LEAST_CORRELATION = 0.9
+"""Below this, noise hides the relation and nothing is concluded."""
+RATIO_TOLERANCE = 0.05
+"""Measured velocities of an arm's joints agree with their angles within 0.017."""
+LARGEST_LAG_S = 0.02
+LARGEST_LAG_SAMPLES = 4
+LARGEST_LEAD_SAMPLES = 2
+"""Bounds of the lag; on the measured arm it is one sample of 5 ms."""
+SHIFT_GAIN = 2.0
+"""A shift must halve the unexplained variance: a slow motion hardly shows where it begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """How a channel's slope compares with its stated derivative.
+
+    Attributes:
+        ratio: Slope over derivative, negative where the signs differ; 1 is right.
+        lag_s: Time by which the derivative is late, s; negative where it is early.
+        lag_is_shift: Whether the lag is too large for a filter.
+        correlation: Correlation of the two after the lag, 0 to 1.
+    """
+
+    ratio: float
+    lag_s: float
+    lag_is_shift: bool
+    correlation: float
+
+    @property
+    def ratio_is_wrong(self) -> bool:
+        """Whether no share of noise in either channel makes the ratio's size 1."""
+        return not self.allows(1.0)
+
+    def allows(self, ratio: float) -> bool:
+        """Return whether the true ratio's size may be this one, by the noise in either channel."""
+        size = abs(self.ratio) / ratio
+        lowest, highest = size * self.correlation, size / self.correlation
+        return highest >= 1 - RATIO_TOLERANCE and lowest <= 1 + RATIO_TOLERANCE
+
+
+def checked(recording: Recording) -> Recording:
+    """Return the recording if every channel agrees with the channel that is its derivative.
+
+    Raises:
+        DataError: A pair differs by a factor, a sign or a shift in time.
+    """
+    for name, slope_name in pairs(recording):
+        found = relation(recording, name, slope_name)
+        fault = _fault(name, slope_name, found) if found else ""
+        if fault:
+            raise DataError(
+                f"{recording.source or recording.name}: {fault}.",
+                f"{slope_name} must be the time derivative of {name}. Either the sample rate, or a "
+                "scale, a sign or the order of columns is wrong; nothing of it was imported.",
+                "Correct the file, its sidecar or the stated sample rate.",
+            )
+    return recording
+
+
+def _fault(name: str, slope_name: str, found: Relation) -> str:
+    if found.lag_is_shift:
+        way = "after" if found.lag_s > 0 else "before"
+        return f"{slope_name} comes {abs(1000 * found.lag_s):.0f} ms {way} the motion of {name}"
+    if found.ratio < 0:
+        return f"{slope_name} has the opposite sign of the motion of {name}"
+    if found.ratio_is_wrong:
+        return (
+            f"{name} changes {found.ratio:.2f} times as fast as {slope_name} states; a sample rate "
+            f"that is wrong by this factor would explain it"
+        )
+    return ""
+
+
+def pairs(recording: Recording) -> Iterator[tuple[str, str]]:
+    """Yield each channel that has its derivative in the recording, and the derivative's name."""
+    units: dict[str, dict[str, list[str]]] = {}
+    for name in recording.columns:
+        stem, unit = _stem(name)
+        units.setdefault(stem, {}).setdefault(unit, []).append(name)
+    for by_unit in units.values():
+        for unit, names in by_unit.items():
+            for slope_name in by_unit.get(DERIVATIVE.get(unit, ""), []):
+                for name in names:
+                    yield name, slope_name
+
+
+def _stem(name: str) -> tuple[str, str]:
+    """Return what a channel belongs to, and its unit: `joint_1`, `rad` of `joint_1_angle_rad`."""
+    try:
+        unit = unit_of(name)
+    except UnknownUnitError:
+        return name, ""
+    parts = name.split("_")
+    last = max((i for i, part in enumerate(parts) if part in QUANTITIES), default=None)
+    return "_".join(parts[:last]) if last is not None else name, unit
+
+
+def relation(recording: Recording, name: str, slope_name: str) -> Relation | None:
+    """Compare a channel's slope with its stated derivative on the longest unbroken part.
+
+    Args:
+        recording: The run.
+        name: A channel.
+        slope_name: Its derivative.
+
+    Returns:
+        The relation, or None where noise hides it or the run is too short.
+    """
+    if len(recording) < 2:
+        return None
+    part = _unbroken(recording)
+    period_s = 1 / recording.sample_rate_hz
+    value, slope = recording[name][part], recording[slope_name][part]
+    integral = np.concatenate([[0.0], np.cumsum((slope[1:] + slope[:-1]) / 2)]) * period_s
+    best: Relation | None = None
+    for span_s in SPANS_S:
+        half = max(1, round(span_s / 2 / period_s))
+        if value.size < 8 * half or value.size < 50:
+            continue
+        width = 2 * half * period_s
+        found = _aligned(
+            (value[2 * half :] - value[: -2 * half]) / width,
+            (integral[2 * half :] - integral[: -2 * half]) / width,
+            period_s,
+        )
+        if best is None or found.correlation > best.correlation:
+            best = found
+    return best if best is not None and best.correlation >= LEAST_CORRELATION else None
+
+
+def _unbroken(recording: Recording) -> slice:
+    """Return the longest stretch of valid samples without a gap, at most `LONGEST_S` of it."""
+    step_s = 1 / recording.sample_rate_hz
+    broken = np.diff(recording.time_s) > 1.5 * step_s
+    edges = np.flatnonzero(broken | ~recording.valid[1:] | ~recording.valid[:-1]) + 1
+    edges = np.concatenate([[0], edges, [len(recording)]])
+    longest = int(np.argmax(np.diff(edges)))
+    start, stop = int(edges[longest]), int(edges[longest + 1])
+    return slice(start, min(stop, start + round(LONGEST_S / step_s)))
+
+
+def _aligned(moved: FloatArray, stated: FloatArray, period_s: float) -> Relation:
+    """Compare two velocities at the lag at which they correlate best."""
+    moved, stated = moved - moved.mean(), stated - stated.mean()
+    scale = float(np.sqrt((moved @ moved) * (stated @ stated)))
+    if scale <= 0:
+        return Relation(1.0, 0.0, False, 0.0)
+    reach = min(max(round(SEARCH_S / period_s), 2 * LARGEST_LAG_SAMPLES), moved.size // 4)
+    middle = moved.size - 1
+    correlations = correlate(stated, moved)[middle - reach : middle + reach + 1] / scale
+    lags = np.arange(-reach, reach + 1)
+    late = max(LARGEST_LAG_SAMPLES, LARGEST_LAG_S / period_s)
+    usual = (lags >= -LARGEST_LEAD_SAMPLES) & (lags <= late)
+    lag = int(lags[usual][np.argmax(np.abs(correlations[usual]))])
+    best = int(lags[np.argmax(np.abs(correlations))])
+    inside, outside = _overlap(moved, stated, lag), _overlap(moved, stated, best)
+    if 1 - inside[0] ** 2 > SHIFT_GAIN * (1 - outside[0] ** 2):
+        lag, inside = best, outside
+    correlation, ratio = inside
+    shifted = not -LARGEST_LEAD_SAMPLES <= lag <= late
+    return Relation(ratio, lag * period_s, shifted, abs(correlation))
+
+
+def _overlap(moved: FloatArray, stated: FloatArray, lag: int) -> tuple[float, float]:
+    """Return correlation and signed ratio of spread where the two overlap at a lag."""
+    a = moved[max(0, -lag) : moved.size - max(0, lag)]
+    b = stated[max(0, lag) : stated.size - max(0, -lag)]
+    a, b = a - a.mean(), b - b.mean()
+    correlation = float(a @ b / np.sqrt((a @ a) * (b @ b)))
+    return correlation, float(np.copysign(np.sqrt((a @ a) / (b @ b)), correlation))

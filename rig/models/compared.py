@@ -1,0 +1,201 @@
+"""Two estimators on the same runs: which has the smaller error, by how much, and where."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from estimation.campaign import Campaign
+from estimation.closing import is_closing, processed
+from estimation.estimator import Estimator
+from estimation.estimators.bank import BankEstimator
+from estimation.estimators.network import NetworkEstimator
+from estimation.estimators.origin import Origin, data_hash
+from estimation.filters import FilterError
+from estimation.recording import Recording
+from rig.errors import DataError, UsageError
+from rig.models.origins import file_hash
+from rig.output.provenance import Provenance
+
+SCHEMA = "rig.estimators.compared/1"
+CERTAIN = 0.05
+"""Largest p of the signed-rank test at which one estimator is called better."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two estimators.
+
+    Attributes:
+        file: Its file's name.
+        hash: Hash of the file.
+        origin: What the file states of where it comes from; None where it states nothing.
+        seen: Runs compared on that it was fitted on, by the hash of their samples.
+    """
+
+    file: str
+    hash: str
+    origin: Origin | None
+    seen: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RunErrors:
+    """Errors on the valid closing samples of one run, SI units, of the first and the second.
+
+    Attributes:
+        run: The run.
+        samples: Samples compared on.
+        rmse: Root mean square errors.
+        mean: Mean errors, estimate less truth.
+        covered: Share of the samples inside the interval of 95 %; None without one.
+        conditions: The run's conditions that are numbers.
+    """
+
+    run: str
+    samples: int
+    rmse: tuple[float, float]
+    mean: tuple[float, float]
+    covered: tuple[float | None, float | None]
+    conditions: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Result.
+
+    Attributes:
+        schema: Name of this layout.
+        target: Channel that both estimate.
+        sides: The two estimators.
+        runs: Errors by run.
+        left_out: Runs without a valid closing sample.
+        rmse: Root mean square errors over all samples.
+        p: Chance of runs' errors at least this different if neither were better (Wilcoxon's
+            signed-rank test); 1 for fewer than two runs.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    target: str
+    sides: tuple[Side, Side]
+    runs: tuple[RunErrors, ...]
+    left_out: tuple[str, ...]
+    rmse: tuple[float, float]
+    p: float
+    provenance: Provenance
+
+    @property
+    def better(self) -> int | None:
+        """Index of the better one, None where the runs do not decide."""
+        return None if self.p > CERTAIN else int(np.argmin(self.rmse))
+
+
+def compare(
+    files: tuple[Path, Path],
+    estimators: tuple[Estimator, Estimator],
+    campaign: Campaign,
+    on_run: Callable[[str], None] = lambda name: None,
+) -> Comparison:
+    """Compare two estimators of one channel on the closing samples of every run.
+
+    Both are asked whatever the instrument, since the runs state the error.
+
+    Args:
+        files: Their files.
+        estimators: What the files hold.
+        campaign: Runs with the target measured; excluded ones are left out.
+        on_run: Called with each run's name when it has been compared.
+
+    Raises:
+        UsageError: They estimate different channels.
+        DataError: No run has a valid closing sample.
+        MissingChannelError: A run lacks a channel.
+    """
+    target = estimators[0].target
+    if estimators[1].target != target:
+        raise UsageError(
+            f"The estimators estimate different channels: {target} and {estimators[1].target}.",
+            fix="Compare two of the same channel.",
+        )
+    asked = [e.for_any_instrument() if isinstance(e, Stated) else e for e in estimators]
+    found, left_out, squares, hashes = [], [], [], {}
+    for recording in campaign.evidence:
+        errors = _on_run(asked, recording, target)
+        if errors is None:
+            left_out.append(recording.name)
+        else:
+            found.append(errors)
+            squares.append([errors.samples * value**2 for value in errors.rmse])
+            hashes[recording.name] = data_hash(recording)
+        on_run(recording.name)
+    if not found:
+        raise DataError("No run has a valid closing sample to compare on.")
+    first, second = np.sqrt(np.sum(squares, axis=0) / sum(run.samples for run in found))
+    sides = [
+        _side(file, estimator, hashes) for file, estimator in zip(files, estimators, strict=True)
+    ]
+    return Comparison(
+        SCHEMA,
+        target,
+        (sides[0], sides[1]),
+        tuple(found),
+        tuple(left_out),
+        (float(first), float(second)),
+        _chance([run.rmse for run in found]),
+        Provenance.now(0),
+    )
+
+
+Stated = BankEstimator | NetworkEstimator
+"""Estimators that state their instrument and origin."""
+
+
+def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) -> RunErrors | None:
+    try:
+        run = processed(recording, [target])
+    except FilterError:
+        return None
+    kept = is_closing(run) & run.valid
+    if not kept.any():
+        return None
+    truth = run[target][kept]
+    rmse, mean, covered = [], [], []
+    for estimator in estimators:
+        share = None
+        if isinstance(estimator, BankEstimator):
+            whole = estimator.estimate(recording)
+            error = whole.value[kept] - truth
+            if estimator.interval is not None:
+                share = float(np.mean(np.abs(error) <= whole.half_width[kept]))
+        else:
+            error = estimator.predict(recording)[kept] - truth
+        rmse.append(float(np.sqrt(np.mean(error**2))))
+        mean.append(float(error.mean()))
+        covered.append(share)
+    conditions = {k: v for k, v in recording.conditions.items() if isinstance(v, float)}
+    return RunErrors(
+        recording.name,
+        int(kept.sum()),
+        (rmse[0], rmse[1]),
+        (mean[0], mean[1]),
+        (covered[0], covered[1]),
+        conditions,
+    )
+
+
+def _side(file: Path, estimator: Estimator, hashes: dict[str, str]) -> Side:
+    origin = estimator.origin if isinstance(estimator, Stated) else None
+    fitted = set(origin.data.values()) if origin is not None else set()
+    seen = tuple(name for name, value in hashes.items() if value in fitted)
+    return Side(file.name, file_hash(file), origin, seen)
+
+
+def _chance(rmse: list[tuple[float, float]]) -> float:
+    logs = np.log(np.array(rmse))
+    differences = logs[:, 0] - logs[:, 1]
+    if len(differences) < 2 or not differences.any():
+        return 1.0
+    return float(wilcoxon(differences).pvalue)

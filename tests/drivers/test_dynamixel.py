@@ -1,0 +1,287 @@
+"""The Dynamixel: the e-Manual's packets, current control, and how it stops."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.device import SampleFlag
+from drivers.dynamixel import protocol
+from drivers.dynamixel.driver import Dynamixel, open_dynamixel
+from drivers.dynamixel.fake import DynamixelFake
+from drivers.dynamixel.line import InstructionRefusedError
+from drivers.errors import (
+    DisarmUnconfirmedError,
+    DriverError,
+    FrameError,
+    LinkError,
+    LinkLostError,
+    LinkTimeoutError,
+)
+from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.simulated import SimulatedTransport
+
+POSITION = protocol.Register(132, 4)
+GOAL_POSITION = protocol.Register(116, 4)
+GOAL_VELOCITY = protocol.Register(104, 4)
+EXAMPLES = [
+    (1, protocol.PING, b"", "FF FF FD 00 01 03 00 01 19 4E"),
+    (254, protocol.PING, b"", "FF FF FD 00 FE 03 00 01 31 42"),
+    (1, protocol.STATUS, b"\0\x06\x04\x26", "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D"),
+    (2, protocol.STATUS, b"\0\x06\x04\x26", "FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D"),
+    (
+        *(1, protocol.READ, protocol.read_question(POSITION)),
+        "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15",
+    ),
+    (1, protocol.STATUS, b"\0\xa6\0\0\0", "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0"),
+    (
+        *(1, protocol.WRITE, protocol.write_question(GOAL_POSITION, 512)),
+        "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89",
+    ),
+    (
+        *(1, 0x04, protocol.write_question(GOAL_VELOCITY, 200)),
+        "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E",
+    ),
+    (1, protocol.STATUS, b"\0", "FF FF FD 00 01 04 00 55 00 A1 0C"),
+]
+"""Source: ROBOTIS e-Manual, Protocol 2.0, the examples of ping, read, write and reg write."""
+
+
+@pytest.mark.parametrize(("device_id", "instruction", "parameters", "packet"), EXAMPLES)
+def test_packets_are_those_of_the_manual(
+    device_id: int, instruction: int, parameters: bytes, packet: str
+) -> None:
+    data = bytes.fromhex(packet)
+    assert protocol.encode(device_id, instruction, parameters) == data
+    assert protocol.decode(data) == (device_id, instruction, parameters)
+    assert protocol.find(b"\xff\xff" + data + b"x") == (data, b"x")
+
+
+def test_the_registers_are_those_of_the_manual() -> None:
+    """Source: control tables of XM430-W210 and XL330-M288."""
+    registers = {
+        protocol.OPERATING_MODE: (11, 1),
+        protocol.CURRENT_LIMIT: (38, 2),
+        protocol.TORQUE_ENABLE: (64, 1),
+        protocol.HARDWARE_ERROR: (70, 1),
+        protocol.BUS_WATCHDOG: (98, 1),
+        protocol.GOAL_CURRENT: (102, 2),
+        protocol.PRESENT: (126, 21),
+    }
+    assert all((r.address, r.size) == told for r, told in registers.items())
+    instructions = (protocol.PING, protocol.READ, protocol.WRITE, protocol.REBOOT, protocol.STATUS)
+    assert instructions == (0x01, 0x02, 0x03, 0x08, 0x55)
+    assert (
+        *(0, 20),
+        0xFF,
+    ) == (protocol.CURRENT_MODE, protocol.WATCHDOG_UNIT_MS, protocol.WATCHDOG_TRIPPED)
+    assert (protocol.ALERT, protocol.RANGE_ERROR, protocol.ACCESS_ERROR) == (0x80, 4, 7)
+    data = bytes.fromhex("feff 0a000000 a6000000 00000000 00000000 3200 1f")
+    assert protocol.decode_present(data) == protocol.Present(-2, 10, 166, 50, 31)
+    assert pytest.approx(math.radians(0.087890625)) == protocol.RAD_PER_COUNT
+    assert pytest.approx(0.229 * 2 * math.pi / 60) == protocol.RAD_S_PER_COUNT
+    assert protocol.write_question(protocol.GOAL_CURRENT, -2).hex() == "6600feff"
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (1, "failed"),
+        (2, "does not know"),
+        (3, "checksum"),
+        (4, "out of range"),
+        (5, "length"),
+        (6, "limit"),
+        (7, "accessed"),
+    ],
+)
+def test_an_errors_number_is_that_of_the_manual(number: int, words: str) -> None:
+    assert words in protocol.ERRORS[number]
+
+
+@pytest.mark.parametrize(
+    ("number", "name", "unit_a"),
+    [
+        (1020, "XM430-W350", 2.69e-3),
+        (1030, "XM430-W210", 2.69e-3),
+        (1120, "XM540-W270", 2.69e-3),
+        (1190, "XL330-M077", 1e-3),
+        (1200, "XL330-M288", 1e-3),
+    ],
+)
+def test_a_model_is_that_of_the_manual(number: int, name: str, unit_a: float) -> None:
+    assert protocol.model_of(number) == (name, unit_a)
+
+
+@given(parameters=st.binary(max_size=40), bit=st.integers(0, 7), place=st.integers(4, 60))
+def test_packets_come_back_and_one_changed_bit_is_refused(
+    parameters: bytes, bit: int, place: int
+) -> None:
+    packet = protocol.encode(7, protocol.WRITE, parameters)
+    assert protocol.decode(packet) == (7, protocol.WRITE, parameters)
+    damaged = bytearray(packet)
+    damaged[4 + place % (len(packet) - 4)] ^= 1 << bit
+    with pytest.raises(FrameError):
+        protocol.decode(bytes(damaged))
+
+
+def test_a_header_within_a_packet_is_stuffed() -> None:
+    packet = protocol.encode(1, protocol.WRITE, b"\x74\0\xff\xff\xfd\0")
+    assert packet[7:-2] == b"\x03\x74\0\xff\xff\xfd\xfd\0"
+    assert packet[5] == 10  # the length counts what was stuffed
+    assert protocol.decode(packet)[2] == b"\x74\0\xff\xff\xfd\0"
+
+
+def armed(fake: DynamixelFake, **options: int) -> Dynamixel:
+    device = Dynamixel(SimulatedTransport(fake), **options)
+    device.start()
+    device.arm()
+    return device
+
+
+def test_a_current_turns_the_horn_and_the_end_is_without_force() -> None:
+    fake = DynamixelFake()
+    device = armed(fake)
+    assert device.current_limit_a == pytest.approx(1.75)
+    assert device.set_current(0.0301) == pytest.approx(0.030)
+    for _ in range(200):
+        batch = device.read(0.1)
+        assert batch.flags[0] == 0
+    assert batch.columns["current_a"][0] == pytest.approx(0.030)
+    assert batch.columns["command_current_a"][0] == pytest.approx(0.030)
+    assert batch.columns["supply_v"][0] == pytest.approx(5.0)
+    assert batch.columns["temperature_k"][0] == pytest.approx(304.15)
+    assert batch.columns["speed_rad_s"][0] == pytest.approx(300 * 0.229 * math.tau / 60, rel=0.02)
+    assert batch.columns["angle_rad"][0] > 5.0
+    device.close()
+    assert not fake.in_force
+    with pytest.raises(LinkLostError):
+        device.read(0.1)
+
+
+def test_a_negative_current_turns_it_back() -> None:
+    device = armed(DynamixelFake())
+    device.set_current(-0.030)
+    for _ in range(100):
+        batch = device.read(0.1)
+    assert batch.columns["current_a"][0] == pytest.approx(-0.030)
+    assert batch.columns["angle_rad"][0] < -1.0
+    device.close()
+
+
+@pytest.mark.parametrize("current", [math.nan, math.inf, 1.76, -1.76])
+def test_a_current_that_must_not_be_is_refused(current: float) -> None:
+    device = armed(DynamixelFake())
+    with pytest.raises(DriverError, match=r"limit is 1\.75"):
+        device.set_current(current)
+    device.close()
+
+
+def test_a_host_that_falls_silent_stops_the_motor_and_is_told_so() -> None:
+    fake = DynamixelFake()
+    device = armed(fake, watchdog_ms=100)
+    device.set_current(0.03)
+    device.read(0.1)
+    fake.advance(100)
+    assert fake.current == 30
+    fake.advance(1)
+    assert fake.current == 0
+    with pytest.raises(DriverError, match="stopped by itself"):  # noqa: PT012
+        for _ in range(3):
+            device.read(0.1)
+    with pytest.raises(DriverError, match="not armed"):
+        device.set_current(0.03)
+    device.arm()
+    device.set_current(0.03)
+    device.read(0.1)
+    assert fake.current == 30
+    device.close()
+
+
+def test_a_host_that_reads_slowly_but_steadily_is_heard() -> None:
+    fake = DynamixelFake()
+    device = armed(fake, rate_hz=10, watchdog_ms=200)
+    device.set_current(0.03)
+    for _ in range(30):
+        device.read(1.0)
+    assert fake.current == 30
+    device.close()
+
+
+def test_a_hardware_error_is_said_in_words_and_cleared_by_a_restart() -> None:
+    fake = DynamixelFake()
+    device = armed(fake)
+    device.set_current(0.03)
+    device.read(0.1)
+    fake.fail(1 << 2 | 1 << 5)
+    with pytest.raises(DriverError, match="too hot; it was overloaded"):  # noqa: PT012
+        for _ in range(3):
+            device.read(0.1)
+    assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
+    with pytest.raises(DriverError, match="hardware error"):
+        device.arm()
+    device.clear_fault()
+    device.arm()
+    assert device.read(0.1).flags[0] == 0
+    device.close()
+
+
+def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
+    cable = FaultyTransport(SimulatedTransport(DynamixelFake()))
+    device = Dynamixel(cable)
+    device.start()
+    device.arm()
+    cable.incoming = lambda data: b""
+    with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*200 ms"):
+        device.disarm()
+    with pytest.raises(DisarmUnconfirmedError):
+        device.close()
+
+
+def test_a_disarm_is_not_believed_while_the_register_says_otherwise() -> None:
+    fake = DynamixelFake()
+    device = armed(fake)
+    write = fake._write
+    fake._write = lambda address, data: 0 if address == 64 else write(address, data)  # type: ignore[method-assign]
+    with pytest.raises(DisarmUnconfirmedError, match="holds 1"):
+        device.disarm()
+    fake._write = write  # type: ignore[method-assign]
+    device.close()
+    assert not fake.in_force
+
+
+def test_damage_is_asked_for_again_and_an_echo_is_dealt_with() -> None:
+    cable = FaultyTransport(SimulatedTransport(DynamixelFake(echo=True)))
+    device = Dynamixel(cable)
+    cable.incoming = once(lambda data: data[:-1] + bytes([data[-1] ^ 1]))
+    assert device.identify().model == "Dynamixel XL330-M288"
+    assert device.counters["retries"] == 1
+    assert device.counters["crc_errors"] == 1
+    device.close()
+
+
+def test_models_that_cannot_be_driven_so_are_refused() -> None:
+    with pytest.raises(DriverError, match="XL430-W250 neither"):
+        Dynamixel(SimulatedTransport(DynamixelFake(model=1060))).start()
+    with pytest.raises(DriverError, match="9999 is not known"):
+        Dynamixel(SimulatedTransport(DynamixelFake(model=9999))).start()
+    other = Dynamixel(SimulatedTransport(DynamixelFake(model=9999)), current_unit_a=1e-3)
+    assert other.identify().model == "Dynamixel model 9999"
+    with pytest.raises(LinkTimeoutError, match="identifier 9"):
+        Dynamixel(SimulatedTransport(DynamixelFake()), device_id=9).identify()
+    with pytest.raises(DriverError, match="Call start"):
+        Dynamixel(SimulatedTransport(DynamixelFake())).arm()
+    with pytest.raises(LinkError, match="identifier"):
+        open_dynamixel("loop://", device_id=253)
+    with pytest.raises(LinkError, match="watchdog"):
+        open_dynamixel("loop://", watchdog_ms=10)
+
+
+def test_a_refusal_gives_its_reason() -> None:
+    fake = DynamixelFake()
+    device = armed(fake)
+    with pytest.raises(InstructionRefusedError, match="cannot be accessed") as caught:
+        device._line.write(protocol.OPERATING_MODE, 3)
+    assert caught.value.number == 7
+    device.close()

@@ -1,0 +1,223 @@
+"""The moteus: the documentation's frames and lines, torque, faults, and how it stops."""
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.device import SampleFlag
+from drivers.errors import (
+    DisarmUnconfirmedError,
+    DriverError,
+    FrameError,
+    LinkError,
+    LinkLostError,
+    LinkTimeoutError,
+)
+from drivers.moteus import protocol
+from drivers.moteus.driver import Moteus, open_moteus
+from drivers.moteus.fake import MoteusFake
+from drivers.moteus.protocol import State
+from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.simulated import SimulatedTransport
+
+EXAMPLE = "01000a07206000200150ff140400130d"
+"""Source: moteus documentation, "CAN protocol", Example: a command and what is read with it."""
+ANSWER = "2404000a005000000170ff230d181400"
+"""Source: there, the answer to it."""
+
+
+def test_the_documented_frame_is_read_subframe_by_subframe() -> None:
+    assert list(protocol.subframes(bytes.fromhex(EXAMPLE))) == [
+        (protocol.WRITE, 0, 0x000, 1, (10,)),
+        (protocol.WRITE, 1, 0x020, 3, (0x60, 0x120, -176)),
+        (protocol.READ, 1, 0x000, 4, ()),
+        (protocol.READ, 0, 0x00D, 3, ()),
+    ]
+    written = protocol.write(0, 0x000, [10]) + protocol.write(1, 0x020, [0x60, 0x120, -176])
+    asked = protocol.read(1, 0x000, 4) + protocol.read(0, 0x00D, 3)
+    assert (written + asked).hex() == EXAMPLE
+
+
+def test_the_documented_answer_is_read() -> None:
+    assert protocol.registers(bytes.fromhex(ANSWER)) == {
+        **{0x000: 10, 0x001: 80, 0x002: 256, 0x003: -144},
+        **{0x00D: 24, 0x00E: 20, 0x00F: 0},
+    }
+    answer = protocol.reply(1, 0, [10, 80, 256, -144]) + protocol.reply(0, 0x00D, [24, 20, 0])
+    assert answer.hex() == ANSWER
+
+
+def test_the_documented_lines() -> None:
+    data = bytes.fromhex(EXAMPLE)
+    assert protocol.send_line(1, data) == f"can send 8001 {EXAMPLE}\n".encode()
+    assert protocol.decode_line(f"rcv 100 {ANSWER}\r\n".encode()) == (0x100, bytes.fromhex(ANSWER))
+    assert protocol.decode_line(protocol.receive_line(1, bytes.fromhex(ANSWER))) == (
+        0x100,
+        bytes.fromhex(ANSWER),
+    )
+    assert protocol.decode_line(b"OK\r\n") is None
+    for line in (b"rcv 100", b"rcv 100 2x", b"noise", b"rcv zz 24"):
+        with pytest.raises(FrameError):
+            protocol.decode_line(line)
+
+
+def test_a_torque_command_holds_the_documented_registers() -> None:
+    """Source: "Register reference", 0x020 to 0x027; padding 0x50 to a size of CAN-FD."""
+    command = protocol.torque_command(0.05, 0.2, 0.1)
+    mode, values = protocol.subframes(command)
+    assert mode == (protocol.WRITE, 0, 0x000, 1, (10,))
+    assert values[:4] == (protocol.WRITE, 3, 0x020, 8)
+    position, velocity, torque, kp, kd, most, stop, watchdog = values[4]
+    assert math.isnan(position)
+    assert math.isnan(stop)
+    assert (velocity, kp, kd) == (0.0, 0.0, 0.0)
+    assert (torque, most, watchdog) == pytest.approx((0.05, 0.2, 0.1))
+    assert command[:6] == bytes.fromhex("01000a 0c0820")
+    assert command[6:10] == struct.pack("<f", math.nan)
+    # a public driver's test vector, "can send 8001 ...11001F01130D505050": the query behind it
+    assert protocol.STATE_QUESTION.hex() == "11001f01130d"
+    sent = protocol.padded(command + protocol.STATE_QUESTION)
+    assert len(sent) == 48
+    assert sent.endswith(b"\x13\x0d" + b"\x50" * (48 - len(command) - 6))
+    assert protocol.stop_command().hex() == "010000"
+    wide = protocol.read(protocol.INT32, protocol.MODEL, 2)
+    wide += protocol.read(protocol.INT32, protocol.SERIAL, 3)
+    assert wide.hex() == "1a8002" + "1ba002"
+
+
+def test_a_state_survives_its_frame_and_its_bytes_are_little_endian() -> None:
+    state = State(10, 1.5, -0.25, 0.125, 48, -5, 0)
+    data = bytes.fromhex("21000a 2f01 0000c03f 000080be 0000003e 230d 30fb00")
+    assert protocol.encode_state(state) == data
+    assert protocol.decode_state(data + b"\x50\x50") == state
+
+
+@given(data=st.binary(max_size=64))
+def test_any_frame_is_read_or_refused(data: bytes) -> None:
+    try:
+        state = protocol.decode_state(data)
+    except FrameError:
+        return
+    assert math.isfinite(state.position_rev)
+
+
+def armed(fake: MoteusFake, **options: float) -> Moteus:
+    device = Moteus(SimulatedTransport(fake), **options)  # type: ignore[arg-type]
+    device.start()
+    device.arm()
+    return device
+
+
+def test_a_torque_turns_the_output_and_the_end_is_without_force() -> None:
+    fake = MoteusFake()
+    device = armed(fake)
+    assert device.set_torque(0.01) == 0.01
+    for _ in range(100):
+        batch = device.read(0.1)
+        assert batch.flags[0] == 0
+    assert batch.columns["torque_n_m"][0] == pytest.approx(0.01)
+    assert batch.columns["command_torque_n_m"][0] == 0.01
+    assert batch.columns["supply_v"][0] == 24.0
+    assert batch.columns["temperature_k"][0] == pytest.approx(302.15)
+    assert batch.columns["speed_rad_s"][0] == pytest.approx(50.0, rel=0.02)
+    assert batch.columns["angle_rad"][0] > 5.0
+    device.close()
+    assert fake.mode == protocol.STOPPED
+    with pytest.raises(LinkLostError):
+        device.read(0.1)
+
+
+@pytest.mark.parametrize("torque", [math.nan, math.inf, 0.11, -0.11])
+def test_a_torque_that_must_not_be_is_refused(torque: float) -> None:
+    device = armed(MoteusFake())
+    with pytest.raises(DriverError, match=r"limit is 0\.1"):
+        device.set_torque(torque)
+    device.close()
+
+
+def test_a_host_that_falls_silent_is_noticed_by_the_controller_and_said() -> None:
+    fake = MoteusFake()
+    device = armed(fake)
+    device.set_torque(0.01)
+    device.read(0.1)
+    fake.advance(100)
+    assert fake.torque_n_m == pytest.approx(0.01)
+    fake.advance(1)
+    assert fake.mode == protocol.TIMEOUT
+    assert fake.torque_n_m == 0.0
+    with pytest.raises(DriverError, match="timed out"):
+        device.read(0.1)
+    with pytest.raises(DriverError, match="not armed"):
+        device.set_torque(0.01)
+    device.arm()
+    device.set_torque(0.01)
+    device.read(0.1)
+    assert fake.torque_n_m == pytest.approx(0.01)
+    device.close()
+
+
+def test_a_fault_is_said_in_words_and_cleared_by_arming() -> None:
+    fake = MoteusFake()
+    device = armed(fake)
+    device.read(0.1)
+    fake.fail(35)
+    with pytest.raises(DriverError, match=r"fit no magnet \(code 35\)"):
+        device.read(0.1)
+    assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
+    device.arm()
+    assert device.read(0.1).flags[0] == 0
+    device.close()
+
+
+def test_a_controller_that_is_stopped_by_somebody_is_said() -> None:
+    fake = MoteusFake()
+    device = armed(fake)
+    fake.receive(protocol.send_line(1, protocol.stop_command()))
+    with pytest.raises(DriverError, match=r"left operation and is in mode 4"):
+        device.read(0.1)
+    fake.advance(200)  # it is not started again behind the caller's back
+    assert fake.mode == protocol.TIMEOUT
+    device.close()
+
+
+def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
+    cable = FaultyTransport(SimulatedTransport(MoteusFake()))
+    device = Moteus(cable)
+    device.start()
+    device.arm()
+    cable.incoming = lambda data: b""
+    with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*0\.1 s"):
+        device.disarm()
+    with pytest.raises(DisarmUnconfirmedError):
+        device.close()
+
+
+def test_a_disarm_is_not_believed_while_the_mode_says_otherwise() -> None:
+    fake = MoteusFake()
+    device = armed(fake)
+    change, fake._change = fake._change, lambda mode: None  # type: ignore[method-assign]
+    with pytest.raises(DisarmUnconfirmedError, match="mode 10"):
+        device.disarm()
+    fake._change = change  # type: ignore[method-assign]
+    device.close()
+    assert fake.mode == protocol.STOPPED
+
+
+def test_who_answers_and_who_does_not() -> None:
+    cable = FaultyTransport(SimulatedTransport(MoteusFake()))
+    cable.incoming = once(lambda data: data.replace(b"rcv", b"r\xffv"))
+    device = Moteus(cable)
+    identity = device.identify()
+    assert identity.model == "moteus 0x0700"
+    assert identity.serial == "333333332222222211111111"
+    assert device.counters["retries"] == 1
+    assert device.counters["crc_errors"] == 1
+    with pytest.raises(LinkTimeoutError, match="identifier 9"):
+        Moteus(SimulatedTransport(MoteusFake()), device_id=9).identify()
+    with pytest.raises(DriverError, match="Call start"):
+        Moteus(SimulatedTransport(MoteusFake())).arm()
+    with pytest.raises(LinkError, match="identifier"):
+        open_moteus("loop://", device_id=127)

@@ -1,0 +1,69 @@
+"""Runs of several rigs are not opened as one, and what is left out is named with its reason."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.recording import Instrument, Recording
+from rig.cli.main import main
+from rig.importers.left_out import left_out
+from rig.importers.one_rig import MixedRunsError
+from rig.importers.registry import open_campaign
+from rig.log.convert import write_recording
+
+
+def run(name: str, serial: str = "4", **changes: object) -> Recording:
+    """A run of a tool, 2 s of a sine against friction."""
+    time_s = np.arange(2000) / 1000
+    speed = np.cos(2 * np.pi * time_s)
+    columns = {
+        "motor_current_a": 0.1 * np.sign(speed) + 0.05 * np.sin(2 * np.pi * time_s),
+        "spindle_angle_rad": np.sin(2 * np.pi * time_s) / (2 * np.pi),
+        "motor_angle_rad": 35 * np.sin(2 * np.pi * time_s) / (2 * np.pi),
+        "proximal_torque_n_m": 0.05 * np.sin(2 * np.pi * time_s),
+        "distal_torque_n_m": 0.04 * np.sin(2 * np.pi * time_s),
+    }
+    made = Recording(name, time_s, columns, rig="bench", instrument=Instrument("Maryland", serial))
+    return replace(made, **changes)
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (run("b", serial="5"), "instruments: a of Maryland 4, b of Maryland 5"),
+        (run("b", rig="another"), "rigs: a of bench, b of another"),
+    ],
+)
+@pytest.mark.parametrize("words", ["fit", "diagnose"])
+def test_runs_of_two_rigs_are_refused(tmp_path, capsys, other, said, words):
+    for recording in (run("a"), other, run("c")):
+        write_recording(tmp_path / f"{recording.name}.mcap", recording)
+    assert main([words, str(tmp_path)]) == 5
+    assert said in capsys.readouterr().err
+    with pytest.raises(MixedRunsError):
+        list(open_campaign(tmp_path))
+    assert open_campaign(tmp_path).runs[1].recording().name == "b"  # one by itself is shown
+
+
+def test_an_excluded_run_of_another_rig_does_no_harm(tmp_path):
+    write_recording(tmp_path / "a.mcap", run("a"))
+    write_recording(tmp_path / "b.mcap", run("b", serial="5", excluded="another tool"))
+    campaign = open_campaign(tmp_path)
+    assert [r.name for r in campaign] == ["a", "b"]
+    assert left_out(tmp_path, campaign) == ["Run b does not count: another tool"]
+
+
+def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_log, capsys):
+    for name in ("a", "b", "c"):
+        write_recording(tmp_path / f"{name}.mcap", run(name))
+    whole = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "a.aborted-1.mcap.part").write_bytes(whole[: whole.find(b"rig.end") - 20])
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "007.TXT").write_text(make_log().text())
+    (tmp_path / "notes.txt").write_text("the cable was oiled")
+    assert main(["fit", str(tmp_path)]) == 0
+    said = capsys.readouterr().err
+    assert "another format; --format mrdlab opens it: more/007.TXT." in said
+    assert "an earlier attempt of a run, or repaired: a.aborted-1.mcap.part." in said
+    assert "notes.txt" not in said

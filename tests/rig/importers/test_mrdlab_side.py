@@ -1,0 +1,139 @@
+"""Left and right jaws: the side is stated by names, shown by signs, and never assumed."""
+
+import numpy as np
+import pytest
+
+from rig.errors import DataError
+from rig.importers.archive import unpack_text
+from rig.importers.mrdlab import IMPORTER
+
+LEFT, RIGHT = "Tool_4_Maryland_L_4", "Tool_4_Maryland_R_4"
+MEASURED = (1, 2, 3, 4, 5, 7, 8, 9)
+"""Columns of the text whose sign depends on the side."""
+
+
+@pytest.fixture
+def load(tmp_path, make_log):
+    """Write one log into a folder, import it and return its recording."""
+
+    def _load(folder=LEFT, spindle="left", **options):
+        log = make_log(**options)
+        log.header = [line.replace("left spindle", f"{spindle} spindle") for line in log.header]
+        path = tmp_path / folder / "00.TXT"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(log.text())
+        return IMPORTER.open(path).runs[0].recording()
+
+    return _load
+
+
+def mirrored(text):
+    """Return a log's text as a right jaw would have written it."""
+    lines = []
+    for line in text.splitlines():
+        fields = line.split(",")
+        if not line.startswith("%"):
+            for column in MEASURED:
+                field = fields[column].strip()
+                fields[column] = field[1:] if field.startswith("-") else f"-{field}"
+        lines.append(",".join(fields))
+    return "\n".join(lines).replace("left spindle", "right spindle") + "\n"
+
+
+@pytest.mark.parametrize(
+    ("folder", "spindle"), [(RIGHT, "right"), ("bench", "right"), (RIGHT, "left"), (LEFT, "right")]
+)
+def test_a_right_jaw_reads_as_the_left_one_it_mirrors(load, folder, spindle):
+    left = load()
+    right = load(folder, spindle, mirrored=True)
+    assert right.instrument.side == "right"
+    assert right.columns.keys() == left.columns.keys()
+    for name in left.columns:
+        np.testing.assert_allclose(right[name], left[name], atol=1e-12, err_msg=name)
+    assert "right jaw" in right.notes
+    assert right.conditions == left.conditions
+
+
+def test_a_load_logged_with_the_sign_of_its_side_is_positive(load):
+    assert load(RIGHT, "right", mirrored=True, load_a=-0.3).conditions["load_command_a"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("folder", "spindle", "is_mirrored"),
+    [
+        (RIGHT, "right", False),
+        (RIGHT, "left", False),
+        ("bench", "right", False),
+        (LEFT, "right", False),
+        (LEFT, "left", True),
+        ("bench", "left", True),
+    ],
+)
+def test_a_stated_side_that_the_signs_contradict_is_refused(load, folder, spindle, is_mirrored):
+    with pytest.raises(DataError, match=r"00\.TXT.*(left|right).*signs.*(left|right) jaw"):
+        load(folder, spindle, mirrored=is_mirrored)
+
+
+def test_without_a_stated_side_the_signs_decide(load):
+    right = load("bench", header=["%taken by a test"], mirrored=True)
+    assert right.instrument.side == "right"
+    assert np.median(right["distal_torque_n_m"]) > 0
+    assert "side is stated nowhere" in right.notes
+    assert load("bench", header=["%taken by a test"]).instrument.side == "left"
+
+
+def without_load(rows):
+    rows[:, 5] = np.rint(5 * np.sin(np.arange(len(rows))))
+
+
+def test_without_a_load_the_names_decide(load):
+    right = load(RIGHT, "right", mirrored=True, edit=without_load)
+    assert right.instrument.side == "right"
+    assert np.polyfit(right["spindle_angle_rad"], right["proximal_torque_n_m"], 1)[0] > 0
+    assert "torque at the jaw does not show the side" in right.notes
+    with pytest.raises(DataError, match="neither"):
+        load("bench", header=["%taken by a test"], edit=without_load)
+    with pytest.raises(DataError, match=r"folder.*right.*header.*left"):
+        load(RIGHT, "left", mirrored=True, edit=without_load)
+
+
+@pytest.mark.parametrize(
+    ("column", "name"),
+    [(2, "proximal_torque_n_m"), (3, "motor_current_a"), (7, "motor_command_ratio")],
+)
+def test_one_sign_that_contradicts_the_others_is_refused(load, column, name):
+    def turn(rows):
+        rows[:, column] *= -1
+
+    with pytest.raises(DataError, match=rf"00\.TXT.*{name}.*sign"):
+        load(edit=turn)
+
+
+@pytest.mark.parametrize(("column", "name"), [(8, "motor_angle_rad"), (4, "jaw_angle_rad")])
+def test_an_encoder_geared_to_the_spindle_takes_its_sign(load, column, name):
+    def turn(rows):
+        rows[:, column] *= -1
+
+    turned, plain = load(edit=turn), load("bench")
+    np.testing.assert_array_equal(turned[name], plain[name])
+    assert f"{name} was logged with the opposite sign" in turned.notes
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("Tool_4_Maryland_L_4", "01"), ("Tool_5_Maryland_L_2", "00")]
+)
+def test_a_measured_log_mirrored_reads_the_same(measured_data, tmp_path, folder, stem):
+    archive = unpack_text(measured_data / f"mrdlab-{folder}.tar.xz")
+    (log,) = archive.rglob(f"{folder}/{stem}.TXT")
+    right = tmp_path / folder.replace("_L_", "_R_") / log.name
+    right.parent.mkdir()
+    right.write_text(mirrored(log.read_text("latin-1")), "latin-1")
+    (left,), (turned,) = IMPORTER.open(log), IMPORTER.open(right)
+    assert (left.instrument.side, turned.instrument.side) == ("left", "right")
+    for name in left.columns:
+        np.testing.assert_array_equal(turned[name], left[name], err_msg=name)
+    assert turned.stretches == left.stretches
+    right.write_text(log.read_text("latin-1"), "latin-1")
+    with pytest.raises(DataError, match="signs are those of a left jaw"):
+        IMPORTER.open(right).runs[0].recording()

@@ -1,0 +1,128 @@
+"""Which rig a command is about: no command takes the simulated one for granted."""
+
+from pathlib import Path
+
+import pytest
+
+from rig.cli.main import main
+from rig.configuration.config import SIMULATED
+
+CONFIG = SIMULATED.read_text().replace("simulated rig", "bench of Ada")
+BROKEN = CONFIG.replace('"sim://"', '"/dev/no-such-board"').replace("bench of Ada", "dead bench")
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A person's folder without a configuration, in a working folder without one."""
+    monkeypatch.delenv("RIG_CONFIG", raising=False)
+    monkeypatch.delenv("RIG_CALIBRATIONS", raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    (tmp_path / "home" / "rig").mkdir(parents=True)
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    return tmp_path / "home" / "rig"
+
+
+NEED_A_RIG = [
+    "record",
+    "live",
+    "grip --torque 0.06",
+    "calibrate torque --operator Ada --yes",
+    "selftest",
+    "doctor",
+    "stop",
+    "config show",
+    "config check",
+    "cal check",
+    "firmware version",
+    "grasper follow",
+]
+
+
+@pytest.mark.parametrize("words", NEED_A_RIG)
+def test_without_a_rig_a_command_names_the_ways_to_one(words, capsys):
+    assert main(words.split()) == 2
+    said = capsys.readouterr().err
+    for way in ("RIG_CONFIG", "./rig.toml", "~/.config/rig/rig.toml", "--config", "--sim"):
+        assert way in said
+    assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize("words", NEED_A_RIG)
+def test_sim_and_config_exclude_one_another(words, capsys):
+    if words == "grasper follow":
+        pytest.skip("its simulated rig is named by --config grasper")
+    path = ["reference"] if words.startswith("config") else ["-c", "reference"]
+    assert main([*words.split(), *path, "--sim"]) == 2
+    assert "Give one of them" in capsys.readouterr().err
+
+
+def shown(capsys) -> str:
+    assert main(["config", "show"]) == 0
+    return capsys.readouterr().out.splitlines()[0]
+
+
+def test_the_defaults_have_an_order(home, capsys, monkeypatch):
+    (home / "rig.toml").write_text(CONFIG.replace("of Ada", "of the person"))
+    assert shown(capsys) == 'name = "bench of the person"'
+    Path("rig.toml").write_text(CONFIG.replace("of Ada", "of the folder"))
+    assert shown(capsys) == 'name = "bench of the folder"'
+    monkeypatch.setenv("RIG_CONFIG", "grasper")
+    assert shown(capsys) == 'name = "simulated grasper"'
+    assert main(["config", "show", "--sim"]) == 0
+    assert capsys.readouterr().out.startswith('name = "simulated rig"')
+
+
+@pytest.mark.parametrize("words", ["selftest", "doctor", "stop", "firmware version"])
+def test_a_simulated_session_says_so_first(words, capsys):
+    main([*words.split(), "--sim"])
+    assert capsys.readouterr().err.startswith("Simulated rig")
+
+
+def test_a_resumed_recording_says_so_too(tmp_path, capsys):
+    protocol = tmp_path / "short.toml"
+    protocol.write_text(
+        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [2.0]\nloads_a = [0.1]\n'
+        "duration_s = 0.5\n"
+    )
+    out = str(tmp_path / "campaign")
+    assert main(["record", "--sim", "-p", str(protocol), "-o", out]) == 0
+    assert capsys.readouterr().err.startswith("Simulated rig")
+    assert main(["record", "--resume", out]) == 0
+    assert capsys.readouterr().err.startswith("Simulated rig")
+
+
+def test_stop_stops_every_configured_rig_and_goes_on_after_a_dead_one(home, capsys):
+    (home / "a_dead.toml").write_text(BROKEN)
+    (home / "b_unreadable.toml").write_text("name =")
+    (home / "c.toml").write_text(CONFIG.replace("of Ada", "of the person"))
+    Path("rig.toml").write_text(CONFIG)
+    assert main(["stop"]) == 4
+    out, err = capsys.readouterr()
+    assert "bench of Ada: disarmed" in out
+    assert "bench of the person: disarmed" in out
+    assert "dead bench: UNKNOWN" in err
+    assert "b_unreadable.toml: UNKNOWN" in err
+
+
+def test_stop_without_a_rig_has_stopped_nothing_and_says_so(capsys):
+    assert main(["stop"]) == 2
+    out, err = capsys.readouterr()
+    assert "Nothing was stopped" in err
+    assert "disarmed" not in out
+
+
+def test_a_simulated_calibration_stays_out_of_the_real_store(home, capsys):
+    words = ["calibrate", "gearbox", "--operator", "Ada", "--yes", "--sim"]
+    assert main([*words, "-o", "raw"]) == 0
+    assert not (home / "calibrations").exists()
+    assert (home / "calibrations-simulated").is_dir()
+    hint = capsys.readouterr().out.splitlines()[-1]
+    assert main(hint.partition("rig ")[2].split()) == 0
+
+
+@pytest.mark.parametrize("words", ["torque", "fsr", "ft"])
+def test_a_force_sensor_that_would_be_ignored_is_refused(words, capsys):
+    how = ["--operator", "Ada", "--yes", "--sim", "--force-sensor", "ati-net=udp:127.0.0.1:49152"]
+    assert main(["calibrate", words, *how]) == 2
+    assert "would not be used" in capsys.readouterr().err

@@ -1,0 +1,96 @@
+"""`rig firmware flash`: the one board that is plugged in, by its serial number, and not armed."""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from serial.tools import list_ports
+
+from drivers.errors import PortBusyError
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.reference import REFERENCE
+from drivers.transport import open_transport
+from rig.bench import firmware
+from rig.bench.flashing import board_to_flash
+from rig.configuration.config import load_config
+from rig.errors import SafetyTripError, UsageError
+from rig.machines.choose import machine_of
+from rig.simulation.firmware_process import PROGRAM
+
+TEENSY = {"vid": 0x16C0, "pid": 0x0483}
+
+
+@pytest.fixture
+def board(library: Path) -> Iterator[str]:
+    """The port of a board: the firmware's process."""
+    if not PROGRAM.is_file():
+        pytest.skip("the firmware process is built on Linux only")
+    with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.kill()
+
+
+def plug_in(monkeypatch: pytest.MonkeyPatch, **boards: str) -> None:
+    """Let the computer have Teensys, port by serial number, and a port of another maker."""
+    ports = [SimpleNamespace(serial_number=s, device=p, **TEENSY) for s, p in boards.items()]
+    other = SimpleNamespace(serial_number="x", device="/dev/ttyUSB0", vid=0x0403, pid=0x6001)
+    monkeypatch.setattr(list_ports, "comports", lambda: [other, *ports])
+
+
+def test_the_one_board_is_named_with_its_state(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in(monkeypatch, A1=board)
+    found = board_to_flash("", REFERENCE)
+    assert (found.serial, found.port, found.state) == ("A1", board, "it is disarmed")
+    assert board_to_flash("A1", REFERENCE) == found
+    with pytest.raises(UsageError, match="A1, not B2"):
+        board_to_flash("B2", REFERENCE)
+
+
+def test_several_boards_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in(monkeypatch, A1="/dev/ttyACM0", B2="/dev/ttyACM1")
+    with pytest.raises(UsageError, match=r"A1 at /dev/ttyACM0, B2 at /dev/ttyACM1"):
+        board_to_flash("B2", REFERENCE)
+    plug_in(monkeypatch)
+    with pytest.raises(UsageError, match="No Teensy"):
+        board_to_flash("", REFERENCE)
+
+
+def test_a_board_that_another_program_has_is_refused(
+    board: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plug_in(monkeypatch, A1=board)
+    link = open_transport(board)
+    with pytest.raises(PortBusyError, match="may be armed"):
+        board_to_flash("", REFERENCE)
+    link.close()
+
+
+def test_an_armed_board_is_refused_and_nothing_is_written(
+    board: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plug_in(monkeypatch, A1=board)
+    settings = load_config(Path("pty")).changed(safety={"watchdog_s": 1.0})
+    machine = machine_of(settings)
+    limits = machine.untroubled(machine.board_limits(settings, settings.calibration_set()))
+    logger = TeensyLogger(open_transport(board), machine.profile)
+    logger.arm(machine.gains(settings), limits)
+    logger._link.transport.close()
+    run: list[list[str]] = []
+    monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)
+    monkeypatch.setattr(firmware, "_run", run.append)
+    with pytest.raises(SafetyTripError, match="armed"):
+        firmware.flash("teensy41")
+    assert run == []
+
+
+def test_a_disarmed_board_is_flashed(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in(monkeypatch, A1=board)
+    run: list[list[str]] = []
+    monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)
+    monkeypatch.setattr(firmware, "_run", run.append)
+    assert firmware.flash("teensy41", "A1").serial == "A1"
+    (command,) = run
+    assert command[-2:] == ["--target", "upload"]

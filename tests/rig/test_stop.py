@@ -1,0 +1,142 @@
+"""`rig stop` while another program has the rig: it must let go, and the board is read back."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import STATUS_ARMED
+from drivers.transport import open_transport
+from rig.bench.holding import holder, holding
+from rig.cli.main import main
+from rig.configuration.config import load_config
+from rig.errors import ExitCode
+from rig.simulation.firmware_process import PROGRAM
+
+SESSION = """
+import sys
+import numpy as np
+from pathlib import Path
+from drivers.transport import open_transport
+from rig.configuration.config import load_config
+from rig.bench.session import Session
+
+config = load_config(Path(sys.argv[1]))
+with Session(config, open_transport(config.logger.url)) as session:
+    for reading in session.play(np.full(600000, -1.04), np.full(600000, 0.1)):
+        if reading.setpoint.max() > 0:
+            print("playing", flush=True)
+"""
+FOREIGN = """
+import sys
+from pathlib import Path
+from drivers.transport import open_transport
+from rig.configuration.config import load_config
+
+link = open_transport(load_config(Path(sys.argv[1])).logger.url)
+print("open", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def board(library: Path, tmp_path: Path) -> Iterator[Path]:
+    """The configuration of a rig whose board is the firmware's process."""
+    if not PROGRAM.is_file():
+        pytest.skip("the firmware process is built on Linux only")
+    with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        port = process.stdout.readline().strip()
+        path = tmp_path / "held.toml"
+        named = (
+            Path(__file__).parents[2] / "rig" / "configuration" / "shipped" / "pty.toml"
+        ).read_text()
+        path.write_text(named.replace("sim://pty", port))
+        yield path
+        process.kill()
+
+
+def started(script: str, config: Path) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", script, str(config)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline()
+    return process
+
+
+def stopped(config: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:
+    code = main(["stop", "-c", str(config), "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def is_armed(config: Path) -> bool:
+    with TeensyLogger(open_transport(load_config(config).logger.url)) as logger:
+        logger.identify()
+        logger.start()
+        return bool(int(logger.read(1.0).samples["status"][-1]) & STATUS_ARMED)
+
+
+def test_a_session_that_has_the_rig_is_asked_to_end(
+    board: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with started(SESSION, board) as session:
+        code, told = stopped(board, capsys)
+        session.communicate()
+    assert (code, told["state"]) == (0, "disarmed")
+    assert told["holder"] == {"pid": session.pid, "was_killed": False}
+    assert session.returncode != -signal.SIGKILL
+    assert not is_armed(board)
+
+
+def test_a_session_that_hangs_is_killed(
+    board: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
+    with started(SESSION, board) as session:
+        os.kill(session.pid, signal.SIGSTOP)
+        code, told = stopped(board, capsys)
+        session.communicate()
+    assert (code, told["state"]) == (0, "disarmed")
+    assert told["holder"] == {"pid": session.pid, "was_killed": True}
+    assert session.returncode == -signal.SIGKILL
+    assert not is_armed(board)
+
+
+def test_a_program_of_another_maker_is_named_and_left_alone(
+    board: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with started(FOREIGN, board) as other:
+        assert main(["stop", "-c", str(board)]) == ExitCode.SAFETY
+        told = capsys.readouterr().err
+        assert other.poll() is None
+        other.communicate("")
+    assert f"PID {other.pid}" in told
+    assert "Cut the motor supply" in told
+    code, result = stopped(board, capsys)
+    assert (code, result["state"], result["holder"]) == (0, "disarmed", None)
+
+
+def test_a_rig_is_held_once_under_any_of_its_names(tmp_path: Path) -> None:
+    port = tmp_path / "ttyACM0"
+    port.touch()
+    link = tmp_path / "by-id"
+    link.symlink_to(port)
+    with holding(str(port)):
+        assert holder(str(link)) == os.getpid()
+        with holding(str(link)):
+            assert holder(str(port)) == os.getpid()
+        assert holder(str(port)) == os.getpid()
+    assert holder(str(port)) is None
+    with holding("sim://"):
+        assert holder("sim://") is None
