@@ -20,6 +20,7 @@ from drivers.epos4.setup import set_up
 from drivers.errors import (
     DisarmUnconfirmedError,
     DriverError,
+    MissingExtraError,
 )
 from drivers.polling import PollSchedule
 from drivers.transport.can_bus import CanBus
@@ -329,7 +330,7 @@ def _link(bus: CanBus, node_id: int) -> "CanopenLink":
     """Return the link; the `canopen` library is an extra, loaded only here.
 
     Raises:
-        LinkError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         from drivers.epos4.canopen_link import CanopenLink
