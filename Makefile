@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo test lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo test test-unit test-long lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -25,9 +25,22 @@ setup: $(VENV)/.installed firmware
 demo: setup
 	$(BIN)/rig demo
 
+PYTEST := $(BIN)/python -m pytest -q -n auto --dist worksteal
+
+# what is checked before every commit: all but the long tests
 test: lint
-	@echo "test: all tests, on every core"
-	@$(BIN)/python -m pytest -q -n auto --dist worksteal
+	@echo "test: unit and integration tests, on every core; the others: make test-long"
+	@$(PYTEST) -m "not long"
+
+# parts by themselves: no session, no process, no simulated campaign
+test-unit: $(VENV)/.developing
+	@echo "test: unit tests, on every core"
+	@$(PYTEST) -m "not long and not integration"
+
+# whole diagnoses, studies and trained networks
+test-long: $(VENV)/.developing firmware
+	@echo "test: long tests, on every core; tens of minutes"
+	@$(PYTEST) -m long
 
 lint: $(VENV)/.developing firmware
 	@echo "lint: rules and format"

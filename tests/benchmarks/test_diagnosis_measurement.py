@@ -30,6 +30,8 @@ from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
 
+pytestmark = pytest.mark.integration
+
 RUNS = [plan.name for plan in plans_of("usual")]
 
 

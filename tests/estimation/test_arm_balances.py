@@ -16,6 +16,8 @@ from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 
+pytestmark = pytest.mark.integration
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 

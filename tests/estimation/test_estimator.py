@@ -22,6 +22,8 @@ from estimation.networks.training import Settings, has_torch
 from estimation.recording import MissingChannelError, Recording
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.integration
+
 torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 TARGET = "proximal_torque_n_m"
 PAPER_INPUTS = ("spindle_angle_rad", "spindle_velocity_rad_s", "motor_current_a")

@@ -11,6 +11,8 @@ from estimation.networks.network import NetworkError, to_unit
 from estimation.networks.training import Settings, train
 from tests.estimation.test_networks import IN, OUT, make
 
+pytestmark = pytest.mark.integration
+
 pytest.importorskip("torch", reason="torch is not installed (extra learn)")
 
 

@@ -16,6 +16,8 @@ from rig.diagnosis import subject
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.schema import DiagnosisSchema
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 

@@ -22,6 +22,8 @@ from rig.simulation.hidden import (
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
 
+pytestmark = pytest.mark.integration
+
 OPEN_RAD = -1366 * 2 * np.pi / 8192
 Columns = dict[str, NDArray[np.float64]]
 

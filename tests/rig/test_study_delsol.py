@@ -13,6 +13,8 @@ from rig.studies.delsol.diagnosis import PULLS, Named
 from rig.studies.delsol.page import lead
 from rig.studies.delsol.study import DelSolStudy
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 

@@ -26,6 +26,8 @@ from rig.studies.oneill.study import Source, run_study
 from rig.studies.oneill.tables import tables as paper_tables
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 QUICK = Settings(iterations=4)
 

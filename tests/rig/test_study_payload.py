@@ -17,6 +17,8 @@ from rig.cli.main import main
 from rig.cli.study import study_app
 from rig.errors import DataError
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 

@@ -20,6 +20,8 @@ from rig.errors import DataError
 from rig.importers.dvrk_psm import MOTOR_TO_JOINT
 from rig.studies.pique import study as pique
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 RATE_HZ = 100.0

@@ -16,6 +16,8 @@ from estimation.arm.wrench import body_jacobians, spatial_jacobians
 from rig.arm.simulated import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
 from rig.studies.pique.wrench import BODY, TWISTED, ati, in_tip_frame
 
+pytestmark = pytest.mark.long
+
 
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
     out = tmp_path / "wrench.md"

@@ -20,6 +20,8 @@ from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies.zhang.study import PAPER, run_zhang
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 

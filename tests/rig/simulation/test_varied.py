@@ -10,6 +10,8 @@ from rig.importers.registry import open_campaign
 from rig.simulation.varied import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
 from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 
+pytestmark = pytest.mark.integration
+
 FIRST = DEVELOP.start
 
 
