@@ -11,14 +11,13 @@ from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import (
-    KINDS,
     NAMES,
     HiddenEffect,
-    Kind,
     UnknownHiddenEffectError,
     draw,
     table,
 )
+from rig.simulation.hidden_kinds import KINDS, Kind
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
 
