@@ -66,7 +66,7 @@ def costs_over_effects() -> list[Cost]:
 
 
 def measure() -> list[Ratio]:
-    """Return what twice the samples, and twice the effects, cost."""
+    """Return the cost ratios of twice the samples and of twice the effects."""
     named = [("samples", costs_over_samples()), ("effects", costs_over_effects())]
     return [
         Ratio(

@@ -44,7 +44,7 @@ def measure() -> list[Ratio]:
             detail=f"{DURATION_S:g} s simulated in {loaded_s * 1e3:.1f} ms",
         ),
         Ratio(
-            "the simulated twin over real time, smooth friction, one core",
+            "the simulated rig over real time, smooth friction, one core",
             DURATION_S / twin_s,
             150.0,
             detail=f"{DURATION_S:g} s simulated in {twin_s * 1e3:.1f} ms",

@@ -1,1 +1,1 @@
-"""Counts to SI units, and the records that say how. Imports estimation only."""
+"""Conversion of counts to SI units, and its records. Imports estimation only."""

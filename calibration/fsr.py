@@ -132,7 +132,7 @@ class FsrCurve:
         return np.asarray((low + high) / 2)
 
     def interval_n(self, fsr_v: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Return the interval one force lies in at voltages, any shape.
+        """Return the interval of one force at voltages, any shape.
 
         It is Student's with as many degrees of freedom as runs less one: samples of one run share
         its errors.
@@ -209,8 +209,7 @@ def fit_fsr(
     Args:
         runs: The runs, in the order they were made.
         degree: Degree of the polynomial. If None, the lowest one whose error on runs left out is
-            not told apart from the least by one standard error of the runs' differences, or is
-            within 5 % of it.
+            within one standard error of the runs' differences, or within 5 %, of the least.
         force_at_zero_n: Force at 0 V, held fixed; fitted if None.
         rail_v: Upper end of the amplifier's range.
         max_degree: Greatest degree to try.
@@ -218,7 +217,7 @@ def fit_fsr(
         drift_limit: Greatest drift from first to last run that passes, share of the span of force.
 
     Raises:
-        BadDataError: The data cannot carry a calibration; its `rule` says why.
+        BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
     """
     volts, forces = _checked(runs, degree or 1, rail_v)
     span = float(np.ptp(forces))
@@ -392,6 +391,6 @@ def _refuse_outside(values: FloatArray, low: float, high: float, unit: str) -> N
     if outside.any():
         raise FsrRangeError(
             f"{int(outside.sum())} of {values.size} values lie outside {low:g} .. {high:g} {unit}.",
-            "Beyond what was calibrated a polynomial means nothing.",
-            "Calibrate over a wider range, or leave those samples out.",
+            "A polynomial is not valid beyond the calibrated range.",
+            "Calibrate over a wider range, or exclude those samples.",
         )

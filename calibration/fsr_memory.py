@@ -1,4 +1,4 @@
-"""What one curve cannot say of a force-sensing resistor: loading against unloading, and creep.
+"""Hysteresis and creep of a force-sensing resistor, which a single curve cannot represent.
 
     F = p(x) + (g / 2) s w(u)          w(u) = 4 u (1 - u)
 
@@ -25,10 +25,10 @@ class FsrMemory:
     """What the sensor remembers.
 
     Attributes:
-        gap_n: Force on loading less that on unloading at mid-range; 0 where it was not told apart
-            from none on runs left out.
+        gap_n: Force on loading minus that on unloading at mid-range; 0 where it does not improve
+            runs left out.
         gap_standard_error_n: Of the gap, runs as the unit.
-        creep_ratio: Relative rise of the voltage a decade of time; 0 where it was not told apart.
+        creep_ratio: Relative rise of the voltage per decade of time; 0 where not significant.
         held_out_rmse_n: Error on runs left out, without and with the gap.
     """
 
@@ -42,8 +42,8 @@ class FsrMemory:
 
         Args:
             curve: The curve.
-            time_s: Time, s, rising; the press begins where the voltage leaves the lowest tenth.
-            fsr_v: Voltage, shape (n,), smooth enough that its slope says which way it goes.
+            time_s: Time, s, rising; the press begins where the voltage exceeds the lowest tenth.
+            fsr_v: Voltage, shape (n,), smooth enough for the sign of its slope.
 
         Raises:
             FsrRangeError: A voltage lies outside the curve's range.

@@ -1,4 +1,4 @@
-"""Six-axis force sensor: bias, weight and centre of mass of what it carries, and another point.
+"""Six-axis force sensor: bias, weight and centre of mass of its tool, and another point.
 
 With gravity's direction g in the sensor's axes (a unit vector, from the poses),
 
@@ -24,7 +24,7 @@ AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """What hangs on the sensor, and its bias.
+    """The tool on the sensor, and its bias.
 
     Attributes:
         bias: Reading with nothing on it, N and N m, shape (6,).
@@ -84,7 +84,7 @@ def fit_tool(gravity: ArrayLike, wrench: ArrayLike, residual_limit: float = 0.05
         raise BadDataError(
             "levels",
             "The poses turn the sensor about one axis only.",
-            "Bias and weight cannot be told apart.",
+            "Bias and weight cannot be separated.",
             "Turn each of its axes up and down.",
         )
     pull = STANDARD_GRAVITY_M_S2 * down
@@ -96,8 +96,8 @@ def fit_tool(gravity: ArrayLike, wrench: ArrayLike, residual_limit: float = 0.05
         raise BadDataError(
             "no_change",
             f"The readings show a weight of {mass * 1e3:.1f} g +- {deviation * 1e3:.1f} g.",
-            "A tool must be on the sensor, and gravity must point along +z when z looks down.",
-            "Check the poses' signs, or leave the tool's weight out.",
+            "A tool must be on the sensor, and gravity must point along +z when z points down.",
+            "Check the poses' signs, or omit the tool's weight.",
         )
     fix = "Check the poses, and keep cables from pulling."
     weight = mass * STANDARD_GRAVITY_M_S2

@@ -30,8 +30,8 @@ class LinearCalibration:
         counts: Field of the raw counts it reads.
         slope: SI units a count; negative where the raw count falls on closing.
         zero_counts: Counts at zero, from the certificate or the mounting.
-        source: Where slope and zero come from.
-        tared: Whether the zero is measured anew before each run.
+        source: Source of slope and zero.
+        tared: Whether the zero is measured again before each run.
     """
 
     channel: str

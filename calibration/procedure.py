@@ -1,8 +1,8 @@
-"""What a guided calibration is: steps with a measurement each, then a conclusion from all of them.
+"""A guided calibration: steps with a measurement each, then a conclusion from all of them.
 
-A procedure knows no device and asks nobody. Who runs it passes in an operator, who is told what to
-set up before each step, and a bench, which measures it. Nothing is kept before the conclusion is
-reached, so that an aborted session leaves nothing behind.
+A procedure has no access to devices and asks no questions. The caller passes in an operator, who
+receives the set-up instructions of each step, and a bench, which measures it. Nothing is stored
+before the conclusion, so that an aborted session has no effect.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,8 +31,8 @@ class Step:
     Attributes:
         name: Name of the run, unique in the session.
         conditions: What is set, numbers in SI with the unit in the name; kept in the raw log.
-        instruction: What a person has to do first; empty where the rig needs no hands.
-        duration_s: How long to measure a rig that is not moved.
+        instruction: Instruction for a person before the step; empty if none is needed.
+        duration_s: Time to measure a rig that is not moved.
         target_angle_rad: Spindle trajectory at 1 kHz, shape (n,); None where nothing moves.
         load_command_a: Load current at 1 kHz, shape (n,); None where nothing moves.
     """
@@ -47,13 +47,13 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a step gave.
+    """Measurement of one step.
 
     Attributes:
         recording: Channels in SI units and the step's conditions. Sensors are tared once,
             before the first step that moves the rig.
         counts: Raw counts of the logger, structured, shape (n,); None without a logger.
-        details: What the devices said of themselves, such as counts a unit.
+        details: Properties reported by the devices, such as counts per unit.
     """
 
     recording: Recording
@@ -71,7 +71,7 @@ class Result:
         fit: The fit.
         low: Least input it was measured at; None if it has no range.
         high: Greatest input.
-        tared: Whether the zero is measured anew before each run.
+        tared: Whether the zero is measured again before each run.
     """
 
     channel: str
@@ -84,7 +84,7 @@ class Result:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What the fit leaves, for the record's figure.
+    """The residuals of the fit, for the record's figure.
 
     Attributes:
         label: Name and unit of the variable.
@@ -99,7 +99,7 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Conclusion:
-    """What a session came to.
+    """Result of a session.
 
     Attributes:
         results: The calibrations.
@@ -130,14 +130,14 @@ class Procedure(Protocol):
         ...
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
-        """Return what the measurements say, in the order of the steps.
+        """Return the conclusion from the measurements, in the order of the steps.
 
         Args:
             measurements: One a step.
             lines: The calibrations the recordings were converted with.
 
         Raises:
-            BadDataError: They cannot carry a calibration; its `rule` says why.
+            BadDataError: They are not sufficient for a calibration; its `rule` is the reason.
         """
         ...
 
@@ -163,7 +163,7 @@ class Operator(Protocol):
 
 
 class Bench(Protocol):
-    """What measures a step."""
+    """The measuring part of a step."""
 
     def measure(self, step: Step) -> Measurement:
         """Play the step's trajectory, or read the rig at rest for the step's duration."""

@@ -65,7 +65,7 @@ def check_levels(values: FloatArray, least: int, name: str) -> None:
 
 
 def check_change(values: FloatArray, least: float, name: str) -> None:
-    """Refuse values that hardly change."""
+    """Refuse values with too little change."""
     span = float(np.ptp(values))
     if not span >= least:
         raise BadDataError(
@@ -85,7 +85,7 @@ def check_rails(
         values: Readings, shape (n,).
         low: Lower rail; None if rest is there anyway.
         high: Upper rail; None if unknown.
-        name: What they are.
+        name: Name.
         pile_up: Whether to look for the pile-up; off for readings at rest, which are all alike.
     """
     for rail, at_rail in (

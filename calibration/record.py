@@ -22,7 +22,7 @@ class RawFile:
     """A file the calibration was made from.
 
     Attributes:
-        path: Where it was, as given.
+        path: Its path, as given.
         sha256: SHA-256 of its bytes, hexadecimal.
     """
 
@@ -47,7 +47,7 @@ class Fit:
     """Parameters and how well they are known.
 
     Attributes:
-        form: What the parameters mean, such as `line` (slope, zero) or `polynomial` (c0, c1, ...).
+        form: Meaning of the parameters, such as `line` (slope, zero) or `polynomial` (c0, c1, ...).
         parameters: Name to value; SI units of the channel over the input's unit.
         covariance: Of the parameters in that order, shape (p, p); empty where nothing is known,
             as for numbers copied from a certificate.
@@ -102,7 +102,7 @@ class CalibrationRecord:
     """One calibration as it was made. Its hash is its name; nothing in it ever changes.
 
     Attributes:
-        kind: What was done: `certificate`, `torque`, `fsr`, ...
+        kind: Kind of procedure: `certificate`, `torque`, `fsr`, ...
         channel: SI channel it gives.
         input: Raw counts field or channel it reads.
         made_at: When, ISO 8601 with the offset from UTC.
@@ -115,7 +115,7 @@ class CalibrationRecord:
             0 where the board was not built from any.
         raw: Files it was made from.
         code_version: Version of the code that fitted it.
-        tared: Whether the zero is measured anew before each run.
+        tared: Whether the zero is measured again before each run.
         figure_svg: Residual figure as SVG text; empty if there is none.
         notes: Operator's notes.
     """
@@ -144,7 +144,7 @@ class CalibrationRecord:
         if not self.operator.strip():
             raise CalibrationError("A calibration needs the name of who made it.")
         if _time(self.made_at).tzinfo is None:
-            raise CalibrationError(f"{self.made_at!r} does not say its offset from UTC.")
+            raise CalibrationError(f"{self.made_at!r} lacks its offset from UTC.")
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -217,7 +217,7 @@ def record_of_line(
 
     Args:
         line: The line.
-        kind: What kind of calibration it is.
+        kind: Kind of calibration.
         made_at: When it was made.
         operator: Who vouches for it.
         rest: Other fields of the record.

@@ -46,7 +46,7 @@ def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:
     """Fit the target on the columns of all runs.
 
     Raises:
-        BadDataError: Too few runs or samples, or columns that cannot be told apart.
+        BadDataError: Too few runs or samples, or collinear columns.
     """
     check_points(len(runs), least_runs, "runs")
     design = np.concatenate([columns for columns, _ in runs])
@@ -56,8 +56,8 @@ def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:
     if np.linalg.matrix_rank(scaled, tol=1e-9 * len(target)) < design.shape[1]:
         raise BadDataError(
             "no_change",
-            "Two of the quantities to be found change only together.",
-            "One experiment cannot tell them apart.",
+            "Two of the unknown quantities change only together.",
+            "They cannot be separated by one experiment.",
             "Use more levels of load, both directions and more than one speed.",
         )
     values = np.linalg.lstsq(design, target)[0]

@@ -25,7 +25,7 @@ class UnfitCalibrationError(CalibrationError):
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a rule says of a record.
+    """The result of one rule for a record.
 
     Attributes:
         rule: `stale`, `future`, `foreign_serial`, `unknown_serial`, `raw_missing`, `raw_changed`
@@ -46,7 +46,7 @@ class Verdict:
 def judge(
     record: CalibrationRecord, now: datetime, serials: Mapping[str, str] | None = None
 ) -> list[Verdict]:
-    """Return what speaks against using a record now on these devices; empty if nothing does.
+    """Return the objections to using a record now on these devices; empty if there are none.
 
     Stale is a warning, and an error past twice the days. A serial number that differs is an error,
     one that the configuration does not state is a warning.

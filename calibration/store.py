@@ -80,7 +80,7 @@ class CalibrationStore:
         """Return every record, oldest first.
 
         Raises:
-            StoreError: One is not what its name says.
+            StoreError: The content of a record does not match its name.
         """
         found = [_read(path) for path in sorted((self.folder / "records").glob("*.json"))]
         return sorted(found, key=lambda record: (record.made, record.content_hash))
@@ -165,7 +165,7 @@ def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> Calib
 
     Args:
         base: A set that covers every channel of the rig.
-        records: Records that are lines, one a channel; see `active_lines`.
+        records: Records that are lines, one per channel; see `active_lines`.
 
     Raises:
         CalibrationError: A record reads another raw field than the base's line of that channel.

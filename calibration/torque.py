@@ -125,7 +125,7 @@ def check_shunt(
         raise BadDataError(
             "no_change",
             f"The shunt changes the reading by {change:.4g} counts.",
-            f"The certificate says {certificate:.4g}.",
+            f"By the certificate it is {certificate:.4g}.",
             "Check that the shunt is switched on and the bridge is excited.",
         )
     return ShuntCheck(
@@ -200,7 +200,7 @@ def fit_torque(
         drift_limit: Greatest drift of the zero that passes, share of the span.
 
     Raises:
-        BadDataError: The data cannot carry a calibration; its `rule` says why.
+        BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
     """
     check_points(len(steps), MINIMUM_STEPS, "steps")
     for k, step in enumerate(steps):

@@ -56,7 +56,7 @@ def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dic
 
     Args:
         counts: Structured raw counts, shape (n,).
-        calibrations: Says which channels are tared.
+        calibrations: The calibrations, with the tared channels.
 
     Raises:
         CalibrationError: Too few readings, or none of them differ although a real sensor has noise.

@@ -1,1 +1,1 @@
-"""Devices and the transports they speak over. Imports no other room."""
+"""Devices and their transports. Imports no other top-level package."""

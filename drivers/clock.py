@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from drivers.errors import DriverError
 
 WRAP_US = 2**32
-"""A device's microsecond counter begins anew after 71.6 minutes."""
+"""A device's microsecond counter wraps after 71.6 minutes."""
 MAX_DRIFT = 200e-6
 """Largest difference of rates that is a crystal's and not a reset; crystals are within 50e-6."""
 RESET_S = 0.05
-"""A clock further off the line than this, and than half the round trip, has begun anew."""
+"""A clock further off the line than this, and than half the round trip, has restarted."""
 
 OFF_LINE = 6.0
-"""An exchange this many times the median distance off the line is no part of it."""
+"""An exchange this many times the median distance off the line is an outlier."""
 RESOLUTION_S = 2e-6
 """Exchanges this close to the line are always part of it; the counter's step is 1e-6."""
 
@@ -74,7 +74,7 @@ class ClockLine:
 class TickUnwrapper:
     """Follows a 32-bit microsecond counter that may be looked at out of order.
 
-    Between two looks less than half a wrap (35.8 min) may pass.
+    The time between two calls must be less than half a wrap (35.8 min).
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class TickUnwrapper:
         return unwrapped
 
     def restart(self) -> None:
-        """Forget everything: the device's counter has begun anew."""
+        """Reset: the device's counter has restarted."""
         self._newest_us = None
 
 
@@ -113,7 +113,7 @@ class ClockFit:
         self.rejected = 0
         """Exchanges set aside: no running clock can have given them."""
         self.resets = 0
-        """Times the device's clock began anew."""
+        """Number of restarts of the device's clock."""
         self._line: ClockLine | None = None
 
     def add(self, sent_s: float, received_s: float, tick_us: int) -> None:
@@ -137,7 +137,7 @@ class ClockFit:
             self._strange += 1
             self.rejected += 1
             if self._strange < 2:
-                return  # one may be damage; a second is a clock that has begun anew
+                return  # one may be damage; a second is a restarted clock
             self.resets += 1
             self._exchanges.clear()
             self._unwrapper.restart()
@@ -150,7 +150,7 @@ class ClockFit:
         """The line through the exchanges.
 
         Raises:
-            ClockError: There is no exchange yet.
+            ClockError: No exchange so far.
         """
         if self._line is None:
             if not self._exchanges:
@@ -171,7 +171,7 @@ class ClockFit:
         self._line = None
 
     def _possible(self, sent_s: float, received_s: float, device_s: float) -> bool:
-        """Say whether a running clock with a crystal's drift can have given this answer."""
+        """Whether this answer is possible for a running clock with a crystal's drift."""
         last_sent_s, last_received_s, last_device_s = self._exchanges[-1]
         step_s = device_s - last_device_s
         slack_s = MAX_DRIFT * abs(step_s) + RESET_S
@@ -229,7 +229,7 @@ def arrival_fit(
 
     Samples that came in one burst all carry the burst's time: only the newest of each arrival time
     is used, and of those the earlier half relative to the line. The host time is late by the
-    shortest delay of the link, which arrivals alone cannot tell: `bound_s` is infinite.
+    shortest delay of the link, which is not observable from arrivals alone: `bound_s` is infinite.
 
     Args:
         sequence: Numbers of samples, rising, shape (n,).

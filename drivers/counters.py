@@ -1,4 +1,4 @@
-"""What happened on the way to a device, and the numbers of samples that come without any."""
+"""Counters of the link to a device, and numbers for samples without any."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from drivers.link import LinkCounters
 
 @dataclass(slots=True)
 class DeviceCounters(LinkCounters):
-    """What happened on a link since it was opened; see also `drivers.link.LinkCounters`.
+    """Counters of a link since it was opened; see also `drivers.link.LinkCounters`.
 
     `crc_errors` counts checksums that do not fit, whatever their kind.
 
@@ -19,7 +19,7 @@ class DeviceCounters(LinkCounters):
         stalls: Silences of a stream longer than it should ever be silent.
         late: Packets dropped because later ones had come before them.
         device_errors: Samples in which the device itself reports a fault.
-        restarts: Times the device's own numbers began anew.
+        restarts: Number of restarts of the device's own numbering.
     """
 
     timeouts: int = 0
@@ -33,8 +33,8 @@ class Arrivals:
     """Numbers the samples of a stream that does not, and notices its silences.
 
     Args:
-        counters: Where silences are counted.
-        longest_silence_s: Longest time between samples that is no fault, s.
+        counters: Counters to add silences to.
+        longest_silence_s: Longest time between samples that is not a fault, s.
     """
 
     def __init__(self, counters: DeviceCounters, longest_silence_s: float) -> None:

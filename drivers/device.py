@@ -1,6 +1,6 @@
-"""What every driver offers: typed channels, an identity, and samples in batches.
+"""Interface of all drivers: typed channels, an identity, and samples in batches.
 
-A driver is made from an open link, speaks to one device, and does nothing in the background: time
+A driver is made from an open link, controls one device, and does nothing in the background: time
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
@@ -16,7 +16,7 @@ from drivers.errors import LinkError
 
 
 class SampleFlag(IntFlag):
-    """What a device says about a sample; 0 is a good one.
+    """Status of a sample from the device; 0 is good.
 
     The bits are those of a recording's flags, so that they pass on unchanged.
     """
@@ -37,7 +37,7 @@ class Channel:
         rate_hz: Nominal sample rate.
         lower: Lowest value the device can give, in `unit`; minus infinity where it is not known.
         upper: Highest value the device can give.
-        description: What it is, in a few words.
+        description: Description in a few words.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """Who answers; a part that the device does not tell is empty."""
+    """Identity of the device; a part that it does not report is empty."""
 
     model: str
     serial: str
@@ -65,8 +65,8 @@ class Batch:
         columns: Values by channel name, each float64 of shape (n,), in the channel's unit.
         time_s: When each sample was taken (`device` clock) or had arrived (`host` clock), s,
             shape (n,). The zero is arbitrary.
-        clock: Whose clock `time_s` is.
-        sequence: Number of each sample since `start`, int64, shape (n,); lost samples leave a gap
+        clock: The clock of `time_s`.
+        sequence: Number of each sample since `start`, int64, shape (n,); lost samples are a gap
             where the device numbers its samples.
         flags: `SampleFlag` bits, uint8, shape (n,).
         lost: Samples known to be lost since `start`, up to the end of this batch. None is made up
@@ -100,7 +100,7 @@ class Device(Protocol):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """What happened on the link since it was opened.
+        """Counters of the link since it was opened.
 
         `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
         """
@@ -140,7 +140,7 @@ def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> Non
     """End a device's stream where it can still be reached, and let go of its link in any case.
 
     Args:
-        stop: Ends the stream; a link that is gone already is no error here.
+        stop: Ends the stream; a lost link is not an error here.
         let_go: Closes the link.
     """
     try:

@@ -70,7 +70,7 @@ class CommandRefusedError(DriverError):
 
 
 class DisarmUnconfirmedError(DriverError):
-    """The board was told to disarm and has not said that it did: its state is unknown."""
+    """The board was commanded to disarm and has not confirmed it: its state is unknown."""
 
 
 class MissingExtraError(LinkError):

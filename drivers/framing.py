@@ -180,8 +180,8 @@ class FrameStream:
 def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
     """Return the CRC's share of each byte value at each place, and the share of the start value.
 
-    The CRC is linear over GF(2): that of a message of fixed length is the XOR of what each byte
-    adds at its place. The look-ups do not wait for one another, as a byte-wise CRC's do. Shape
+    The CRC is linear over GF(2): that of a message of fixed length is the XOR of the contribution
+    of each byte at its place. The look-ups are independent, unlike those of a byte-wise CRC. Shape
     (payload_size * 256,).
     """
     if not 0 <= payload_size <= MAX_BULK_PAYLOAD:

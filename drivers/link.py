@@ -18,13 +18,13 @@ REPLY_TIMEOUT_S = 0.1
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What happened on a link since it was opened.
+    """Counters of a link since it was opened.
 
     Attributes:
         frames: Good frames received.
         crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
         discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
-        unknown_frames: Good frames of a kind or version that nobody expected.
+        unknown_frames: Good frames of an unexpected kind or version.
         gaps: Places where samples are missing.
         lost: Samples missing in those places.
         duplicates: Samples dropped because they had come before.

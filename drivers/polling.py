@@ -8,7 +8,7 @@ class PollSchedule:
 
     Args:
         rate_hz: Questions a second.
-        counters: Where gaps and lost samples are counted.
+        counters: Counters of gaps and lost samples.
     """
 
     def __init__(self, rate_hz: float, counters: DeviceCounters) -> None:

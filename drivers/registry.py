@@ -52,8 +52,8 @@ class Driver:
         name: Short name, as written in a configuration.
         description: One line on the device.
         open: Opens the device by URL; its keyword arguments, all with defaults, are its options.
-            Their annotations, with pydantic's ranges, are what a configuration is held against.
-        can: What the device takes of a CAN bus; None where it is not on one.
+            A configuration is validated with their annotations, including pydantic's ranges.
+        can: Resources of the device on a CAN bus; None where it is not on one.
     """
 
     name: str
@@ -76,7 +76,8 @@ def drivers() -> dict[str, Driver]:
     """Return every installed driver by name.
 
     Raises:
-        UnknownDriverError: An entry point does not load, or is no driver; none is skipped silently.
+        UnknownDriverError: An entry point does not load or is not a driver. None is skipped
+            silently.
     """
     found = {}
     for entry in sorted(entry_points(group=DRIVERS)):
@@ -126,11 +127,11 @@ def open_device(name: str, url: str, **options: Any) -> Device:
 
     Args:
         name: Name of the driver.
-        url: Where the device is.
+        url: URL of the device.
         **options: The driver's own options.
 
     Raises:
-        UnknownDriverError: There is no such driver.
+        UnknownDriverError: No driver has this name.
         DriverError: The driver has no such option.
         LinkError: The link cannot be opened.
     """

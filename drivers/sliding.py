@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drivers.counters import DeviceCounters
 
 Check = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
-"""Says of each row of candidates, shape (m, size), whether its checksum holds."""
+"""Returns for each row of candidates, shape (m, size), whether its checksum is right."""
 
 
 class SlidingFrames:
@@ -21,7 +21,7 @@ class SlidingFrames:
     Args:
         size: Bytes of a frame.
         check: The checksum.
-        counters: Where frames, bad ones and discarded bytes are counted.
+        counters: Counters of frames, bad ones and discarded bytes.
         agree: Frames in a row that must hold.
     """
 

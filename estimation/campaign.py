@@ -1,7 +1,8 @@
 """A campaign: many runs of one rig, walked run by run, split by run, on one clock.
 
-A campaign holds run *handles*. A handle knows the run's name and conditions and loads the recording
-when asked, so a campaign may be larger than memory: iterate over it and keep only what you need.
+A campaign contains run *handles*. A handle has the run's name and conditions and loads the
+recording on request, so a campaign may be larger than memory: iterate over it and keep only what
+you need.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,9 +28,9 @@ class Run:
 
     Attributes:
         name: Name of the run.
-        load: Reads the recording. Called anew each time; nothing is kept.
+        load: Reads the recording. Called again each time; nothing is cached.
         source: File the run is read from, or None for a run in memory.
-        excluded: Why the run is left out of evidence, or None.
+        excluded: Reason for excluding the run, or None.
     """
 
     name: str
@@ -93,7 +94,7 @@ class Campaign:
         if twice:
             raise CampaignError(
                 f"Two runs of the campaign share a name: {', '.join(twice)}.",
-                "A run is the unit of evidence and is told apart by its name.",
+                "A run is the unit of evidence and is identified by its name.",
             )
 
     @classmethod
@@ -127,7 +128,7 @@ class Campaign:
         """Return a campaign in which one run is excluded, with the reason.
 
         Raises:
-            CampaignError: There is no such run.
+            CampaignError: The campaign has no such run.
         """
         if name not in self.names:
             raise CampaignError(
@@ -236,7 +237,7 @@ class Campaign:
         if len(levels) < 2:
             raise CampaignError(
                 f"Every run has {condition} = {levels[0] if levels else 'nothing'}.",
-                "Leaving the only value out leaves nothing to fit.",
+                "Without its only value there are no runs to fit.",
             )
         return [
             _split(evidence, f"{condition} = {v}", {n for n, w in values.items() if w == v})

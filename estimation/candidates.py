@@ -1,4 +1,4 @@
-"""What a search may add to a balance: every effect of the catalogue that may enter it."""
+"""Candidates of a search: every effect of the catalogue that applies to an equation."""
 
 from collections.abc import Collection, Mapping
 
@@ -14,17 +14,16 @@ def candidates(
     instead: Mapping[str, str] | None = None,
     at_rest: bool = False,
 ) -> list[Term]:
-    """Return the terms that may be added to a balance, without values.
+    """Return the terms that may be added to an equation, without values.
 
-    An effect comes once for each way its roles may be played, such as a delay of either of two
-    sensors.
+    An effect appears once for each assignment of channels to its roles, such as a delay of either
+    of two sensors.
 
     Args:
-        balance: Balance id, such as `motor` or `joint.3`.
+        balance: Id of the equation, such as `motor` or `joint.3`.
         available: Measured channels of the recordings.
-        instead: Channel to the one that plays its roles here, such as a commanded current for the
-            measured one.
-        at_rest: Whether samples at rest count, so that effects that tell what acts there may enter.
+        instead: Channel to its replacement here, such as a commanded current for the measured one.
+        at_rest: Whether static samples count, so that effects of standstill are candidates.
     """
     there = set(available)
     played = instead or {}

@@ -39,7 +39,7 @@ class Channel:
     Attributes:
         name: Column name, ends in the unit's suffix.
         unit: SI unit symbol.
-        description: What is measured and where.
+        description: Quantity and place of the measurement.
     """
 
     name: str

@@ -30,7 +30,7 @@ def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PA
 
 
 def is_closing(run: Recording) -> NDArray[np.bool_]:
-    """Say which samples of a processed run the paper keeps, shape (n,)."""
+    """Return which samples of a processed run the paper keeps, shape (n,)."""
     return closing(run[SPEED], run.sample_rate_hz)
 
 

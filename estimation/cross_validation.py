@@ -45,7 +45,7 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
 
     Raises:
         CampaignError: Fewer runs than folds, or fewer than two.
-        FitError: A fold's runs do not tell the model's parameters.
+        FitError: The model's parameters are not identifiable from a fold's runs.
     """
     errors: dict[str, FloatArray] = {}
     for split in campaign.folds(folds, seed):
@@ -76,7 +76,7 @@ def closing_score(
     """Return the error of a recipe's estimators on closing samples, each run held out once.
 
     Args:
-        recipe: What is fitted on all folds but one.
+        recipe: The estimator to fit.
         campaign: The runs.
         folds: Number of folds.
         seed: Seed of the folds.

@@ -1,16 +1,16 @@
-"""Channels that are computed: speeds, accelerations, the twist of the gearbox.
+"""Derived channels: speeds, accelerations, the twist of the gearbox.
 
-A derived channel is asked for by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
+A derived channel is requested by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
 and second derivative of `X_angle_rad`, and so in metres of `X_position_m`; `X_rate_n_m_s` is the
-first of `X_n_m`; `X_travel_rad` is how far that angle has come since its lowest value of the last
-`TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` how long ago that
-value was; `X_rise_a` is what the channel `X_a` (any unit) has gained since the motor's angle was
-lowest, and `X_fall_a` how far it is below its highest value of that window; `X_20ms_ago_a` is its
-value that long ago, `X_acceleration_20ms_ago_rad_s2` that derivative then;
-`gearbox_differential_rad` is the motor's angle behind the gear ratio less the spindle's;
+first of `X_n_m`; `X_travel_rad` is the increase of that angle since its lowest value of the last
+`TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` the time since that
+value; `X_rise_a` is the increase of the channel `X_a` (any unit) since the motor's angle was
+lowest, and `X_fall_a` its difference to its highest value of that window; `X_20ms_ago_a` is its
+value 20 ms earlier, `X_acceleration_20ms_ago_rad_s2` the derivative at that time;
+`gearbox_differential_rad` is the motor's angle divided by the gear ratio minus the spindle's;
 `motor_load_n_m` is the spindle's torque projected from the current, `cable_load_n_m` the same from
 the torque at the jaw, `cable_angle_rad` the jaw's angle from the spindle's and that torque;
-`campaign_time_s` is the time since the campaign's first run began, put beside the measured channels
+`campaign_time_s` is the time since the campaign's first run began, added to the measured channels
 by `Campaign.timed`, and live the time since the first sample. Offline they come from a zero-phase
 filter and a noise-robust derivative, live from a causal filter and backward differences: the same
 names, two sources.
@@ -44,24 +44,24 @@ GEAR_RATIO = 35.0
 GEARBOX = "gearbox_differential_rad"
 
 MOTOR_LOAD = "motor_load_n_m"
-"""The spindle's torque as the motor's side knows it: nominal torque constant times current, less
-nominal Coulomb friction. A regressor, not an estimate: it stands in for the torque sensor where
-that sensor is the target, since noise shared by both sides of a balance looks like an effect."""
+"""The spindle's torque predicted from the motor side: nominal torque constant times current, minus
+nominal Coulomb friction. It is a regressor, not an estimate: it replaces the torque sensor where
+that sensor is the target, since noise shared by both sides of an equation looks like an effect."""
 
 LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
 """Regression of proximal torque on current and direction while moving, 49 runs of the public data
 set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
 
 CABLE_LOAD = "cable_load_n_m"
-"""The spindle's torque as the cable's side knows it, in the same way: nominal ratio times the
+"""The spindle's torque predicted from the cable side in the same way: nominal ratio times the
 distal torque, and nominal Coulomb friction."""
 
 CABLE_RATIO, CABLE_FRICTION_N_M, CABLE_WIDTH_RAD_S = 2.62, 0.060, 0.15
 """Regression of proximal on distal torque and direction while moving, runs of the same data."""
 
 CABLE_ANGLE = "cable_angle_rad"
-"""The jaw's angle as the cable's side knows it: nominal ratio times the spindle's angle less the
-distal torque by the nominal stiffness. It stands in for the jaw's encoder where that is the
+"""The jaw's angle predicted from the cable side: nominal ratio times the spindle's angle minus the
+distal torque divided by the nominal stiffness. It replaces the jaw's encoder where that is the
 target."""
 
 CABLE_TURN, CABLE_YIELD_RAD_N_M = 0.934, 3.56
@@ -82,7 +82,7 @@ TURNING = "motor_angle_rad"
 """The angle whose lowest value is where the drive last turned."""
 
 TRAVEL_WINDOW_S = 0.5
-"""How far back a travel looks, s. Longer memory could tell which run it is in."""
+"""Window of a travel, s. A longer memory could identify the run."""
 
 CLOCKS = ("time_s", CAMPAIGN_TIME)
 
@@ -235,9 +235,9 @@ def settled_places(
 
     Args:
         channels: Filtered channels of one whole run.
-        low_pass: The filter they went through.
+        low_pass: The filter applied to them.
         step: Keep every n-th sample.
-        samples: Which samples; whether one moves is told by the speeds among the channels.
+        samples: Which samples; motion is determined from the speeds among the channels.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
@@ -290,7 +290,7 @@ def zero_phase_channels(
 
 
 def looks_back(names: Iterable[str]) -> bool:
-    """Say whether a channel needs the samples of the last `TRAVEL_WINDOW_S`."""
+    """Whether a channel needs the samples of the last `TRAVEL_WINDOW_S`."""
     return any(
         name.endswith((TRAVEL, TURNED)) or FALL in name or RISE in name or AGO.match(name)
         for name in names
@@ -298,15 +298,15 @@ def looks_back(names: Iterable[str]) -> bool:
 
 
 def _window(sample_rate_hz: float) -> int:
-    """Return the samples a travel looks at."""
+    """Return the number of samples in the window of a travel."""
     return max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))
 
 
 class CausalChannels:
     """Filtered and derived channels as they come live, in batches of any size.
 
-    Samples that were lost are bridged by a straight line when the next one arrives; after a silence
-    of more than `LONGEST_GAP_S` the filter starts anew. A sample in which a needed channel is not
+    Lost samples are interpolated linearly when the next one arrives; after a gap of more than
+    `LONGEST_GAP_S` the filter restarts. A sample in which a needed channel is not
     finite counts as lost, and its derived values are NaN. The result does not depend on how the
     samples are cut into batches.
 

@@ -1,4 +1,4 @@
-"""Errors of the `estimation` room: what an estimate or a recording cannot do."""
+"""Errors of the `estimation` package."""
 
 
 class EstimationError(Exception):
@@ -7,7 +7,7 @@ class EstimationError(Exception):
     Attributes:
         what: What happened, in one sentence.
         why: The cause as far as it is known; may be empty.
-        fix: What to do or to type next; may be empty.
+        fix: Action or next command; may be empty.
     """
 
     def __init__(self, what: str, why: str = "", fix: str = "") -> None:

@@ -1,7 +1,7 @@
-"""One interface for everything that estimates a channel: fit, predict, step, save, load.
+"""The common interface of all estimators of a channel: fit, predict, step, save, load.
 
-An estimator is an unchanging object. What fits one is a recipe: `ModelRecipe`, `BankRecipe`,
-`NetworkRecipe` and `ResidualRecipe` hold their settings and turn a campaign into an estimator.
+An estimator is an immutable object. A recipe fits one: `ModelRecipe`, `BankRecipe`,
+`NetworkRecipe` and `ResidualRecipe` contain settings and fit an estimator on a campaign.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class Stepper(Protocol):
 
 
 class Estimator(Protocol):
-    """What estimates one channel of the rig."""
+    """An estimator of one channel of the rig."""
 
     @property
     def target(self) -> str:
@@ -52,7 +52,7 @@ class Estimator(Protocol):
 
 
 class Recipe(Protocol):
-    """What fits an estimator on a campaign."""
+    """The settings of a fit of an estimator on a campaign."""
 
     def fit(self, campaign: Campaign) -> Estimator:
         """Fit on the runs that are not excluded."""

@@ -17,7 +17,7 @@ class OutputError(EstimationError):
 
 
 def write_text_atomic(path: Path, text: str) -> None:
-    """Write a text file under a temporary name beside the target and rename it.
+    """Write a text file under a temporary name in the target's folder and rename it.
 
     Args:
         path: Target; its folder is made when it is missing.
@@ -30,7 +30,7 @@ def write_text_atomic(path: Path, text: str) -> None:
 
 
 def write_bytes_atomic(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name beside the target and rename it.
+    """Write a file under a temporary name in the target's folder and rename it.
 
     Args:
         path: Target; its folder is made when it is missing.

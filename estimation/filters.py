@@ -1,7 +1,7 @@
 """Low-pass filters and the noise-robust derivative: zero-phase for analysis, causal for live use.
 
-Every channel of a recording goes through the same filter: unequal smoothing of the channels of one
-balance looks like a delay or a lag that is not there.
+Every channel of a recording has the same filter: unequal smoothing of the channels of one equation
+looks like a delay or a lag.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from estimation.recording import FloatArray, Recording
 
 
 class FilterError(EstimationError):
-    """A signal is too short, too coarse or too broken for the filter asked for."""
+    """A signal is too short, too coarse or too broken for the requested filter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,8 @@ class LowPass:
     """A Butterworth low-pass filter.
 
     Attributes:
-        cutoff_hz: Frequency at which one pass of the filter leaves -3 dB, Hz. The zero-phase
-            filter passes twice and leaves -6 dB there.
+        cutoff_hz: Frequency at which one pass of the filter has a gain of -3 dB, Hz. The zero-phase
+            filter passes twice and has -6 dB there.
         order: Order of one pass.
     """
 
@@ -50,7 +50,7 @@ class LowPass:
 
     @property
     def reach_s(self) -> float:
-        """Time over which one bad sample is smeared in either direction, s."""
+        """Time over which one bad sample is spread in either direction, s."""
         return 1.0 / self.cutoff_hz
 
 
@@ -59,7 +59,7 @@ PAPER = LowPass(cutoff_hz=50.0, order=3)
 
 
 def zero_phase(values: FloatArray, sample_rate_hz: float, low_pass: LowPass = PAPER) -> FloatArray:
-    """Filter forwards and backwards: no lag, but it looks into the future.
+    """Filter forwards and backwards: no lag, but not causal.
 
     The ends are continued by an odd reflection, so that a signal keeps its first and last value
     and slope.
@@ -79,7 +79,7 @@ def zero_phase(values: FloatArray, sample_rate_hz: float, low_pass: LowPass = PA
         raise FilterError(
             f"{len(values)} samples are too few for a zero-phase filter.",
             f"Its ends are reflected over {padding} samples.",
-            "Use a longer stretch.",
+            "Use a longer segment.",
         )
     filtered: FloatArray = signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
     return filtered

@@ -32,7 +32,7 @@ OFFSET = "sensor.offset"
 
 
 class FitError(EstimationError):
-    """The campaign does not tell the model's parameters."""
+    """The model's parameters are not identifiable from the campaign."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def fit(
         shapes too. A parameter at its bound, or fitted on a single run, has no spread.
 
     Raises:
-        FitError: No valid sample, or columns that cannot be told apart on these runs.
+        FitError: No valid sample, or columns that are collinear on these runs.
         MissingChannelError: A run lacks a channel of the model.
     """
     if run_offsets is not None:
@@ -130,7 +130,7 @@ def fit(
 
 
 def evidence_of(fitted: Model, campaign: Campaign, seed: int = 0) -> Evidence:
-    """Return how well a model that was fitted elsewhere does on the runs it was fitted on.
+    """Return the evidence of a model that was fitted elsewhere, on the runs of its fit.
 
     Args:
         fitted: The model.
@@ -156,8 +156,8 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]
             runs.append(_Run(whole, places, whole.at(places)))
     if not runs:
         raise FitError(
-            f"These runs do not tell the model {model.name!r}: there is no valid sample to fit.",
-            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded; samples at rest"
+            f"No valid samples to fit model {model.name!r}.",
+            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded; static samples"
             " do not count where friction is fitted.",
             "Record runs in which the rig moves.",
         )
@@ -199,7 +199,7 @@ def _check_independent(problem: _Problem, normal: FloatArray, power: FloatArray)
     guilty = np.abs(vectors[:, 0]) > 0.1 if np.all(power > 0) else power <= 0
     named = ", ".join(problem.names[k] for k in problem.free[guilty])
     raise FitError(
-        f"These runs do not tell {named}.",
+        f"{named} cannot be identified from these runs.",
         "The columns are constant or proportional to one another in every run.",
         "Take an effect out of the model, or record runs that excite it.",
     )
@@ -215,7 +215,7 @@ def _unscaled(parameter: Parameter, value: float) -> float:
 
 
 def _error_share(problem: _Problem, shape: Sequence[float]) -> float:
-    """Return the share of the target's power that the best amplitudes leave."""
+    """Return the residual power of the best amplitudes, relative to the target's power."""
     gram = np.sum([problem.gram(run, shape) for run in problem.runs], axis=0)
     vector = np.append(_solve(problem, gram), -1.0)
     return float(vector @ gram @ vector / max(gram[-1, -1], np.finfo(float).tiny))
@@ -239,7 +239,7 @@ def _search_shape(problem: _Problem) -> list[float]:
     def error(candidate: Sequence[float] | FloatArray) -> float:
         try:
             return _error_share(problem, values(candidate))
-        except FitError:  # a shape at which columns fall together, such as a width far too wide
+        except FitError:  # a shape with collinear columns, such as a width far too wide
             return 1.0
 
     grids = [[_scaled(p, float(x)) for x in p.grid()] for p in parameters]
@@ -258,11 +258,11 @@ def _descended(
     bounds: Sequence[tuple[float, float]],
     most: int = 20,
 ) -> list[float]:
-    """Return the lowest point near where the grid left off.
+    """Return the minimum near the best point of the grid.
 
     A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
-    each descent goes one step of the grid at most either way; it starts anew from where it ends
-    while that gains, since a valley of two shapes bends.
+    each descent moves by at most one step of the grid; it restarts from its end while that improves
+    the result, since a valley of two shapes is curved.
     """
     left = error(point)
     for _ in range(most):
@@ -282,7 +282,7 @@ def _descended(
 
 
 def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) -> float:
-    """Return the mean over the runs of what the free columns leave."""
+    """Return the mean over the runs of the residual of the free columns."""
     if problem.offset is None:
         return 0.0
     return float(np.mean([_run_offset(problem, run, shape, free) for run in problem.runs]))

@@ -1,7 +1,7 @@
 """Speed and acceleration of an encoder's angle, live: a Kalman filter in its steady state.
 
-The motion is one of constant acceleration that is disturbed anew in every sample; the encoder's
-quantum is the noise. filterpy designs the filter; what runs is its constant gain, compiled.
+The motion model is constant acceleration with a random disturbance in every sample; the encoder's
+quantisation is the noise. filterpy designs the filter; its constant gain runs as compiled code.
 
 Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and
 Navigation" (2001), section 6.3.2, discrete white noise acceleration, third-order model.

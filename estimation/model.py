@@ -1,4 +1,4 @@
-"""A model: one balance of the rig, the channel it estimates, and the effects it is made of.
+"""A model: one equation of the rig, the channel it estimates, and its effects.
 
 What is declared, what is fitted, what a residual search adds and what runs live is this same
 object. A parameter without a value is one that has not been fitted yet.
@@ -26,7 +26,7 @@ BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw", "ja
 
 
 class ModelError(EstimationError):
-    """A model contradicts itself, or is asked for what it does not hold."""
+    """A model is inconsistent, or lacks a requested value."""
 
 
 class NotFittedError(ModelError):
@@ -54,7 +54,7 @@ class Term:
 
     Attributes:
         effect: The effect.
-        sign: Side of the balance: 1 adds to the target, -1 takes from it.
+        sign: Side of the equation: 1 adds to the target, -1 subtracts from it.
         channels: Role to channel name.
         values: Parameter name to estimate; what is missing is not fitted. The value of a shape
             parameter is also where a fit starts.
@@ -127,7 +127,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a model was fitted on, and how well.
+    """Data and errors of a model's fit.
 
     Attributes:
         runs: Names of the runs.
@@ -136,10 +136,10 @@ class Evidence:
         rmse_with_means: The same with the means left in.
         seed: Seed of the bootstrap behind the spreads.
         run_spread: Standard deviation over runs of the logarithm of a run's error, None where a
-            single run was fitted or the file does not tell.
+            single run was fitted or the file does not contain it.
         target_range: Least and greatest value of the target in the fit; None where the file does
-            not tell.
-        made_at: When it was fitted, ISO 8601 with offset from UTC; empty where nobody said.
+            not contain it.
+        made_at: When it was fitted, ISO 8601 with offset from UTC; empty if unknown.
     """
 
     runs: tuple[str, ...]
@@ -154,20 +154,20 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Model:
-    """A balance, the channel it estimates, and its effects.
+    """One equation: the channel it estimates, and its effects.
 
     Attributes:
         name: Short name.
-        balance: Balance id, see `BALANCES`.
+        balance: Id of the equation, see `BALANCES`.
         target: Channel that is estimated.
         terms: The effects.
-        description: What it is and where it comes from.
+        description: Description and origin.
         low_pass: Filter of every channel.
         run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
             zero drifts. Not where the runs differ by what is to be estimated, such as a load that
             is held within a run.
         counted: Which samples count, or None for what suits the effects; see `samples`.
-        evidence: What it was fitted on, or None for a declared model.
+        evidence: Data and errors of the fit, or None for a declared model.
     """
 
     name: str
@@ -186,7 +186,7 @@ class Model:
             r"joint\.\d+|calibration\.\S+", self.balance
         ):
             raise ModelError(
-                f"There is no balance {self.balance!r}.",
+                f"Unknown equation {self.balance!r}.",
                 f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME.",
                 nearest(self.balance, BALANCES),
             )
@@ -203,7 +203,7 @@ class Model:
     def samples(self) -> Samples:
         """Which samples the model is fitted and judged on.
 
-        Unless declared: friction says nothing of a rig at rest, where it takes any value.
+        Unless declared: friction is undetermined at standstill, where it takes any value.
         """
         if self.counted is not None:
             return self.counted
@@ -222,7 +222,7 @@ class Model:
 
 
 def nearest(name: str, allowed: Sequence[str]) -> str:
-    """Say what was probably meant; empty when nothing is near."""
+    """Return a suggestion of the probable name; empty when none is near."""
     near = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
     return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(allowed)}."
 

@@ -11,7 +11,7 @@ sign = -1
 channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
-A file of several balances holds each under `[[models]]`, with `[models.processing]`,
+A file of several equations contains each under `[[models]]`, with `[models.processing]`,
 `[[models.effects]]` and `[models.fit]`, and has the schema `rig.models/1`.
 """
 
@@ -44,7 +44,7 @@ def shipped() -> dict[str, Path]:
 
 
 def read(path: Path) -> Model:
-    """Read a model file; of several balances the first one.
+    """Read a model file; of several equations the first one.
 
     Raises:
         ModelFileError: As for `read_all`.
@@ -81,7 +81,7 @@ def read_all(path: Path) -> list[Model]:
 
 
 def parse(text: str, where: str = "model") -> Model:
-    """Read a model from TOML text; of several balances the first one.
+    """Read a model from TOML text; of several equations the first one.
 
     Raises:
         ModelFileError: As for `parse_all`.
@@ -272,7 +272,7 @@ def _pair(table: Table) -> tuple[float, float]:
 
 
 def _counted(processing: Table) -> Samples | None:
-    """Return which samples count, or None where the file leaves that to the effects."""
+    """Return which samples count, or None where the effects decide."""
     if "samples" not in processing.content:
         return None
     name = processing.take("samples", str)
@@ -315,6 +315,6 @@ def _date(table: Table) -> str:
         is_date = False
     if not is_date:
         raise ModelFileError(
-            f"{table.where}: made_at = {text!r} is no date, ISO 8601 with offset from UTC."
+            f"{table.where}: made_at = {text!r} is not a date, ISO 8601 with offset from UTC."
         )
     return text

@@ -1,4 +1,4 @@
-"""A table of a model file, read key by key, so that what nobody reads is told."""
+"""A table of a model file, read key by key, so that unknown keys are reported."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -9,7 +9,7 @@ from estimation.model import ModelError, nearest
 
 
 class ModelFileError(ModelError):
-    """A model file cannot be read; says which file and which key."""
+    """A model file cannot be read; the message names the file and the key."""
 
 
 class NoModelError(ModelFileError, UnknownNameError):
@@ -17,7 +17,7 @@ class NoModelError(ModelFileError, UnknownNameError):
 
 
 class Table:
-    """A TOML table that knows which of its keys were read.
+    """A TOML table that records which of its keys were read.
 
     Args:
         content: The table as `tomllib` reads it.

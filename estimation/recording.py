@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Flag(IntFlag):
-    """What is wrong with one sample; 0 is a valid sample."""
+    """Faults of one sample; 0 is a valid sample."""
 
     VALID = 0
     SATURATED = 1  # a sensor or converter at its limit
@@ -31,14 +31,14 @@ class Flag(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A flagged stretch of a run.
+    """A flagged segment of a run.
 
     Attributes:
         start_s: Time of the first flagged sample, s.
         stop_s: Time of the last flagged sample, s.
-        flag: What is wrong.
-        reason: Why, in words a person can act on.
-        channel: The channel it was seen in, or None for all of them.
+        flag: The fault.
+        reason: Reason, in words that a person can act on.
+        channel: The channel concerned, or None for all of them.
     """
 
     start_s: float
@@ -60,7 +60,7 @@ class Mark:
 class Instrument:
     """Identity of the instrument under test. What is not known is None.
 
-    One that was mounted anew has another friction and another zero, so `mounting` tells it apart.
+    After remounting, friction and zero differ, so `mounting` identifies the mounting.
     """
 
     model: str | None = None
@@ -101,17 +101,17 @@ class Recording:
         time_s: Device clock, shape (n,), strictly increasing.
         columns: Channel name to values, each of shape (n,), SI units.
         flags: Per-sample `Flag` bits, shape (n,), uint8.
-        conditions: What was held constant, numbers in SI with the unit in the name
+        conditions: Constant conditions, numbers in SI with the unit in the name
             (`load_command_a`, `frequency_hz`) or words.
         rig: Name of the rig.
         instrument: Identity of the instrument.
         notes: Operator's notes.
         marks: Operator's marks.
-        stretches: Flagged stretches with their reasons.
+        stretches: Flagged segments with their reasons.
         started_at_ns: Start of the run, ns since the Unix epoch, or None when not recorded.
         calibrations: Calibration name to content hash.
-        source: Where it was read from.
-        excluded: Why the run is left out of evidence, or None when it counts.
+        source: File it was read from.
+        excluded: Reason for excluding the run, or None when it counts.
     """
 
     name: str
@@ -253,7 +253,7 @@ class Recording:
         return replace(self, columns={**self.columns, **added})
 
     def with_stretch(self, stretch: Stretch) -> "Recording":
-        """Return a recording with one more flagged stretch, its samples flagged."""
+        """Return a recording with one more flagged segment, its samples flagged."""
         inside = (self.time_s >= stretch.start_s) & (self.time_s <= stretch.stop_s)
         flags = np.where(inside, self.flags | np.uint8(stretch.flag), self.flags)
         return replace(self, flags=flags.astype(np.uint8), stretches=(*self.stretches, stretch))

@@ -1,13 +1,13 @@
 """The residual of a fitted model on a campaign, and the largest structure left in it.
 
-This is a screening, not a diagnosis. It says that something is left and which variable it goes
-with; it does not name an effect, and it does not prove one. Naming an effect needs the search over
+This is a screening, not a diagnosis. It shows that the residual is structured and which variable it
+depends on; it does not identify an effect. Naming an effect needs the search over
 the catalogue with its own statistics: that search takes the same inputs (a fitted `Model`, a
 `Campaign`) and starts from the same `residuals`.
 
-The unit of evidence is the run: a map of the residual against a variable is fitted on all other
-runs and scored on the run left out. Each run's mean is removed first where the model says that run
-offsets are a nuisance; else the mean over all runs is.
+The unit of evidence is the run: a smooth function of a variable is fitted to the residual of all
+other runs and scored on the run left out. Each run's mean is removed first where run offsets
+are a nuisance in the model; else the mean over all runs is.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,7 +32,7 @@ VARIABLES: dict[str, str] = {
     "acceleration": "spindle_acceleration_rad_s2",
     "time": "time_s",
 }
-"""What a residual is held against, and the channel it is taken from."""
+"""Variables of the screening, and the channel of each."""
 
 BINS = 24
 """Bins of a map; its range is that of the middle 98 % of the samples."""
@@ -56,7 +56,7 @@ class ResidualError(EstimationError):
 
 @dataclass(frozen=True)
 class RunResidual:
-    """What a model leaves of one run.
+    """The residual of a model in one run.
 
     Attributes:
         run: The run's filtered channels: the model's, its target and the variables'.
@@ -71,16 +71,16 @@ class RunResidual:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """How much of a residual goes with one variable.
+    """Dependence of a residual on one variable.
 
     Attributes:
         variable: Name of the variable, see `VARIABLES`.
-        explained_fraction: Share of the residual's variance that a map of this variable, fitted on
-            the other runs, explains; negative when the map makes it worse.
+        explained_fraction: Share of the residual's variance that a function of this variable,
+            fitted on the other runs, explains; negative when the map makes it worse.
         chance_fraction: The largest such share that any variable reached on residuals shifted in
-            time and flipped run by run. A share that is not well above it is nothing to speak of.
-        amplitude: Size of the map: half its spread between the 5th and the 95th percentile of the
-            samples, or the amplitude of the ripple.
+            time and flipped run by run. A share that is not well above it is not significant.
+        amplitude: Size of the function: half its spread between the 5th and the 95th percentile of
+            the samples, or the amplitude of the ripple.
         unit: Unit of the amplitude.
         detail: Where it is largest, in words.
     """
@@ -98,18 +98,18 @@ class Structure:
         return self.explained_fraction > max(2 * self.chance_fraction, 0.01)
 
     def sentence(self) -> str:
-        """Return what may be said about it, and no more."""
+        """Return a sentence about the structure."""
         if not self.stands_out:
             return "Screening finds no structure above chance in the residual."
         return (
-            f"Something is left, and it looks like a function of {self.variable.replace('_', ' ')}:"
-            f" it goes with {100 * self.explained_fraction:.0f} % of the residual's variance on"
-            f" runs held out, {self.detail}. This is a screening; it names no effect."
+            f"The residual depends on {self.variable.replace('_', ' ')}, which explains"
+            f" {100 * self.explained_fraction:.0f} % of the residual's variance on"
+            f" runs held out, {self.detail}. This is a screening; it identifies no effect."
         )
 
 
 def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> list[RunResidual]:
-    """Return what a fitted model leaves of each run that is not excluded.
+    """Return the residual of a fitted model in each run that is not excluded.
 
     Args:
         model: A fitted model.
@@ -140,8 +140,8 @@ def centred(model: Model, values: Sequence[FloatArray]) -> list[FloatArray]:
     """Remove each run's mean, or the mean over all runs when run offsets are no nuisance.
 
     Args:
-        model: Says which.
-        values: One array a run, shape (n,) or (n, columns).
+        model: The model whose samples count.
+        values: One array per run, shape (n,) or (n, columns).
     """
     if model.run_offsets:
         return [part - part.mean(axis=0) for part in values]
@@ -192,11 +192,11 @@ def largest_structure(
     Args:
         model: A fitted model.
         campaign: The runs; two at least.
-        seed: Seed of the surrogates.
+        seed: Seed of the permutations.
         surrogates: Number of shifted residuals behind `chance_fraction`.
 
     Returns:
-        One structure a variable that the runs can tell, ranked by explained fraction.
+        One structure per variable that varies in the runs, ranked by explained fraction.
 
     Raises:
         ResidualError: Fewer than two runs have samples.
@@ -221,7 +221,7 @@ def largest_structure(
 
 
 def _ranked(structures: list[Structure]) -> list[Structure]:
-    """Sort by explained fraction; the direction goes before a speed that hardly does better."""
+    """Sort by explained fraction; prefer the direction to a speed that is only slightly better."""
 
     def rank(structure: Structure) -> float:
         share = structure.explained_fraction
@@ -248,14 +248,14 @@ def _shown(value: float, unit: str, sign: str = "") -> str:
 
 
 _Features = tuple[str, list[FloatArray], Sequence[str]]
-"""Variable, its columns in each run, and what each column stands for."""
+"""Variable, its columns in each run, and the quantity of each column."""
 
 
 def _features(model: Model, runs: list[RunResidual]) -> Iterable[_Features]:
     for variable, channel in VARIABLES.items():
         if any(channel not in part.run for part in runs):
             continue
-        # a sensor held against its own residual finds its own noise, so the estimate stands in
+        # a sensor's noise correlates with its own residual, so the estimate replaces the sensor
         values = [part.estimate if channel == model.target else part.run[channel] for part in runs]
         if variable == "motor_angle":
             yield from (_ripple(values, order) for order in range(1, ORDERS + 1))
@@ -317,7 +317,7 @@ class _Map:
         return gained / max(sum(float(r @ r) for r in left), np.finfo(float).tiny)
 
     def structure(self, left: list[FloatArray], chance: float, unit: str) -> Structure:
-        """Return what the map says, fitted on all runs."""
+        """Return the values of the function fitted on all runs."""
         rights = sum(c.T @ r for c, r in zip(self.columns, left, strict=True))
         weights = self._solve(self.grams.sum(axis=0), np.asarray(rights))
         if len(self.labels) == 1:  # a ripple: sine and cosine

@@ -1,8 +1,9 @@
-"""Which samples are in motion or closing: where friction sticks a model of motion says nothing.
+"""Samples in motion or closing: a model of motion is not valid where friction sticks.
 
-At rest friction takes whatever value holds the balance. Such samples are few and their errors are
-large: on a simulated rig a twentieth of the samples held more than half of the squared error, and
-pulled the torque constant 15 % from its true value. They are left out of fits and of residuals.
+At standstill friction takes any value that satisfies the equation. Such samples are few and their
+errors are large: on a simulated rig a twentieth of the samples had more than half of the squared
+error, and pulled the torque constant 15 % from its true value. They are left out of fits and of
+residuals.
 """
 
 from typing import Literal
@@ -22,11 +23,12 @@ Samples = Literal["all", "motion", "closing"]
 """Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
 
 SLOWEST_RAD_S = {SPEED: 0.7, SPINDLE_SPEED: 0.02}
-"""Speeds that friction goes with, and below which each is at rest. While the gearbox winds up the
-motor turns and the spindle stands: a balance is at rest when the speed of its own friction is."""
+"""Speeds that friction depends on, and the threshold of standstill of each. While the gearbox winds
+up the motor turns and the spindle stands still: an equation is static when the speed of its own
+friction is below the threshold."""
 
 CLOSING_RAD_S, TRIM_S = 0.25, 1.0
-"""Filtered spindle speed from which a sample counts as closing, and what is left out at the start
+"""Filtered spindle speed from which a sample counts as closing, and the part omitted at the start
 and at the end of each run (O'Neill et al. 2018, section II.C)."""
 
 REST_SHARE, REST_REACH_S = 0.05, 0.02

@@ -47,7 +47,7 @@ def score(estimate: ArrayLike, truth: ArrayLike) -> Score:
         truth: Measured values in the same unit, shape (n,).
 
     Raises:
-        ScoreError: The shapes differ, there is no sample, or a value is not finite.
+        ScoreError: The shapes differ, the arrays are empty, or a value is not finite.
     """
     estimated = np.asarray(estimate, dtype=np.float64)
     measured = np.asarray(truth, dtype=np.float64)
@@ -60,7 +60,7 @@ def score(estimate: ArrayLike, truth: ArrayLike) -> Score:
         raise ScoreError(
             "An estimate or its truth holds values that are not finite.",
             "A score over the remaining samples would hide them.",
-            "Leave these samples out on purpose, and say so.",
+            "Exclude these samples explicitly, and report it.",
         )
     error = np.abs(estimated - measured)
     varies = bool(np.ptp(estimated) > 0 and np.ptp(measured) > 0)

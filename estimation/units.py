@@ -1,7 +1,7 @@
 """Unit symbols as a product of powers: what a torque divided by a speed is called.
 
 Parameters of an effect take their unit from the channels they are used with, so that the same
-effect serves a torque balance and an angle balance.
+effect serves a torque equation and an angle equation.
 """
 
 import re

@@ -1,9 +1,9 @@
-"""The residual watch: says when a fitted model stops fitting what is recorded.
+"""The residual monitor: detects when a fitted model no longer fits the recordings.
 
-The unit is the run, as everywhere. Each run's error, on the scale of its logarithm, is held against
-the error and the spread over runs that the model's own fit had; a one-sided cumulative sum adds up
-what is beyond half a spread (Page, Biometrika 41, 1954), so that a small lasting change is told
-like a large one, and a single odd run is not.
+The unit is the run. The logarithm of each run's error is compared with the error and the spread
+over runs of the model's own fit. A one-sided cumulative sum adds the excess over half a spread
+(Page, Biometrika 41, 1954), so that a small lasting change is detected like a large one, and a
+single unusual run is not.
 """
 
 import math
@@ -30,12 +30,12 @@ LEAST_SPREAD = 0.1
 """Runs that the model was not fitted on differ by a tenth at least."""
 
 FIRST = 5
-"""Runs that stand for the fit's own where the model's file tells no error."""
+"""Runs that replace those of the fit where the model's file has no error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What one run says of the model.
+    """The verdict of one run on the model.
 
     Attributes:
         name: Name of the run.
@@ -58,7 +58,7 @@ class Sight:
 
 
 class ResidualWatch:
-    """Sees runs one after the other and says when a model stops fitting."""
+    """Evaluates runs in sequence and reports when a model no longer fits."""
 
     def __init__(self, model: Model, least_spread: float = LEAST_SPREAD) -> None:
         """Start before the first run.

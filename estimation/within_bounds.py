@@ -21,7 +21,7 @@ def solve_within(
         high: Upper bounds, above the lower ones, shape (n,).
 
     Returns:
-        Shape (n,). Where bounds are active the others are the best beside them.
+        Shape (n,). Where bounds are active the others are optimal conditional on them.
     """
     scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     scaled, aim = normal / np.outer(scale, scale), right / scale

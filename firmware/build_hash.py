@@ -8,7 +8,7 @@ CORE = Path(__file__).parent / "core"
 
 
 def main() -> None:
-    """Print `-DRIG_BUILD_HASH=...U`, nothing where there is no `cksum`."""
+    """Print `-DRIG_BUILD_HASH=...U`, nothing where `cksum` is missing."""
     sources = b"".join(path.read_bytes() for path in sorted(CORE.glob("*.hpp")))
     try:
         done = subprocess.run(["cksum"], input=sources, capture_output=True, check=True)  # noqa: S607

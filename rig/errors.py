@@ -34,7 +34,7 @@ class RigError(Exception):
     Attributes:
         what: What happened, in one sentence.
         why: The cause as far as it is known; may be empty.
-        fix: What to do or to type next; may be empty.
+        fix: Action or next command; may be empty.
     """
 
     exit_code = ExitCode.FAILED

@@ -1,7 +1,8 @@
 """Measure how good a version of `rig diagnose` is, and append a line to the results page.
 
-`python -m benchmarks.diagnosis measure [--own] [--otherlab FOLDER] [--machines FOLDER]`: without a
-generator, `--own`. Resumes where it stopped; a line goes to the page when every case is answered.
+`python -m benchmarks.diagnosis measure [--varied] [--own] [--otherlab FOLDER] [--machines FOLDER]`,
+without a generator `--varied`. Resumes where it stopped; a line goes to the page when every case is
+answered.
 """
 
 import argparse
@@ -10,12 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.diagnosis import machines, otherlab, own
+from benchmarks.diagnosis import machines, otherlab, own, varied
 from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case
 from benchmarks.diagnosis.measure import Row, measure
 from benchmarks.diagnosis.page import PAGE, Measured, append, judged_seeds
-from benchmarks.diagnosis.seeds import next_to_judge, use_of
+from benchmarks.diagnosis.seeds import next_to_judge
+from rig.simulation.varied import part_of
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Generator:
 def main() -> int:
     """Measure what the command line asks for."""
     options = _parser().parse_args()
+    options.varied |= not (options.own or options.otherlab or options.machines)
     rig = Rig(options.rig, options.version)
     for generator in _generators(options):
         rows = measure(
@@ -52,7 +55,10 @@ def main() -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("command", choices=["measure"])
-    parser.add_argument("--own", action="store_true", help="the project's own simulator")
+    parser.add_argument(
+        "--varied", action="store_true", help="rigs, protocols and forms drawn at random"
+    )
+    parser.add_argument("--own", action="store_true", help="the reference rig and its protocols")
     parser.add_argument("--otherlab", type=Path, help="folder of another simulator and its cases")
     parser.add_argument("--machines", type=Path, help="folder of measured data, one a machine")
     parser.add_argument(
@@ -62,9 +68,12 @@ def _parser() -> argparse.ArgumentParser:
         help="executable in .venv/bin of the checkout that is measured",
     )
     parser.add_argument("--version", default="", help="its name on the page; its commit if none")
-    parser.add_argument("--seed", type=int, help="of --own; the next judging seed if none")
+    parser.add_argument("--seed", type=int, help="the next judging block if none")
     parser.add_argument(
-        "--counts", type=_counts, default=own.COUNTS, help="of --own: class=N,class=N"
+        "--gear-ratio", type=float, help="of --varied: one for all rigs, for versions that need it"
+    )
+    parser.add_argument(
+        "--counts", type=_counts, default=own.COUNTS, help="of simulated cases: class=N,class=N"
     )
     parser.add_argument("--only", default="", help="only cases whose names begin so, with commas")
     parser.add_argument("--out", type=Path, default=Path("build/measure"), help="for the answers")
@@ -79,18 +88,24 @@ def _counts(text: str) -> dict[str, int]:
     for word in text.split(","):
         kind, _, number = word.partition("=")
         if kind not in KINDS or not number.isdigit():
-            raise argparse.ArgumentTypeError(f"{word!r} is no count; classes: {', '.join(KINDS)}")
+            raise argparse.ArgumentTypeError(f"{word!r} is not a count; one of {', '.join(KINDS)}")
         counts[kind] = int(number)
     return counts
 
 
 def _generators(options: argparse.Namespace) -> Iterator[Generator]:
-    if options.own or not (options.otherlab or options.machines):
+    if options.own or options.varied:
         seed = options.seed
         if seed is None:
             seed = next_to_judge(judged_seeds(options.page))
-        _say(f"own simulator, seed {seed} ({use_of(seed)})")
-        yield Generator("own", list(own.cases(seed, options.counts)), seed)
+        _say(f"seed {seed}: {part_of(seed)}")
+        if options.own:
+            yield Generator("own", list(own.cases(seed, options.counts)), seed)
+        if options.varied:
+            ratio = options.gear_ratio
+            name = "varied" if ratio is None else f"varied, gear {ratio:g}"
+            drawn = varied.cases(seed, options.counts, options.out / "truths", ratio)
+            yield Generator(name, list(drawn), seed)
     for path, cases in ((options.otherlab, otherlab.cases), (options.machines, machines.cases)):
         if path is not None and not path.is_dir():
             _say(f"skipped: there is no folder {path}")

@@ -42,7 +42,7 @@ class Judgement:
     Attributes:
         right: Whether the answer is what the case asks for; None where nobody knows the answer.
         sure_and_wrong: Whether a wrong statement was made with a confidence of `SURE` or more.
-        extra: Names beside the hidden effects that are not true.
+        extra: Wrong names in addition to the hidden effects.
         equations: Equations in which a hidden effect was named rightly.
         note: What the answer came to, in words.
     """

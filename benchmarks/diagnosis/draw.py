@@ -30,7 +30,7 @@ WEAK = 0.3
 """Strength of a weak case for one of a strong one."""
 
 CHAINS = ("plain", "coloured", "drifting", "skewed")
-"""What a logger may do to a case beside white noise and counts."""
+"""Faults of a logger in a case, in addition to white noise and counts."""
 
 CLEAN = (*((chain, "usual") for chain in CHAINS), ("coloured", "rests"), ("coloured", "wrist"))
 """Chain and excitation of clean cases, in turn."""
@@ -153,7 +153,7 @@ def write(answer: Answer, folder: Path) -> None:
 
 
 def write_next(answer: Answer, protocol: Path, folder: Path) -> None:
-    """Play a protocol on the case's rig and write its runs beside those that are there."""
+    """Play a protocol on the case's rig and write its runs next to the existing ones."""
     plans = [replace(p, name=f"next-{p.name}") for p in load_protocol(str(protocol)).plans()]
     later = range(RUNS, RUNS + len(plans))
     lasting = replace(answer, runs=(*answer.runs, *later))
@@ -203,7 +203,7 @@ def _sensors(chain: str, rig_seed: int) -> SensorParameters:
 
 
 def _wrist(plan: RunPlan, plant: PlantParameters) -> FloatArray:
-    """Return what the encoder of the wrist reads during a run."""
+    """Return the reading of the wrist's encoder during a run."""
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
     phase = 2.0 * np.pi * TICK_S * np.arange(motion.first, motion.last)
     pitch = plant.wrist_middle_rad + plant.wrist_swing_rad * np.sin(phase / plant.wrist_period_s)

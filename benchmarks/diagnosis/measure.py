@@ -26,7 +26,7 @@ class Row:
         kind: Its class.
         right: Whether the answer was right; None where nobody knows.
         sure_and_wrong: Whether a wrong statement was made surely.
-        extra: Names that are not true, beside those that are.
+        extra: Wrong names in addition to the right ones.
         named: What was stated, finding by finding.
         ratio: Error on the test runs over the error of the declared model on the same campaign
             without the effects, the worst of the rightly named equations; None where not known.

@@ -59,7 +59,7 @@ def _case(one: dict[str, Any], simulator: ModuleType, scorer: ModuleType) -> Cas
 
 
 def _judged(one: dict[str, Any], row: dict[str, Any], report: Report) -> Judgement:
-    """Return what the simulator's own scorer says of an answer.
+    """Return the score of an answer by the simulator's own scorer.
 
     Sure and wrong is a case that is not right although its first finding was stated surely, and
     in a pair is neither of the two effects.

@@ -56,7 +56,7 @@ def _case(kind: str, number: int, seed: int) -> Case:
 
 
 def truth_of(answer: Answer) -> scoring.Truth:
-    """Return what is hidden, as an answer is held against it."""
+    """Return the hidden truth in the form of an answer."""
     plans = plans_of(answer.excitation)
     hidden = [
         scoring.Hidden({t.family, *t.accepted}, t.equations, t.depends_on)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks.diagnosis.case import KINDS, MACHINE
 from benchmarks.diagnosis.measure import Row
-from benchmarks.diagnosis.seeds import use_of
 from estimation.files import write_text_atomic
+from rig.simulation.varied import part_of
 
 PAGE = Path("docs/results/diagnosis-versions.md")
 
@@ -46,7 +46,7 @@ COLUMNS = {
 HEAD = """# The diagnosis, version by version
 
 Appended by `make measure` ([how](../blind-study.md)): one line for each version of the code and
-each generator of cases, so that every version stands beside the earlier ones. `+changes` is a
+each generator of cases, so that every version is listed with the earlier ones. `+changes` is a
 checkout with changes that were not committed.
 """
 
@@ -57,11 +57,11 @@ right variables and no name; some runs: the name and the runs, one run may be of
 laboratory's scorer counts the name); confounded: the whole set of effects that the runs cannot
 distinguish and a next experiment; clean: no finding. Solved: confounded cases that are right after
 the proposed runs were recorded, of those for which runs were proposed. Sure and wrong: cases with
-a wrong statement at a confidence of .9 or more. Extra names: names that are not true beside the
-hidden effects, over all cases. Error ratio: error on the test runs over what the declared model
-leaves on the same campaign without the hidden effects, median of the rightly named cases (their
-number). A judging seed is used once: `judge` on the first line with it; `seen` on later lines.
-Processor time is of one call on one core of a shared machine.""",
+a wrong statement at a confidence of .9 or more. Extra names: wrong names in addition to the
+hidden effects, over all cases. Error ratio: error on the test runs over the residual of the
+declared model on the same campaign without the hidden effects, median of the rightly named cases
+(their number). A judging seed is used once: `judge` on the first line with it; `seen` on later
+lines. Processor time is of one call on one core of a shared machine.""",
     MACHINES: """Measured data of machines that were built, recorded and published by others; the
 conversions are in `benchmarks/diagnosis`. Error is the root mean square of the test runs'
 residual, run means included, over that of the target, before and after what was found. A dash
@@ -124,14 +124,14 @@ def _lines(text: str, section: str) -> list[list[str]]:
 
 
 def _key(section: str, cells: Sequence[str]) -> tuple[str, ...]:
-    """Return what makes a line another one: version, generator and seed, or version and machine."""
+    """Return the key of a line: version, generator and seed, or version and machine."""
     return (cells[0], *(cells[2:4] if section == SIMULATED else cells[2:3]))
 
 
 def _simulated(
     measured: Measured, rows: Sequence[Row], earlier: Sequence[Sequence[str]]
 ) -> list[str]:
-    use = "develop" if measured.seed is None else use_of(measured.seed)
+    use = "develop" if measured.seed is None else part_of(measured.seed)
     seed = "-" if measured.seed is None else str(measured.seed)
     if use == "judge" and any(c[3] == seed and c[0] != measured.version for c in earlier):
         use = "seen"

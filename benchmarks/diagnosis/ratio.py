@@ -1,4 +1,4 @@
-"""What the declared model leaves without the hidden effects: the denominator of the error ratio.
+"""The declared model's residual without hidden effects: denominator of the error ratio.
 
 The declared model is fitted on the answer's training runs of the same campaign simulated without
 the effects, and its error is that of the answer's test runs: over all valid samples, filtered as

@@ -20,7 +20,8 @@ RIGHT = {"clean": "nothing found", "outside": "depends on", "confounded": "one o
 """The outcome that a kind of case asks for; of the other kinds the first one."""
 
 OFF = 1
-"""So many runs may be misjudged where an effect is in some runs only: it may hardly show in one."""
+"""So many runs may be misjudged where an effect is in some runs only: it may be invisible in
+one."""
 
 
 @dataclass(frozen=True)

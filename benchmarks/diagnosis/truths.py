@@ -29,7 +29,7 @@ class Truth:
         family: Catalogue id, or `unknown` for what no catalogue holds.
         equations: Equations in which it shows.
         accepted: Families that cannot be distinguished from it.
-        depends_on: For `unknown`: one word of each group, and none beside them, is right.
+        depends_on: For `unknown`: one word of each group, and no other, is right.
         scale: Strength of a strong case; 1 unless the effect is faint or loud on this rig.
         needs: Excitation that shows it, one of `EXCITATIONS`.
         course: How it changes from run to run: empty for alike in all, `comes` with one run and

@@ -141,7 +141,7 @@ _MEASURES = {
     "faults": _faults,
     "kills": _kills,
     "network": lambda o: listening.measure(),
-    "fuzz": lambda o: {},  # its own command measures it; here it is only told
+    "fuzz": lambda o: {},  # its own command measures it; here it is only reported
 }
 
 

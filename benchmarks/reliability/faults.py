@@ -76,7 +76,7 @@ SENSOR_FAULTS: dict[str, tuple[Trip, int, int | None, float]] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one fault.
+    """Result of one fault.
 
     Attributes:
         kind: What was injected.

@@ -50,7 +50,7 @@ def listening(process_id: int) -> set[str]:
 
 
 def measure() -> dict[str, list[str]]:
-    """Return what listened: while recording and watching every rig, and with Foxglove asked for."""
+    """Return the open sockets: while recording and watching every rig, and with Foxglove."""
     unasked: set[str] = set()
     with tempfile.TemporaryDirectory() as folder:
         for name in CONFIGS:
@@ -61,7 +61,7 @@ def measure() -> dict[str, list[str]]:
 
 
 def is_loopback(address: str) -> bool:
-    """Say whether an address of /proc is 127.0.0.1 or ::1."""
+    """Whether an address of /proc is 127.0.0.1 or ::1."""
     host = address.split(":")[0]
     return host in ("0100007F", "00000000000000000000000001000000")
 

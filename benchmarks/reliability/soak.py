@@ -16,7 +16,7 @@ BLOCK_S = 60.0
 
 @dataclass(frozen=True)
 class Soak:
-    """What a soak came to.
+    """Result of a soak test.
 
     Attributes:
         where: What the session ran on.

@@ -1,1 +1,1 @@
-"""Guided calibrations, one file a kind: their steps, and what their measurements say."""
+"""Guided calibrations, one file per kind: their steps and their conclusions."""

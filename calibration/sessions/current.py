@@ -1,11 +1,11 @@
 """Motor current against the torque sensor at the spindle: torque constant, friction, driver.
 
-While the spindle moves steadily the sensor at the spindle sees
+While the spindle moves steadily the sensor at the spindle measures
 
     T = K i - F sgn(v) - b v + c,
 
 K the motor's torque constant times the gear's ratio times its efficiency, F the friction of motor
-and gear seen at the spindle, c what zeros leave. F / K is the current that only turns the drive.
+and gear at the spindle, c the remaining zeros. F / K is the current that only turns the drive.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ class CurrentSession:
     Attributes:
         loads_a: Loads to move against.
         speeds_rad_s: Speeds of the spindle.
-        repeats: How often each is moved.
+        repeats: Number of moves of each.
         motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
         gear_ratio: Ratio of the gear by its label.
         residual_limit: Greatest residual that passes, share of the span of torque.
@@ -89,7 +89,7 @@ class CurrentSession:
         span = float(np.ptp(torques))
         fix = "Look for a tight spot, a loose coupling, or another effect with `rig diagnose`."
         check_limit(
-            "not_linear", torque.residual_rms / span, self.residual_limit, "What is left", fix
+            "not_linear", torque.residual_rms / span, self.residual_limit, "The residual", fix
         )
         drift = refuse_drift(torque, span)
         driver = regress(

@@ -1,9 +1,9 @@
-"""An encoder: its zero at a mark, and against another one its ratio, offset and wave.
+"""An encoder: its zero at a mark, and against another one its ratio, offset and periodic error.
 
     angle = a reference + c + d T + h sgn(v) + A sin(n angle) + B cos(n angle)
 
-T is the torque between the two, whose twist would pass for an error, h the lost motion. How often
-the wave comes a turn is searched for and must predict runs left out.
+T is the torque between the two, whose twist would look like an error, h the lost motion. The number
+of periods per turn is searched for and must predict runs left out.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """An encoder, what it is held against, and the torque between the two."""
+    """An encoder, its reference, and the torque between the two."""
 
     channel: str
     reference: str
@@ -35,7 +35,7 @@ PAIRS = {
     "jaw": Pair("jaw_angle_rad", "spindle_angle_rad", "distal_torque_n_m", 1.0),
 }
 SPEEDS_RAD_S = (0.3, 0.5)
-"""More than one: at one speed the time tells whatever the angle does."""
+"""More than one: at one speed, time and angle are collinear."""
 MARKS = 5
 MARK_SPREAD_COUNT = 6.0
 LEAST_PERIODS, MOST_PERIODS = 6, 40
@@ -49,8 +49,8 @@ class EncoderSession:
     Attributes:
         encoder: `spindle`, against the motor's encoder, or `jaw`, against the spindle's.
         loads_a: Loads of the moves.
-        repeats: How often each is moved.
-        line_only: Model no wave.
+        repeats: Number of moves of each.
+        line_only: Model no periodic error.
     """
 
     encoder: str = "spindle"
@@ -64,7 +64,7 @@ class EncoderSession:
     def __post_init__(self) -> None:
         if self.encoder not in PAIRS:
             raise BadDataError(
-                "points", f"There is no encoder {self.encoder!r}.", f"Known: {', '.join(PAIRS)}."
+                "points", f"Unknown encoder {self.encoder!r}.", f"Known: {', '.join(PAIRS)}."
             )
 
     def steps(self) -> list[Step]:
@@ -115,7 +115,9 @@ class EncoderSession:
         found: dict[str, float | str] = {
             "mark_spread_count": float(at.std(ddof=1)),
             "ratio_over_nominal": float(used.values[0] / pair.nominal_ratio),
-            "wave": f"{periods} periods a turn" if has_wave else "none that predicts runs left out",
+            "wave": f"{periods} periods per turn"
+            if has_wave
+            else "none that predicts runs left out",
             "wave_amplitude_rad": amplitude,
         }
         series = {
@@ -155,7 +157,7 @@ def _plain(run: dict[str, FloatArray], pair: Pair) -> FloatArray:
 
 
 def _best_wave(runs: Sequence[dict[str, FloatArray]], pair: Pair) -> tuple[int, Regression]:
-    """Return the periods a turn whose wave leaves least, and that fit."""
+    """Return the periods per turn with the smallest residual, and that fit."""
     fits = {}
     for periods in range(LEAST_PERIODS, MOST_PERIODS + 1):
         columns = []

@@ -69,13 +69,13 @@ class FsrSession:
         hold = Step(
             "hold",
             {"press_n": weight, "profile": "hold"},
-            f"After Enter put a weight of {weight / 9.80665 * 1e3:.0f} g on and leave it.",
+            f"After Enter put a weight of {weight / 9.80665 * 1e3:.0f} g on and do not touch it.",
             self.hold_s,
         )
         return [rest, *runs, hold]
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
-        """Return the curve from voltage to force with what it remembers."""
+        """Return the curve from voltage to force, with hysteresis and creep."""
         by_name = {m.recording.name: m for m in measurements}
         runs = self.pressed(measurements)
         zero_n = self._rest(measurements)[0]
@@ -148,12 +148,12 @@ class FsrSession:
                 volts = measurement.recording[FSR]
                 floor_v = float(volts.mean() + 5 * volts.std() + 0.005)
                 return float(measurement.recording[self.axis].mean()), floor_v
-        raise BadDataError("points", "There is no reading of the empty sensors.")
+        raise BadDataError("points", "A reading of the empty sensors is missing.")
 
     def _gap_words(self, memory: FsrMemory) -> str:
         if self.curve_only:
-            return "left out, as asked for"
-        return "modelled" if memory.gap_n else "not told apart from none"
+            return "omitted, as requested"
+        return "modelled" if memory.gap_n else "not significant"
 
     def _run(self, measurement: Measurement, zero_n: float, floor_v: float) -> FsrRun:
         """Return the pressed part of a run, both channels smoothed alike."""

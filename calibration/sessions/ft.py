@@ -31,7 +31,7 @@ class FtSession:
 
     Attributes:
         poses: Directions of gravity in the sensor's axes.
-        repeats: How often to go through them; three tell a wrong sensor from poses held badly.
+        repeats: Number of rounds; three separate sensor errors from inaccurate poses.
         jaw_m: The jaw, from the sensor's origin.
         jaw_turn_rad: Turns of the jaw's frame about the sensor's x, y and z, in that order.
     """
@@ -70,8 +70,8 @@ class FtSession:
         if missing:
             raise BadDataError(
                 "points",
-                f"The sensor did not say its {missing[0]}.",
-                "Counts a unit are read from the device, never assumed.",
+                f"The sensor did not report its {missing[0]}.",
+                "Counts per unit are read from the device, never assumed.",
             )
         down, read = [], []
         for measurement in measurements:

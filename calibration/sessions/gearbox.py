@@ -24,7 +24,7 @@ from estimation.recording import FloatArray
 
 TORQUE, MOTOR, SPINDLE = "proximal_torque_n_m", "motor_angle_rad", "spindle_angle_rad"
 LEAST_TORQUE_N_M = 0.02
-"""Below this torque the gear may stand anywhere in its gap, and the sample is left out."""
+"""Below this torque the gear may be anywhere in its backlash, and the sample is excluded."""
 
 ZEROS_N_M = np.arange(-0.06, 0.0601, 0.002)
 """Readings of an unloaded gear that are tried."""
@@ -40,7 +40,7 @@ class GearboxSession:
     Attributes:
         loads_a: Loads of both signs.
         speeds_rad_s: Speeds of the spindle.
-        repeats: How often each is moved.
+        repeats: Number of moves of each.
         gear_ratio: Motor turns a turn of the spindle.
         stiffness_only: Model no backlash.
     """
@@ -82,9 +82,9 @@ class GearboxSession:
         used = without if self.stiffness_only else whole
         fit = _as_fit(used, int(every.size))
         found: dict[str, float | str] = {
-            "backlash": "told apart from none on runs left out"
+            "backlash": "significant on runs left out"
             if has_gap
-            else "not told apart from none on runs left out",
+            else "not significant on runs left out",
             "drift_ratio": drift,
             "backlash_ci95_rad": float(2 * whole.half_widths()[1]),
             "torque_zero_n_m": zero_n_m if has_gap else "only a gap shows it",
@@ -153,6 +153,6 @@ def _refuse_no_slope(compliance: float, residual_rad: float, torque_n_m: FloatAr
         raise BadDataError(
             "no_change",
             f"The gear twists by {twist * 1e3:.3g} mrad over the whole range of torque.",
-            f"That is less than twice what the fit leaves, {residual_rad * 1e3:.3g} mrad.",
+            f"That is less than twice the residual of the fit, {residual_rad * 1e3:.3g} mrad.",
             "Load more, and check the signs of both encoders and of the torque.",
         )

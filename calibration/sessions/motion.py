@@ -63,8 +63,8 @@ def steady(measurement: Measurement, names: Sequence[str]) -> dict[str, FloatArr
     if kept.sum() < 20:
         raise BadDataError(
             "no_change",
-            f"{recording.name}: the spindle hardly moves.",
-            f"It is to be faster than {MOVING_RAD_S:g} rad/s for some tenths of a second.",
+            f"{recording.name}: the spindle barely moves.",
+            f"It must be faster than {MOVING_RAD_S:g} rad/s for some tenths of a second.",
             "Check that the motor has its supply and that the jaw is free.",
         )
     found = {name: smooth[::step, k][kept] for k, name in enumerate(names)}

@@ -33,7 +33,7 @@ class TorqueSession:
         sensor: `proximal` or `distal`.
         arm_m: From the axis to where the weights hang, the arm level.
         masses_kg: Weights, rising.
-        repeats: How often to go up and down; four tell a bend from weights hung badly.
+        repeats: Number of passes up and down; four separate non-linearity from misplaced weights.
         shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
         counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
         temperature_k: Temperature of the sensor; None if it was not measured.
@@ -56,7 +56,7 @@ class TorqueSession:
         if self.sensor not in SENSORS:
             raise BadDataError(
                 "points",
-                f"There is no torque sensor {self.sensor!r}.",
+                f"Unknown torque sensor {self.sensor!r}.",
                 f"Known: {', '.join(SENSORS)}.",
             )
         rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
@@ -92,7 +92,7 @@ class TorqueSession:
         return steps
 
     def reading(self, measured: Sequence[Measurement], lines: CalibrationSet) -> str:
-        """Return what the last step read, and how far it is off the line of all steps so far."""
+        """Return the reading of the last step, and its distance to the line of all steps so far."""
         field = lines.channels[SENSORS[self.sensor]].counts
         counts = _counts(measured[-1], field)
         shown = f"{counts.mean():.1f} +- {counts.std():.1f} counts"
@@ -168,8 +168,8 @@ class TorqueSession:
         if not checked.passes:
             raise BadDataError(
                 "shunt",
-                f"The shunt changes the reading by {checked.change_counts:.0f} counts, the "
-                f"certificate says {checked.certificate_counts:.0f}.",
+                f"The shunt changes the reading by {checked.change_counts:.0f} counts, "
+                f"by the certificate {checked.certificate_counts:.0f}.",
                 f"That is {checked.deviation:+.2%}; {checked.tolerance:.0%} passes.",
                 "Check wiring, excitation and the amplifier's gain before hanging weights.",
             )

@@ -90,7 +90,7 @@ def draw() -> str:
         state.snapshot(),
         "rig live, synthetic recording",
         lever_m=0.012,
-        footer="t tare  m mark  r record  q leaves",
+        footer="t tare  m mark  r record  q quits",
         half_widths={estimator.target_channel: 0.014},
     )
     console.print(view)

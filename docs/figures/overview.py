@@ -21,7 +21,7 @@ BOXES = [
     ("recording\nSI, flags, zeros", 2.3, 0.0, 1.7, SOFT),
     ("model\nnamed effects", 4.4, 0.0, 2.3, SOFT),
     ("residual\nwhat is left, and where", 7.1, 0.0, 1.9, SOFT),
-    ("report on runs\nnobody touched", 9.4, 0.0, 2.3, SOFT),
+    ("report on held-out\ntest runs", 9.4, 0.0, 2.3, SOFT),
 ]
 ARROWS = [
     ((1.9, 2.5), (2.3, 2.5)),

@@ -1,4 +1,4 @@
-"""The driver of an AMT21: it is asked for every sample, at a steady rate."""
+"""The driver of an AMT21: it is polled for every sample, at a steady rate."""
 
 import math
 from typing import Annotated
@@ -26,7 +26,7 @@ class Amt21:
         transport: The way to the line; the device closes it.
         address: The encoder's address.
         multi_turn: Whether it also counts turns.
-        rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         reply_timeout_s: Time for an answer, on a USB adapter some milliseconds.
         top_speed_rad_s: The fastest the shaft turns; a reading that would need more is damaged.
     """
@@ -63,11 +63,11 @@ class Amt21:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line."""
+        """Counters of the line."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Ask for one position: the encoder says nothing else of itself.
+        """Request one position: the encoder has no other identification.
 
         Raises:
             LinkTimeoutError: Nobody answers at this address.
@@ -178,7 +178,7 @@ class Amt21:
         return None
 
     def _receive(self, request: bytes) -> bytes:
-        """Return what came, without an echo of the question where the adapter makes one."""
+        """Return the answer, without the request where the adapter returns it."""
         give_up_s = self._transport.now_s + self._reply_timeout_s
         came = b""
         while len(came) < protocol.REPLY_SIZE:

@@ -17,7 +17,7 @@ class Amt21Fake:
         address: Its address; it stays silent for any other.
         counts_a_tick: Counts its shaft turns in 1 ms.
         multi_turn: Whether it answers for turns.
-        echo: Whether the adapter returns the host's own bytes.
+        echo: True if the adapter returns the host's own bytes.
     """
 
     def __init__(

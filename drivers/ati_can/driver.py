@@ -1,4 +1,4 @@
-"""The driver of a NETCANOEM: it is asked for every sample, at a steady rate."""
+"""The driver of a NETCANOEM: it is polled for every sample, at a steady rate."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -34,7 +34,7 @@ class AtiCan:
         bus: The bus; the device closes it.
         base: The sensor's base identifier, 0 to 127.
         calibration: Which of its 16 calibrations to use.
-        rate_hz: How often it is asked. A question without an answer leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
     """
 
     name = "ati-can"
@@ -83,7 +83,7 @@ class AtiCan:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the bus, as far as this sensor is concerned, and to the bus itself."""
+        """Counters of this sensor's frames, and of the bus."""
         bus = self._bus.counters
         trouble = {"error_frames": bus.error_frames, "overruns": bus.overruns}
         return self._counters.as_dict() | trouble
@@ -93,7 +93,7 @@ class AtiCan:
 
         Raises:
             LinkTimeoutError: Nobody answers with this base identifier.
-            FrameError: What answers is no NETCANOEM, or its calibration is empty.
+            FrameError: The answer is not of a NETCANOEM, or its calibration is empty.
         """
         version = protocol.decode_firmware(self._ask(protocol.FIRMWARE)[0])
         serial = protocol.decode_serial(self._ask(protocol.SERIAL)[0])
@@ -149,7 +149,7 @@ class AtiCan:
         """Take the present load for zero: the mean of some readings, kept in this program.
 
         Raises:
-            DriverError: A gauge is saturated, or the sensor says that its readings are unusable.
+            DriverError: A gauge is saturated, or the sensor reports that its readings are unusable.
             LinkTimeoutError: The sensor does not answer.
         """
         taken = []
@@ -158,7 +158,9 @@ class AtiCan:
             if self._flag(gauges):
                 said = ", ".join(protocol.status_words(self.status)) or "a gauge is saturated"
                 raise DriverError(
-                    "The sensor cannot be zeroed.", f"It says: {said}.", "Take the load off it."
+                    "The sensor cannot be zeroed.",
+                    f"Reported status: {said}.",
+                    "Take the load off it.",
                 )
             taken.append(gauges)
         self.bias = np.mean(taken, axis=0, dtype=np.float64)
@@ -185,7 +187,7 @@ class AtiCan:
     def _require_calibration(self, matrix: NDArray[np.float64]) -> None:
         """Hold a row of the matrix in use against the one read at the start, each time the next.
 
-        No question tells the calibration in use: the one that chooses it also sets it.
+        The calibration in use cannot be read: the request that selects it also sets it.
 
         Raises:
             DriverError: It is another one.
@@ -204,7 +206,7 @@ class AtiCan:
             f" {self._calibration} any more.",
             f"It has restarted, after which it uses calibration {AFTER_RESTART}."
             f" Up to {CHECK_S:g} s of readings before this one are wrong.",
-            "Check its supply, then start again: the calibration is chosen anew.",
+            "Check its supply, then start again: the calibration is then selected again.",
         )
 
     def _read_gauges(self) -> NDArray[np.int16]:
@@ -288,7 +290,7 @@ class AtiCan:
                 continue  # of another device
             if frame.can_id == first:
                 if answer:
-                    self._counters.late += 1  # that was another request's: begin anew
+                    self._counters.late += 1  # that was another request's: start again
                 answer = [frame.data]
             elif answer and frame.can_id == first + len(answer):
                 answer.append(frame.data)

@@ -1,8 +1,8 @@
 """NETCANOEM's frames: one operation a request, replies of one to three frames. All big-endian.
 
 The identifier is `base << 4 | operation`, of a reply as of a request; a reply's second and third
-frame carry the operations that follow. Frames have no number: nothing but their order tells which
-request a reply belongs to.
+frame carry the operations that follow. Frames have no number: only their order identifies the
+request of a reply.
 
 Source: ATI manual 9610-05-1030 (NETCANOEM).
 """
@@ -20,7 +20,7 @@ HIGHEST_BASE = 0x7F
 READ, READ_SECOND, MATRIX_ROW, SERIAL, CALIBRATION = 0x0, 0x1, 0x2, 0x5, 0x6
 COUNTS_PER_UNIT, UNIT_CODES, FIRMWARE = 0x7, 0x8, 0xF
 ASSUMED_COUNTS_PER_UNIT = 1_000_000
-"""Of firmware before 3.7, which does not tell."""
+"""Value for firmware before 3.7, which does not report it."""
 TELLS_UNITS = (3, 7)
 """First firmware that answers for counts per unit and unit codes."""
 GAUGES = 6
@@ -41,7 +41,7 @@ STATUS_BITS = {
     12: "temperature too low",
     14: "CAN error",
 }
-"""What each bit of the status says; bit 15 says that any other is set."""
+"""Meaning of each bit of the status; bit 15 is set when any other is set."""
 UNUSABLE = sum(1 << bit for bit in (1, 2, 3, 4, 5, 6, 7, 11, 12))
 """Bits with which the readings are not to be used."""
 ANY_ERROR = 1 << 15
@@ -149,12 +149,12 @@ def decode_serial(reply: bytes) -> str:
 
 
 def is_saturated(gauges: NDArray[np.int16]) -> bool:
-    """Say whether any gauge stands at an end of its range: the whole wrench is then wrong."""
+    """Whether any gauge is at an end of its range: the whole wrench is then wrong."""
     return bool(((gauges <= GAUGE_MIN) | (gauges >= GAUGE_MAX)).any())
 
 
 def status_words(status: int) -> list[str]:
-    """Return what a status says, a phrase a bit; empty for a healthy device."""
+    """Return the meaning of a status, one phrase per bit; empty for a healthy device."""
     return [STATUS_BITS.get(bit, f"bit {bit} is set") for bit in range(15) if status >> bit & 1]
 
 

@@ -72,7 +72,7 @@ class AtiNet:
 
     @property
     def counts_per_unit(self) -> dict[str, float]:
-        """Counts a newton and a newton metre, as the device says; empty before it was asked."""
+        """Counts per newton and newton metre, from the device; empty before they are read."""
         if self._calibration is None:
             return {}
         slopes = self._calibration.slopes()
@@ -80,15 +80,15 @@ class AtiNet:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the network."""
+        """Counters of the network."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Ask for the calibration: units and counts per unit. Neither serial nor firmware is told.
+        """Read the calibration: units and counts per unit. Serial and firmware are not available.
 
         Raises:
             LinkTimeoutError: Nobody answers.
-            FrameError: The answer is no calibration.
+            FrameError: The answer is not a calibration.
         """
         link = self._open_calibration()
         try:
@@ -178,7 +178,7 @@ class AtiNet:
         stop_and_let_go(self.stop, self._transport.close)
 
     def _ask_again(self) -> None:
-        """Request the stream anew where it is to run; its records are numbered from 1 again."""
+        """Request the stream again where it is to run; its records are numbered from 1 again."""
         if self._streams:
             self._sequence.expect_restart()
             self._transport.write(protocol.encode_command(protocol.STREAM))
@@ -219,11 +219,11 @@ def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 100
     """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
 
     Args:
-        url: Where it is; the port is 49152 on every such device.
+        url: URL; the port is 49152 on every such device.
         rate_hz: The RDT rate set on its web page, 1 to 7000.
 
     Raises:
-        LinkError: The URL is no UDP address, or the host is out of reach.
+        LinkError: The URL is not a UDP address, or the host is out of reach.
     """
     host, _ = split_address(url)
     calibration = f"socket://{host}:{protocol.CALIBRATION_PORT}"

@@ -59,7 +59,7 @@ STATUS_BITS = {
     2: "internal temperature out of range",
     1: "web server failed",
 }
-"""What each bit of the status says; bit 31 says that any other is set."""
+"""Meaning of each bit of the status; bit 31 is set when any other is set."""
 N_PER_UNIT = {1: 4.4482216152605, 2: 1.0, 3: 4448.2216152605, 4: 1e3, 5: 9.80665, 6: 9.80665e-3}
 """By the code of the force unit: lbf, N, klbf, kN, kgf, gf."""
 N_M_PER_UNIT = {1: 0.1129848290276167, 2: 1.3558179483314004, 3: 1.0, 4: 1e-3, 5: 0.0980665, 6: 1e3}
@@ -68,7 +68,7 @@ N_M_PER_UNIT = {1: 0.1129848290276167, 2: 1.3558179483314004, 3: 1.0, 4: 1e-3, 5
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How counts become forces and torques.
+    """Conversion of counts to forces and torques.
 
     Attributes:
         force_unit: Code of the force unit.
@@ -103,7 +103,7 @@ def decode_command(datagram: bytes) -> tuple[int, int]:
         FrameError: It is none.
     """
     if len(datagram) != _COMMAND.size or datagram[:2] != HEADER.to_bytes(2, "big"):
-        raise FrameError("A datagram is no RDT request.")
+        raise FrameError("A datagram is not an RDT request.")
     _, command, samples = _COMMAND.unpack(datagram)
     return command, samples
 
@@ -132,10 +132,10 @@ def encode_calibration(calibration: Calibration) -> bytes:
 
 
 def decode_calibration(answer: bytes) -> Calibration:
-    """Return what the answer to `READ_CALIBRATION` says.
+    """Return the content of the answer to `READ_CALIBRATION`.
 
     Raises:
-        FrameError: It is no such answer, has an unknown unit, or zero counts a unit.
+        FrameError: It is not such an answer, has an unknown unit, or zero counts per unit.
     """
     if len(answer) != CALIBRATION_SIZE:
         raise FrameError(f"A calibration has {CALIBRATION_SIZE} bytes, not {len(answer)}.")
@@ -148,13 +148,13 @@ def decode_calibration(answer: bytes) -> Calibration:
 
 
 def status_words(status: int) -> list[str]:
-    """Return what a status says, a phrase a bit; empty for a healthy device."""
+    """Return the meaning of a status, one phrase per bit; empty for a healthy device."""
     return [
         STATUS_BITS.get(bit, f"bit {bit} is set") for bit in range(30, -1, -1) if status >> bit & 1
     ]
 
 
 def is_data_fault(status: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """Say whether each status makes its sample doubtful; a latched threshold alone does not."""
+    """Whether each status makes its sample doubtful; a latched threshold alone does not."""
     faulty: NDArray[np.bool_] = (status & ~np.uint32(SUMMARY | LATCHED)) != 0
     return faulty

@@ -7,9 +7,9 @@ from drivers.counters import DeviceCounters
 
 _WRAP = 2**32
 RESTART_STEP = 1000
-"""A number this far behind the newest is a device that began anew, not a late packet.
+"""A number this far behind the newest is from a restarted device, not from a late packet.
 
-A stream that the host has requested anew may begin anew at any number. Whether it does is open for
+A stream that the host has requested again may restart at any number. Whether it does is open for
 as many records: a device may as well go on counting.
 """
 
@@ -18,7 +18,7 @@ class RecordSequence:
     """The thread through a stream of records that may be lost, repeated or overtaken.
 
     Args:
-        counters: Where it is counted.
+        counters: Counters of its errors.
     """
 
     def __init__(self, counters: DeviceCounters) -> None:
@@ -37,11 +37,11 @@ class RecordSequence:
         self.lost = 0
 
     def expect_restart(self) -> None:
-        """Let the device's numbers begin anew once, because the host has asked for it."""
+        """Let the device's numbers restart once, because the host has requested it."""
         self._may_restart = RESTART_STEP
 
     def follow(self, numbers: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Say which records are new and in order, and number those from 0 since `restart`.
+        """Return which records are new and in order, with their numbers from 0 since `restart`.
 
         Args:
             numbers: `rdt_sequence` of the records as they came, shape (n,).

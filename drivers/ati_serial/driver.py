@@ -20,7 +20,7 @@ from drivers.transport.transport import Transport
 TRIES = 3
 REPLY_TIMEOUT_S = 0.2
 QUIET_S = 0.05
-"""A stream that was told to end has ended when nothing comes for this long, s."""
+"""A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
 GAUGE_LIMIT = 32767
 
@@ -33,7 +33,7 @@ class Assumptions:
 
     Attributes:
         matrix_by_rows: The calibration's matrix comes row by row, Fx first; else column by column.
-        force_unit: Code of the force unit, in place of the one the sensor tells; 0 for that one.
+        force_unit: Code of the force unit, in place of the one read from the sensor; 0 for that.
         torque_unit: Code of the torque unit, likewise.
         lock_answers: The sensor answers the function that locks its storage (0x6A).
     """
@@ -98,7 +98,7 @@ class AtiSerial:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line."""
+        """Counters of the line."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:

@@ -1,6 +1,6 @@
 """A digital F/T that takes and gives the bytes a real one would, a slow sine on its gauges.
 
-What it says in Modbus is a Modbus library's word (`modbus_server`), not this project's; the stream
+Its Modbus answers come from a Modbus library (`modbus_server`), not from this project; the stream
 and its end are here. Each write of the host is taken for one message, as the silence between
 messages marks them on a line. Not modelled: the time bytes take.
 """

@@ -45,7 +45,7 @@ class ModbusServer:
         self.streaming = False
 
     def registers(self, first: int, count: int) -> tuple[int, ...]:
-        """Return what registers hold."""
+        """Return the values of registers."""
         return tuple(self._store.devices[protocol.SLAVE].block["x"][2][first : first + count])
 
     def answer(self, message: bytes) -> bytes:
@@ -99,7 +99,7 @@ class ModbusServer:
 
 
 def _done(work: Coroutine[Any, Any, ModbusPDU]) -> ModbusPDU:
-    """Return what a coroutine that waits for nothing returns."""
+    """Return the result of a coroutine that never waits."""
     try:
         work.send(None)
     except StopIteration as end:

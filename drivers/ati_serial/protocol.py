@@ -34,7 +34,7 @@ _CALIBRATION = struct.Struct(">8s32s4s20s144sBB24sII6H6H")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """How gauges become forces and torques.
+    """Conversion of gauges to forces and torques.
 
     Attributes:
         serial: Serial number.
@@ -82,7 +82,7 @@ def decode(message: bytes) -> tuple[int, bytes]:
         FrameError: Too short, of another slave, or the CRC does not fit.
     """
     if len(message) < 4 or message[0] != SLAVE:
-        raise FrameError(f"{message[:8].hex(' ')} is no message of a digital F/T.")
+        raise FrameError(f"{message[:8].hex(' ')} is not a message of a digital F/T.")
     if crc16(message[:-2]) != int.from_bytes(message[-2:], "little"):
         raise FrameError("The CRC of a Modbus message does not fit.", "Bytes changed on the line.")
     return message[1], message[2:-2]
@@ -138,14 +138,14 @@ def encode_calibration(calibration: Calibration) -> bytes:
 
 
 def frame_checks(candidates: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Say of each row, shape (m, 13), whether its low 7 bits of checksum hold."""
+    """Return for each row, shape (m, 13), whether its low 7 bits of checksum are right."""
     sums = candidates[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F
     holds: NDArray[np.bool_] = sums == (candidates[:, 12] & 0x7F)
     return holds
 
 
 def decode_frames(frames: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the gauges in frames, shape (n, 6), and whether each says that the status is bad."""
+    """Return the gauges in frames, shape (n, 6), and whether each reports a bad status."""
     words = np.ascontiguousarray(frames[:, :12]).view(">i2").astype(np.int64)
     return words[:, FRAME_ORDER], (frames[:, 12] & 0x80) != 0
 

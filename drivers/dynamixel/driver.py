@@ -36,7 +36,7 @@ class Dynamixel:
     Args:
         transport: The way to the line; the device closes it.
         device_id: The drive's identifier.
-        rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         watchdog_ms: Silence after which an armed drive stops by itself, in steps of 20 ms.
         current_unit_a: Amperes a unit of current; 0 for what the model's e-Manual says.
     """

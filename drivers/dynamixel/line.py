@@ -40,7 +40,7 @@ class Line:
         """Whether the newest answer says that the device has a hardware error."""
 
     def read(self, register: Register) -> bytes:
-        """Return what a register holds.
+        """Return the value of a register.
 
         Raises:
             LinkTimeoutError: Nobody answers.

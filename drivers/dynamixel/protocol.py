@@ -157,7 +157,7 @@ def decode_ping(parameters: bytes) -> tuple[int, int]:
 
 
 def decode_present(data: bytes) -> Present:
-    """Return what the registers from 126 on hold.
+    """Return the values of the registers from 126 on.
 
     Raises:
         FrameError: They are not 21 bytes.

@@ -27,7 +27,7 @@ def open_epos4(
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
 
     Raises:
-        LinkError: The bus cannot be opened, an option is no drive's, or `canopen` is missing.
+        LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.
     """
     bus = open_can(url)
     try:

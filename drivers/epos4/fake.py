@@ -1,4 +1,4 @@
-"""An EPOS4 that speaks the frames a real one would, on the library's own CANopen server.
+"""An EPOS4 with the frames of a real one, on the library's own CANopen server.
 
 Errors act as in maxon's firmware specification (chapter 7 and objects 0x6007, 0x605E, 0x1029, as
 transcribed in the public library `Imcab/EposLib`): a lost heartbeat stops the drive as 0x6007 says
@@ -115,7 +115,7 @@ class Epos4Fake:
         self._node.add_write_callback(self._written)  # type: ignore[no-untyped-call]
         self._node.add_read_callback(self._asked)  # type: ignore[no-untyped-call]
         self._network.subscribe(0x80, lambda *_: self._synchronise())
-        self._node.nmt.state = "INITIALISING"  # says that it has booted
+        self._node.nmt.state = "INITIALISING"  # reports that it has booted
         self._node.nmt.state = "PRE-OPERATIONAL"
 
     # drivers.transport.simulated_can.CanNode
@@ -154,7 +154,7 @@ class Epos4Fake:
         out, self._network.out = self._network.out, []
         return out
 
-    # what a test may do to it and see
+    # controls and observations for tests
 
     @property
     def torque_n_m(self) -> float:

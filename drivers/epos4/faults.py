@@ -87,7 +87,7 @@ class DriveFaultError(DriverError):
     """The drive has a fault, or has left operation by itself.
 
     Attributes:
-        code: Its error code, 0 when it told none.
+        code: Its error code, 0 when it reported none.
     """
 
     def __init__(self, what: str, why: str = "", fix: str = "", code: int = 0) -> None:
@@ -96,13 +96,13 @@ class DriveFaultError(DriverError):
 
 
 def explain(code: int) -> tuple[str, str, str]:
-    """Return what an error code means: what, why, what to do."""
+    """Return the meaning of an error code: what, why, what to do."""
     if code in ERRORS:
         return ERRORS[code]
     for codes, words in _RANGES:
         if code in codes:
             return words
-    return ("The drive has an error this program does not know.", "", "Look it up in its manual.")
+    return ("The drive has an unknown error.", "", "Look it up in the drive's manual.")
 
 
 def fault(code: int) -> DriveFaultError:

@@ -22,7 +22,7 @@ def identify(link: "CanopenLink") -> tuple[DeviceIdentity, Ratings]:
     vendor = read(0x1018, 1)
     if vendor != protocol.VENDOR_ID:
         raise ProtocolMismatchError(
-            f"Node {link.node_id} on {link.bus.url} is no maxon drive.",
+            f"Node {link.node_id} on {link.bus.url} is not a maxon drive.",
             f"Its vendor number is {vendor:#x}, maxon's is {protocol.VENDOR_ID:#x}.",
             "Check the node number.",
         )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DRIVE_HEARTBEAT_MS = 100
 SILENT_S = 3.5 * DRIVE_HEARTBEAT_MS / 1000
-"""Longest silence of the drive that is no fault."""
+"""Longest silence of the drive that is not a fault."""
 HOST_NODE = 127
 """Node number under which the host sends its heartbeat."""
 STATE_TIMEOUT_S = 0.8

@@ -88,5 +88,5 @@ class PowerStage:
         self._node.wait(f"the state {wanted.value!r}", reached)
 
     def _state(self) -> State:
-        """Return the state, asked for: before the first SYNC no process data tell it."""
+        """Return the state by request: before the first SYNC no process data contain it."""
         return protocol.state_of(self._link.read(0x6041))

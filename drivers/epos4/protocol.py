@@ -72,15 +72,15 @@ _STATES = (
 
 
 def state_of(statusword: int) -> State:
-    """Return the state a statusword says.
+    """Return the state of a statusword.
 
     Raises:
-        FrameError: It says none.
+        FrameError: It contains none.
     """
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
-    raise FrameError(f"The statusword {statusword:#06x} says no state of CiA 402.")
+    raise FrameError(f"The statusword {statusword:#06x} is not a state of CiA 402.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def encode_feedback(feedback: Feedback) -> bytes:
 
 
 def decode_feedback(data: bytes) -> Feedback:
-    """Return what a TPDO1 says.
+    """Return the content of a TPDO1.
 
     Raises:
         FrameError: It has not 8 bytes.
@@ -136,7 +136,7 @@ class Ratings:
     """What the drive is set to, as read from it. Torques are the motor's, before any gearhead.
 
     Attributes:
-        rated_torque_n_m: Motor rated torque; torques are told in thousandths of it.
+        rated_torque_n_m: Motor rated torque; torques are in thousandths of it.
         torque_constant_n_m_per_a: Torque constant.
         nominal_current_a: Nominal current.
         current_limit_a: Output current limit, the one that takes effect.

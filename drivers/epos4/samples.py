@@ -11,7 +11,7 @@ def channels_of(ratings: Ratings | None, rate_hz: float) -> tuple[Channel, ...]:
     """Return position, torque and current of the motor, and the torque commanded.
 
     Args:
-        ratings: The drive's motor data; None where they are not known, which leaves no ends.
+        ratings: The drive's motor data; None where unknown; the range is then infinite.
         rate_hz: How often SYNC is sent.
     """
     torque = current = np.inf

@@ -1,7 +1,7 @@
 """What goes between a Teensy and an ESCON: set value as voltage or duty, actual current as voltage.
 
 The module has no data bus at run time. In ESCON Studio two points make the line of the set-value
-input and of each analog output; the same two points are written here. The twin on the board is
+input and of each analog output; the same two points are written here. The board's implementation is
 `firmware/boards/escon.hpp`.
 
 Sources: ESCON Module 24/2 Hardware Reference (2021-08), p. 3-20: PWM set value 10 Hz to 5 kHz, duty
@@ -67,7 +67,7 @@ class EsconWiring:
     Attributes:
         set_value: Voltage or duty of the set-value input, and the current it asks for.
         kind: `analog` for a DAC (Teensy 3.5), `pwm` for a duty (Teensy 4.1).
-        read_back: Voltage of the analog output, and the actual current it tells.
+        read_back: Voltage of the analog output, and the actual current it represents.
         limit_a: Current limit set in ESCON Studio.
         output_bits: Resolution of the DAC or of the PWM.
         output_v: Full scale of the DAC at the set-value input, V; behind an amplifier, its output.

@@ -38,7 +38,7 @@ class Moteus:
     Args:
         transport: The way to the fdcanusb; the device closes it.
         device_id: The controller's identifier.
-        rate_hz: How often it is asked. A question that went unanswered leaves a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         torque_limit_n_m: The most it may be commanded, at the output.
         watchdog_s: How long a command is valid.
     """
@@ -93,14 +93,14 @@ class Moteus:
 
         Raises:
             LinkTimeoutError: Nobody answers.
-            FrameError: What answers is no moteus.
+            FrameError: The answer is not of a moteus.
         """
         question = protocol.read(protocol.INT32, protocol.MODEL, 2)
         question += protocol.read(protocol.INT32, protocol.SERIAL, 3)
         found = self._link.ask(question, protocol.registers)
         wanted = [protocol.MODEL, protocol.MODEL + 1, *(protocol.SERIAL + k for k in range(3))]
         if not all(register in found for register in wanted):
-            raise FrameError(f"What answers as identifier {self._id} is no moteus.")
+            raise FrameError(f"What answers as identifier {self._id} is not a moteus.")
         model, firmware, *serial = (int(found[register]) & 0xFFFFFFFF for register in wanted)
         self._identified = True
         text = "".join(f"{part:08x}" for part in reversed(serial))

@@ -47,7 +47,7 @@ FAULTS = {
     46: "the firmware missed a deadline",
     48: "its position limits are beyond what it can count",
 }
-"""What a fault code says. Codes from 96 on say which limit acts; they are no faults."""
+"""Meaning of a fault code. Codes from 96 on name the active limit; they are not faults."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +146,13 @@ def registers(data: bytes) -> dict[int, float]:
     found: dict[int, float] = {}
     for operation, _, first, _, values in subframes(data):
         if operation != REPLY:
-            raise FrameError("A frame of a moteus is no answer.")
+            raise FrameError("A frame of a moteus is not an answer.")
         found |= {first + offset: value for offset, value in enumerate(values)}
     return found
 
 
 def decode_state(data: bytes) -> State:
-    """Return what the answer to `STATE_QUESTION` says.
+    """Return the content of the answer to `STATE_QUESTION`.
 
     Raises:
         FrameError: A register is missing, or a value is not finite.
@@ -202,12 +202,12 @@ def decode_line(line: bytes) -> tuple[int, bytes] | None:
     if not words or words == [b"OK"]:
         return None
     if words[0] not in (b"rcv", b"can") or len(words) < 3:
-        raise FrameError(f"{line[:40]!r} is no line of an fdcanusb.")
+        raise FrameError(f"{line[:40]!r} is not a line of an fdcanusb.")
     identifier, data = (words[2], words[3:4]) if words[0] == b"can" else (words[1], words[2:3])
     try:
         return int(identifier, 16), bytes.fromhex(data[0].decode("ascii"))
     except (ValueError, IndexError, UnicodeDecodeError) as error:
-        raise FrameError(f"{line[:40]!r} is no line of an fdcanusb.", "Bytes changed.") from error
+        raise FrameError(f"{line[:40]!r} is not an fdcanusb line.", "Bytes changed.") from error
 
 
 def _head(operation: int, kind: int, count: int, first: int) -> bytes:

@@ -19,7 +19,7 @@ TRIES = 3
 RATE_HZ = 1300.0
 REPLY_TIMEOUT_S = 0.2
 QUIET_S = 0.05
-"""A stream that was told to end has ended when nothing comes for this long, s."""
+"""A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
 
 
@@ -67,7 +67,7 @@ class Qia128:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line."""
+        """Counters of the line."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
@@ -152,7 +152,7 @@ class Qia128:
             if self._transport.now_s > give_up_s:
                 raise LinkTimeoutError(
                     f"The QIA128 at {self._transport.url} does not end its stream.",
-                    "It was told to and went on for 1 s.",
+                    "It continued for 1 s after the stop command.",
                     "Check the line to its receiver, and the bit rate.",
                 )
 
@@ -194,7 +194,7 @@ def open_qia128(
         unit: Unit of `rated_load`.
         rate_hz: Rate it is set to, samples a second.
         baud_rate: Bit rate of its UART; no public source gives it.
-        serial: Serial number from its label, for one that does not tell it as assumed.
+        serial: Serial number from its label, for one that does not report it as assumed.
 
     Raises:
         LinkError: The adapter cannot be opened.

@@ -81,7 +81,7 @@ def find_packet(data: bytes, command: tuple[int, int]) -> tuple[bytes, int] | No
 
 
 def frame_checks(candidates: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Say of each row, shape (m, 4), whether it is a reading with its checksum."""
+    """Return for each row, shape (m, 4), whether it is a reading with its checksum."""
     weighted = candidates[:, :3] * np.array([1, 2, 3], np.uint8)
     holds: NDArray[np.bool_] = weighted.sum(axis=1, dtype=np.uint8) == candidates[:, 3]
     return holds

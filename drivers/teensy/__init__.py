@@ -1,1 +1,1 @@
-"""The Teensy logger: its frames, its driver, and the fake that speaks for it."""
+"""The Teensy logger: its frames, its driver and its fake."""

@@ -1,7 +1,7 @@
 """The logger's frames on a CAN bus: the same payload and CRC, cut into 7-byte pieces, no COBS.
 
 Byte 0 of every CAN frame: bit 7 the first piece, bit 6 the last, bits 0 to 5 a counter that goes on
-from frame to frame. The twin is `firmware/core/can_segments.hpp`.
+from frame to frame. The board's side is `firmware/core/can_segments.hpp`.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ class Splitter:
 
 
 class Joiner:
-    """Puts pieces together. What a lost piece leaves is given as it is: its CRC fails."""
+    """Joins pieces. A frame with a lost piece is returned incomplete: its CRC fails."""
 
     def __init__(self) -> None:
         self._body = b""

@@ -1,4 +1,4 @@
-"""The logger on a CAN bus as a byte transport: the driver sees the bytes of a serial line."""
+"""The logger on a CAN bus as a byte transport: the driver receives the bytes of a serial line."""
 
 from drivers.framing import cobs_decode, cobs_encode
 from drivers.teensy.can_segments import BOARD_ID, HOST_ID, Joiner, Splitter

@@ -12,7 +12,7 @@ class Continuity:
     """The thread through a stream of samples.
 
     Args:
-        counters: Where gaps, lost samples and duplicates are counted.
+        counters: Counters of gaps, lost samples and duplicates.
     """
 
     def __init__(self, counters: LinkCounters) -> None:

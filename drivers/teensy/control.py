@@ -1,4 +1,4 @@
-"""The position controller the logger runs at 1 kHz, the twin of `firmware/core/control.hpp`.
+"""The position controller of the logger at 1 kHz, in Python (`firmware/core/control.hpp`).
 
 Signs are the rig's raw ones: on closing the spindle count and the command fall while the motor
 count rises. Both implementations do the same float64 operations in the same order, so that the
@@ -19,7 +19,7 @@ One command tick is 1e-4 of full scale."""
 
 
 def new_state() -> NDArray[np.float64]:
-    """Return the state of a controller that has seen no sample."""
+    """Return the initial state of a controller."""
     return np.zeros(4)
 
 
@@ -35,7 +35,7 @@ def control_tick(
 
     Args:
         state: Controller state, shape (4,), changed in place.
-        gains: Shape (5,), see `KP` and the names beside it.
+        gains: Shape (5,), see `KP` and the names next to it.
         target_count: Target of the spindle, encoder counts.
         spindle_count: Spindle encoder, counts.
         motor_count: Motor encoder, counts.

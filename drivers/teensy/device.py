@@ -25,8 +25,8 @@ class TeensyDevice:
 
     Args:
         transport: The way to the board; the device closes it.
-        wired: What the fields of a sample mean; raw counts if not said.
-        profile: What the board samples.
+        wired: Meaning of the fields of a sample; raw counts by default.
+        profile: Samples of the board.
     """
 
     name = "teensy"
@@ -55,11 +55,11 @@ class TeensyDevice:
         return self._counters.as_dict() | self.logger.counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Ask the board who it is and whether it speaks this program's protocol.
+        """Read the board's identity and check its protocol version.
 
         Raises:
             LinkTimeoutError: Nobody answers.
-            ProtocolMismatchError: It speaks another protocol.
+            ProtocolMismatchError: Its protocol differs.
         """
         identity = self.logger.identify()
         return DeviceIdentity("Teensy logger", identity.serial, identity.firmware_version)

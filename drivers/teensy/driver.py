@@ -26,9 +26,9 @@ from drivers.transport.transport import Transport
 
 FLASH = "Run: rig firmware flash"
 _REASONS: dict[int, tuple[str, str]] = {
-    Result.UNKNOWN_KIND: ("It does not know the command.", "Run: rig firmware flash"),
+    Result.UNKNOWN_KIND: ("The command is unknown to the board.", "Run: rig firmware flash"),
     Result.WRONG_SIZE: ("The command has the wrong size.", "Run: rig firmware flash"),
-    Result.WRONG_VERSION: ("It speaks another frame version.", "Run: rig firmware flash"),
+    Result.WRONG_VERSION: ("Its frame version differs.", "Run: rig firmware flash"),
     Result.BAD_VALUE: (
         "A value is not finite, out of its range, or beyond the limits it was armed with.",
         "Check gains, limits and setpoints.",
@@ -77,12 +77,12 @@ class ClockExchange:
 class TeensyLogger:
     """The logger on the other end of a transport. Nothing runs in the background.
 
-    While armed, the board wants to hear something every 250 ms: a block of setpoints or a
-    `heartbeat`; otherwise it makes itself safe.
+    While armed, the board needs a frame every 250 ms: a block of setpoints or a
+    `heartbeat`; otherwise it goes to its safe state.
 
     Args:
         transport: The way to the board; the logger closes it.
-        profile: What the board samples and moves.
+        profile: Samples and motors of the board.
     """
 
     def __init__(self, transport: Transport, profile: Profile = REFERENCE) -> None:
@@ -109,15 +109,15 @@ class TeensyLogger:
 
     @property
     def counters(self) -> LinkCounters:
-        """What happened on the link."""
+        """Counters of the link."""
         return self._link.counters
 
     def identify(self) -> Identity:
-        """Ask who is there and whether it speaks this program's protocol.
+        """Read the board's identity and check its protocol version.
 
         Raises:
             LinkTimeoutError: Nobody answers.
-            ProtocolMismatchError: It speaks another protocol; names both.
+            ProtocolMismatchError: Its protocol differs; the message names both.
         """
         self._link.break_frame()
         hello = protocol.encode_command(Kind.HELLO, self._number())
@@ -144,7 +144,7 @@ class TeensyLogger:
 
         Args:
             gains: `drivers.teensy.control`'s gains, shape (5,) or (motors, 5).
-            limits: What the board holds against every sample; of the profile's kind.
+            limits: Limits that the board checks on every sample; of the profile's kind.
 
         Raises:
             CommandRefusedError: A gain or a limit is not finite or out of range, or the board
@@ -227,7 +227,7 @@ class TeensyLogger:
                 return SampleBatch(*self._continuity.follow(samples), self._continuity.lost)
 
     def heartbeat(self) -> None:
-        """Tell the board that the host is there, and ask for its clock without waiting.
+        """Send a sign of life to the board, and request its clock without waiting.
 
         The answer, once read, is `last_exchange`.
         """
@@ -239,10 +239,10 @@ class TeensyLogger:
     def disarm(self) -> None:
         """Take the motors out of force: command 0, load 0, the queue cleared.
 
-        Works without `identify`. Returns only when the board has said that it is disarmed.
+        Works without `identify`. Returns only when the board has confirmed that it is disarmed.
 
         Raises:
-            DisarmUnconfirmedError: It has not said so; its state is unknown.
+            DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
         try:
             ack = self._simple(Kind.DISARM)
@@ -253,7 +253,7 @@ class TeensyLogger:
         self._may_be_armed = False
 
     def trip(self) -> TripReport:
-        """Ask what the board tripped over first since it was armed."""
+        """Read the first limit crossed since the board was armed."""
         question = protocol.encode_command(Kind.TRIP, self._number())
         return self._profile.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
 
@@ -271,7 +271,7 @@ class TeensyLogger:
 
     def _mismatch(self, theirs: str, why: str, fix: str = FLASH) -> ProtocolMismatchError:
         return ProtocolMismatchError(
-            f"The board at {self._link.transport.url} speaks {theirs}, this program"
+            f"The board at {self._link.transport.url} has {theirs}, this program"
             f" protocol {self._profile.protocol_hash:08x} ({self._profile.name}).",
             why,
             fix,
@@ -282,7 +282,7 @@ class TeensyLogger:
             f"The board at {self._link.transport.url} has not confirmed that it is disarmed.",
             why,
             "Take the motor for live and cut its supply. A working board makes itself safe"
-            f" {protocol.WATCHDOG_US // 1000} ms after the last command it heard.",
+            f" {protocol.WATCHDOG_US // 1000} ms after the last received command.",
         )
 
     def _require_identity(self) -> None:
@@ -314,7 +314,7 @@ class TeensyLogger:
         """Send a command and return the fields of the answer with its number.
 
         Raises:
-            FrameError: The answer is not laid out as this program knows it.
+            FrameError: The layout of the answer is unknown.
         """
         number = payload[2:4]
         answer = self._link.request(
@@ -326,7 +326,7 @@ class TeensyLogger:
         return fields
 
     def _take_replies(self) -> None:
-        """Note the pongs; count what nobody expected. Late acknowledgements are of no use."""
+        """Note the pongs; count unexpected frames. Late acknowledgements are of no use."""
         received_s = self._link.transport.now_s
         for payload in self._link.take_others():
             try:
@@ -355,7 +355,7 @@ _ACK = bytes([Kind.ACK])
 
 
 def _profile_named(protocol_hash: int) -> str:
-    """Say which of this program's profiles has that hash, if one has."""
+    """Return which of this program's profiles has that hash, if any."""
     named = [
         profile.name for profile in (REFERENCE, GRASPER) if protocol_hash == profile.protocol_hash
     ]

@@ -2,8 +2,8 @@
 
 The bench behind it is physics; this file is the board's logic, block by block instead of tick by
 tick: between two commands everything but a limit is known ahead, so one call of the bench and one
-bulk encode do for as many ticks. `firmware/core/board.hpp` is the twin that runs tick by tick; a
-test holds the two against each other byte for byte.
+bulk encode do for as many ticks. `firmware/core/board.hpp` is the implementation that runs tick by
+tick; a test compares the two byte for byte.
 
 For simulation only, where there is no compiler. The guards that hold encoders and current against
 one another (trips 15 to 19) are in the compiled core alone: this board takes their limits and does
@@ -89,8 +89,8 @@ class PythonBoard:
         bench: The physics.
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
-        protocol_hash: Protocol the board claims to speak; its profile's if None.
-        build_hash: Build the board claims to be.
+        protocol_hash: Protocol hash of the board; its profile's if None.
+        build_hash: Build hash of the board.
         logic: What its profile does a tick.
     """
 
@@ -156,11 +156,11 @@ class PythonBoard:
         return is_in_force(self._state)
 
     def set_clock(self, tick_us: int) -> None:
-        """Say what the board's clock will show at the next tick, where ticks are not regular."""
+        """Set the board's clock of the next tick, where ticks are not regular."""
         self._next_tick_us = tick_us % 2**32
 
     def skip(self, ticks: int) -> None:
-        """Let ticks pass that nobody ran: their samples are lost, their setpoints are played."""
+        """Let ticks pass without running them: samples are lost, setpoints are played."""
         self._queued = self._queued[ticks:]
         self._sequence = (self._sequence + ticks) % 2**32
         self._next_tick_us = (self._next_tick_us + ticks * self._profile.tick_us) % 2**32
@@ -355,7 +355,7 @@ class PythonBoard:
 
 
 def _reason_of_refusal(payload: bytes) -> Result:
-    """Say why `protocol.decode` refused a frame with a header."""
+    """Return why `protocol.decode` refused a frame with a header."""
     if payload[0] != protocol.VERSION:
         return Result.WRONG_VERSION
     if payload[1] not in [kind.value for kind in Kind if kind >= Kind.HELLO]:

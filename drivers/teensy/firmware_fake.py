@@ -53,10 +53,10 @@ class FirmwareBoard:
         serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         library: The shared library; the built one when None.
-        profile: What the board samples and moves.
+        profile: Samples and motors of the board.
 
     Raises:
-        FirmwareMissingError: There is no library.
+        FirmwareMissingError: The library is missing.
     """
 
     def __init__(

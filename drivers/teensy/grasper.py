@@ -1,7 +1,8 @@
 """The profile of the 3-DOF grasper: three motors, each in a position loop of its own, 2 kHz.
 
-The twin of `firmware/core/profile_grasper.hpp`. Motor 1 turns the yaw, 2 and 3 the two jaws. Every
-motor has its encoder, its current read-back, its force sensor, its limits and its guard.
+The board's side is `firmware/core/profile_grasper.hpp`. Motor 1 turns the yaw, 2 and 3 the two
+jaws. Every motor has its encoder, its current read-back, its force sensor, its limits and its
+guard.
 """
 
 from dataclasses import astuple, dataclass
@@ -63,7 +64,7 @@ GRASPER = Profile(
 
 @dataclass(frozen=True, slots=True)
 class AxisLimits:
-    """What the board holds against one motor's counts while armed.
+    """Limits that the board checks on one motor's counts while armed.
 
     Attributes:
         max_current: Largest size of the measured current, counts of 1 mA.
@@ -120,7 +121,7 @@ class AxisLimits:
 
 @dataclass(frozen=True, slots=True)
 class GrasperLimits:
-    """What the board holds against every sample while armed; what is not given, it does not hold.
+    """Limits that the board checks on every sample while armed; a missing limit is not checked.
 
     Attributes:
         axes: Limits of each motor.
@@ -142,7 +143,7 @@ class GrasperLimits:
 
     @property
     def valid(self) -> bool:
-        """Whether a board takes them: the twin of the checks in the firmware."""
+        """Whether a board accepts them, by the same checks as in the firmware."""
         return all(axis.valid for axis in self.axes) and choice_is_valid(self)
 
     def as_array(self) -> NDArray[np.int64]:

@@ -1,7 +1,7 @@
-"""What the grasper's board holds against every sample, and what a tick then gives its motors.
+"""The limit checks of the grasper's board on every sample, and the motor commands of a tick.
 
-The twin of `check` and `drive` of `firmware/core/profile_grasper.hpp`, as `drivers.teensy.guard` is
-of the reference rig's.
+`check` and `drive` of `firmware/core/profile_grasper.hpp` in Python, as `drivers.teensy.guard` for
+the reference rig.
 """
 
 from collections.abc import Sequence
@@ -217,7 +217,7 @@ def first_crossing(
     guard: NDArray[np.int64],
     limits: NDArray[np.int64],
 ) -> tuple[int, int, int, int, int, int]:
-    """Hold the limits against rows of inputs; see `drivers.teensy.guard.first_crossing`."""
+    """Check the limits on rows of inputs; see `drivers.teensy.guard.first_crossing`."""
     for k in range(len(rows)):
         for motor in range(MOTORS if guard[PRIMED] else 0):
             watch = guard[MOTOR_WATCH + MOTOR_PLACES * motor :]

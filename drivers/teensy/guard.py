@@ -1,8 +1,8 @@
-"""What an armed board holds against every sample, and what a tick then gives the motors.
+"""The limit checks of an armed board on every sample, and the motor commands of a tick.
 
-The twin of `check` and `drive` of `firmware/core/profile_reference.hpp`: the same whole-number
-operations in the same order, so that fake and firmware answer with the same bytes. Counts and
-ticks throughout; what a limit means is said in `drivers.teensy.reference.Limits`.
+`check` and `drive` of `firmware/core/profile_reference.hpp` in Python: the same integer operations
+in the same order, so that fake and firmware answer with the same bytes. Counts and ticks
+throughout; `drivers.teensy.reference.Limits` documents the limits.
 """
 
 from dataclasses import dataclass, field

@@ -1,7 +1,7 @@
-"""What differs from board to board: what is sampled and asked for, how often, within which limits.
+"""The differences between boards: samples, setpoints, rate and limits.
 
-A profile is the twin of a class in `firmware/core/profile_*.hpp`. Its `text` is the contract both
-sides hash: `firmware/core` holds the same text, and its CRC-32 is compared before anything moves.
+A profile corresponds to a class in `firmware/core/profile_*.hpp`. Its `text` is the contract that
+both sides hash: `firmware/core` has the same text, and its CRC-32 is compared before any motion.
 """
 
 import zlib
@@ -66,7 +66,7 @@ class SafetyChoice(Protocol):
 
 
 def choice_is_valid(choice: SafetyChoice) -> bool:
-    """Say whether a board takes these, as `SafetyChoice::valid` of the firmware does."""
+    """Whether a board accepts these, as `SafetyChoice::valid` of the firmware."""
     return (
         min(choice.stall_ticks, choice.saturated_ticks, choice.stale_ticks) >= 1
         and MIN_WATCHDOG_US <= choice.watchdog_us <= MAX_WATCHDOG_US
@@ -77,7 +77,7 @@ def choice_is_valid(choice: SafetyChoice) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A kind of board, as its frames tell it.
+    """A kind of board, as described by its frames.
 
     Attributes:
         name: Its name: in the host library, in messages, in configurations.
@@ -194,10 +194,10 @@ class Profile:
         return np.frombuffer(payload, self.setpoint, offset=HEADER_DTYPE.itemsize)
 
     def decode_trip_report(self, fields: np.void) -> TripReport:
-        """Return what a board says it tripped over.
+        """Return the crossed limit that a board reports.
 
         Raises:
-            FrameError: It gives a reason this program does not know.
+            FrameError: The reported reason is unknown.
         """
         code, channel = int(fields["code"]), int(fields["channel"])
         if code not in Trip.__members__.values():

@@ -1,9 +1,8 @@
-"""What the logger and the host say to each other, whatever is wired to the logger.
+"""The protocol between logger and host, independent of the wiring of the logger.
 
 Every payload begins with `version u1, kind u1`. All but the sample go on with `sequence u2`: the
-host's command number, which the answer repeats. Which sample, setpoints and limits go with these
-frames is said by a board's profile (`drivers.teensy.profile`): the reference rig's, or the
-grasper's.
+host's command number, which the answer repeats. A board's profile (`drivers.teensy.profile`)
+defines the sample, setpoints and limits of these frames: the reference rig's, or the grasper's.
 """
 
 from dataclasses import dataclass
@@ -15,8 +14,8 @@ VERSION = 1
 QUEUE_CAPACITY = 2000
 """Setpoints the board holds: two seconds of motion at 1 kHz."""
 WATCHDOG_US = 250_000
-"""Board time without a valid host frame after which an armed board makes itself safe, where the
-host does not ask for another."""
+"""Board time without a valid host frame after which an armed board goes to its safe state, unless
+the host sets another time."""
 MIN_WATCHDOG_US, MAX_WATCHDOG_US = 5_000, 1_000_000
 MISSING = -(2**31)
 """Count of a sensor that gave nothing: a whole number's NaN."""
@@ -166,7 +165,7 @@ class TripReport:
         code: What it was.
         channel: Name of the count that crossed; empty where it was none.
         value: That count; for the host's silence its length, us; for heat, counts^2 s.
-        limit: What it was held against.
+        limit: The crossed limit.
         tick_us: Board clock at the trip.
         late_us: How long the crossing had lasted by then.
     """
@@ -270,7 +269,7 @@ def encode_pong(sequence: int, token: int, tick_us: int) -> bytes:
 
 
 def decode_identity(fields: np.void) -> Identity:
-    """Return what a hello reply says."""
+    """Return the content of a hello reply."""
     return Identity(
         serial=bytes(fields["serial"]).decode("ascii", "replace"),
         firmware_version=version_text(int(fields["firmware_version"])),
@@ -280,7 +279,7 @@ def decode_identity(fields: np.void) -> Identity:
 
 
 def decode_ack(fields: np.void) -> Ack:
-    """Return what an acknowledgement says."""
+    """Return the content of an acknowledgement."""
     return Ack(
         sequence=int(fields["sequence"]),
         command=int(fields["command"]),

@@ -1,6 +1,6 @@
 """The profile of the reference rig: a drive motor over the spindle, a load motor, 1 kHz.
 
-The twin of `firmware/core/profile_reference.hpp`.
+The board's side is `firmware/core/profile_reference.hpp`.
 """
 
 from dataclasses import astuple, dataclass
@@ -90,7 +90,7 @@ REFERENCE = Profile(
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the board holds against every sample while armed, in counts; beyond it, it is safe.
+    """Limits that the board checks on every sample while armed, in counts.
 
     What has a default is not held unless it is given.
 
@@ -189,7 +189,7 @@ class Limits:
 
     @property
     def valid(self) -> bool:
-        """Whether a board takes them: the twin of `Limits::valid` in the firmware."""
+        """Whether a board accepts them, as `Limits::valid` in the firmware."""
         sizes = (
             *(self.max_current, self.max_load_ma, self.max_proximal, self.max_distal),
             *(self.max_motor_step, self.continuous_current, self.i2t),

@@ -1,7 +1,7 @@
 """The watches every profile's guard is made of: of a motor, of sensors, and what a trip does.
 
-The twins of `motor_guard.hpp` and `sensor_guard.hpp` in `firmware/core` and of the latch in
-`board.hpp`: the same whole-number operations in the same order, so that fake and firmware answer
+`motor_guard.hpp` and `sensor_guard.hpp` of `firmware/core` and the latch of `board.hpp` in Python:
+the same integer operations in the same order, so that fake and firmware answer
 with the same bytes. Counts and ticks throughout.
 """
 
@@ -80,7 +80,7 @@ def motor_crossing(  # type: ignore[no-untyped-def]
 
     Args:
         watch: State of this motor's watch, `MOTOR_PLACES` places, changed in place.
-        limits: Its limits, `MAX_STEP` and the names beside it.
+        limits: Its limits, `MAX_STEP` and the names next to it.
         max_stall: Ticks it may be stalled.
         tick_us: Period of a tick.
         motor: Its encoder.
@@ -148,7 +148,7 @@ def sensor_crossing(watch, limits, tick_us, counts, first, low, high):  # type: 
 
 @numba.njit(cache=True)
 def judge_by_time(watch, motor, ticks):  # type: ignore[no-untyped-def]
-    """Let a motor's watch see the way of one tick where more time than that has passed.
+    """Scale a motor's travel to one tick where more time than that has passed.
 
     Args:
         watch: State of this motor's watch, changed in place.
@@ -192,5 +192,5 @@ def silence(guard, limits):  # type: ignore[no-untyped-def]
 
 
 def is_in_force(state: Any) -> bool:
-    """Say whether a board in this state may give its motors current."""
+    """Whether a board in this state may give its motors current."""
     return bool(int(state) & (STATUS_ARMED | STATUS_HOLDING))

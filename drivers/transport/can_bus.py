@@ -44,7 +44,7 @@ class CanFrame:
 
 @dataclass(slots=True)
 class CanCounters:
-    """What happened on a bus since it was opened.
+    """Counters of a bus since it was opened.
 
     Attributes:
         received: Data frames received.
@@ -52,7 +52,7 @@ class CanCounters:
         error_frames: Error frames the controller reported.
         bus_off: Times the controller took itself off the bus.
         overruns: Times the controller reported that it had to drop received frames.
-        echoes: Own frames that the interface gave back; they are not passed on.
+        echoes: Own frames that the interface returned; they are not passed on.
         ignored: Remote frames and frames of more than 8 bytes; they are not passed on.
     """
 
@@ -84,7 +84,7 @@ class CanBus(Protocol):
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         ...
 
     def send(self, frame: CanFrame) -> None:
@@ -100,7 +100,7 @@ class CanBus(Protocol):
         """Return the next frame, or None when none came in `timeout_s`.
 
         Raises:
-            LinkLostError: The bus is gone; every later call says so again.
+            LinkLostError: The bus is gone; every later call raises it again.
         """
         ...
 

@@ -1,7 +1,7 @@
 """A bad cable: faults on what a device sends, around any transport, repeatable by a seed.
 
 Time is the inner transport's own, so that a fault that lasts takes no real time on a simulated one.
-`Faults` knows nothing of transports; a bus that is none can ask it what becomes of each message.
+`Faults` is independent of transports; a bus can use it for each message, too.
 """
 
 import random
@@ -72,7 +72,7 @@ class Faults:
             self._waiting.extend([(fault, duration_s)] * count)
 
     def pass_on(self, chunk: bytes, now_s: float, whole: bool) -> list[tuple[float, bytes]]:
-        """Return what becomes of a chunk: pieces, each with the time from which it may be read.
+        """Return a chunk with faults: pieces, each with the time from which it may be read.
 
         Args:
             chunk: Bytes from the device; a packet where `whole`.
@@ -126,7 +126,7 @@ class Faults:
 
 
 Tap = Callable[[bytes], bytes]
-"""Changes bytes on their way; what it returns goes on in their place."""
+"""Changes bytes on their way; the returned bytes replace them."""
 
 
 class FaultyTransport:

@@ -1,8 +1,8 @@
 """Fakes on a CAN bus at the pace of real time, served by whoever waits on the bus; no thread.
 
-Their clock goes in ticks of 1 ms, each when the clock on the wall says so. Where this computer was
-kept from it, the ticks that are due follow one another at once, as a firmware process on a
-pseudo-terminal does it: the fakes' world is late then, and nothing in it is lost or torn.
+Their clock goes in ticks of 1 ms, by the wall clock. After a delay of this computer the ticks that
+are due follow one another at once, as a firmware process on a pseudo-terminal does it: the fakes'
+world is late then, and nothing in it is lost or torn.
 """
 
 import time
@@ -41,7 +41,7 @@ class LiveCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._bus.counters
 
     def send(self, frame: CanFrame) -> None:
@@ -77,7 +77,7 @@ class LiveCanBus:
         self._answer()
 
     def _answer(self) -> None:
-        """Let the nodes say what they have to say."""
+        """Let the nodes send their pending frames."""
         for node in self._nodes:
             for answer in node.transmit():
                 self._theirs.send(answer)

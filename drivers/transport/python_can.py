@@ -46,7 +46,7 @@ def _yes(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Interface:
-    """What a URL may say about an interface of python-can."""
+    """The options of an interface of python-can in a URL."""
 
     options: dict[str, Callable[[str], Any]]
     fixed: dict[str, Any]
@@ -69,7 +69,7 @@ class PythonCanBus:
     Args:
         url: The URL the user gave, for messages.
         bus: The open interface; closed with this.
-        echoes: Whether the interface gives own frames back. Each is then dropped once.
+        echoes: Whether the interface returns own frames. Each is then dropped once.
     """
 
     def __init__(self, url: str, bus: can.BusABC, echoes: bool = False) -> None:
@@ -92,7 +92,7 @@ class PythonCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._counters
 
     def send(self, frame: CanFrame) -> None:
@@ -200,7 +200,7 @@ def open_can(url: str) -> CanBus:
 
     Raises:
         UnknownSchemeError: No such interface.
-        PortNotFoundError: There is no such bus.
+        PortNotFoundError: The bus does not exist.
         PortBusyError: Another program holds it.
         PortPermissionError: The user may not open it.
         LinkError: An option is unknown or has no such value, or python-can refuses.
@@ -269,7 +269,7 @@ def _explain(url: str, name: str, channel: str, error: Exception) -> LinkError:
     if code == errno.EAFNOSUPPORT:
         return LinkError(
             f"{url} cannot be opened.",
-            "The kernel of this computer knows no CAN.",
+            "The kernel of this computer has no CAN support.",
             "Run: sudo modprobe can_raw; or use an slcan or gs_usb adapter.",
         )
     return LinkError(f"{url} cannot be opened.", f"{error}.", up if name == "socketcan" else "")

@@ -69,7 +69,7 @@ class SerialTransport:
         try:
             if isinstance(self._port, serial.Serial):
                 return self._read_port(timeout_s)
-            self._set_timeout(timeout_s)  # a socket does not know how much is waiting
+            self._set_timeout(timeout_s)  # a socket has no count of waiting bytes
             first = bytes(self._port.read(1))
             if not first:
                 return b""
@@ -103,8 +103,8 @@ class SerialTransport:
         self._port.close()
 
     def _read_port(self, timeout_s: float) -> bytes:
-        """Return what a port has; pyserial would set the port up anew for every new timeout."""
-        if sys.platform == "win32":  # its ports are no file descriptors
+        """Return the waiting bytes; pyserial would configure the port again for every timeout."""
+        if sys.platform == "win32":  # its ports are not file descriptors
             self._set_timeout(timeout_s)
             return bytes(self._port.read(max(1, self._port.in_waiting)))
         descriptor = self._port.fileno()
@@ -191,7 +191,7 @@ def find_usb_port(url: str) -> str:
         vendor, product = int(parts[1], 16), int(parts[2], 16)
     except (IndexError, ValueError) as error:
         raise PortNotFoundError(
-            f"{url!r} is no USB identity.", "", "Write it as usb:16c0:0483:SERIAL."
+            f"{url!r} is not a USB identity.", "", "Write it as usb:16c0:0483:SERIAL."
         ) from error
     ports = list(list_ports.comports())
     matching = [port for port in ports if (port.vid, port.pid) == (vendor, product)]
@@ -205,7 +205,7 @@ def find_usb_port(url: str) -> str:
 
 
 def port_holders(path: str) -> list[str]:
-    """Return the processes that hold a device open, as `PID 123 (name)`, as far as Linux tells."""
+    """Return the processes that hold a device open, as `PID 123 (name)`; Linux only."""
     device = Path(path).resolve()
     holders = []
     for process in sorted(Path("/proc").glob("[0-9]*"), key=lambda found: int(found.name)):
@@ -258,7 +258,7 @@ def _group(path: str) -> str:
 
 
 def _join(path: str) -> str:
-    """Say what gives the user access to a device."""
+    """Return how the user gets access to a device."""
     try:
         shared = Path(path).stat().st_mode & stat.S_IRGRP
     except OSError:

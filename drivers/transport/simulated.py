@@ -1,7 +1,7 @@
 """A board inside this process, in virtual time.
 
-Time passes only while someone reads: `read` advances the board. Nothing sleeps unless a pace is
-asked for, so a session is repeatable and as fast as the board computes.
+Time passes only during a read: `read` advances the board. Nothing sleeps unless a pace is
+requested, so a session is repeatable and as fast as the board computes.
 
 Not modelled: the time bytes take on the wire, and a host that is late (see the faults of a board's
 own tests for lost and damaged bytes).
@@ -14,11 +14,11 @@ from typing import Protocol
 from drivers.errors import LinkLostError
 
 TICK_S = 1e-3
-"""A tick of a board, where no other is said."""
+"""Default tick of a board."""
 
 
 class Board(Protocol):
-    """What speaks bytes and lives by ticks: a fake or the firmware itself."""
+    """A simulated board with bytes and ticks: a fake or the firmware itself."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""

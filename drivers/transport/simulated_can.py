@@ -16,7 +16,7 @@ TICK_S = 1e-3
 
 
 class CanNode(Protocol):
-    """What speaks frames and lives by ticks of 1 ms: a fake, or the firmware itself."""
+    """A simulated node with frames and ticks of 1 ms: a fake, or the firmware itself."""
 
     def receive(self, frame: CanFrame) -> None:
         """Take a frame from the bus."""
@@ -59,7 +59,7 @@ class SimulatedCanBus:
 
     @property
     def counters(self) -> CanCounters:
-        """What happened on the bus."""
+        """Counters of the bus."""
         return self._counters
 
     def send(self, frame: CanFrame) -> None:

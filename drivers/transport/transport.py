@@ -28,7 +28,7 @@ class Transport(Protocol):
         Returns no bytes when none came in time.
 
         Raises:
-            LinkLostError: The link is gone; every later call says so again.
+            LinkLostError: The link is gone; every later call raises it again.
         """
         ...
 
@@ -58,7 +58,7 @@ def register_scheme(scheme: str, opener: Opener) -> None:
 
 
 def known_schemes() -> list[str]:
-    """Return the schemes `open_transport` knows, sorted."""
+    """Return the schemes of `open_transport`, sorted."""
     return sorted(_openers)
 
 

@@ -1,7 +1,7 @@
 """UDP to one device: `udp:HOST:PORT`. Each read is one datagram.
 
-The socket is connected: the kernel drops datagrams from anyone else. Nothing listens for strangers;
-`listen_udp`, for fakes in another process, does so on the loopback interface unless told otherwise.
+The socket is connected: the kernel drops datagrams from anyone else. Only `listen_udp` accepts
+unknown senders, for fakes in another process, by default on the loopback interface.
 """
 
 import select
@@ -12,7 +12,7 @@ from drivers.errors import LinkError, LinkLostError
 
 LARGEST_DATAGRAM = 65535
 RECEIVE_BUFFER = 1 << 20
-"""Bytes the kernel is asked to hold for a reader that is late: seconds of a 7 kHz stream."""
+"""Receive buffer of the kernel for a late reader, bytes: seconds of a 7 kHz stream."""
 
 
 class UdpTransport:
@@ -102,7 +102,7 @@ def open_udp(url: str) -> UdpTransport:
 
 
 def listen_udp(port: int = 0, host: str = "127.0.0.1") -> socket.socket:
-    """Return a socket that takes datagrams, on the loopback interface unless told otherwise.
+    """Return a socket that receives datagrams, by default on the loopback interface.
 
     Args:
         port: Port; any free one when 0.
@@ -122,6 +122,6 @@ def split_address(url: str) -> tuple[str, int]:
     host, colon, port = url.removeprefix("udp:").removeprefix("//").rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) < 65536):
         raise LinkError(
-            f"{url!r} is no UDP address.", "It needs a host and a port.", "Write udp:HOST:PORT."
+            f"{url!r} is not a UDP address.", "It needs a host and a port.", "Write udp:HOST:PORT."
         )
     return host.strip("[]"), int(port)

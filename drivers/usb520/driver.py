@@ -1,4 +1,4 @@
-"""The driver of a USB520 in its text mode: it cannot be asked, only listened to."""
+"""The driver of a USB520 in its text mode: it streams and accepts no commands."""
 
 from typing import Annotated
 
@@ -48,11 +48,11 @@ class Usb520:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What happened on the line; bad lines are `crc_errors`."""
+        """Counters of the line; bad lines are `crc_errors`."""
         return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Wait for a whole line. The device tells no name and no number.
+        """Wait for a whole line. The device reports no name and no number.
 
         Raises:
             LinkTimeoutError: No such line comes.
@@ -113,7 +113,7 @@ class Usb520:
         )
 
     def stop(self) -> None:
-        """Do nothing: the device cannot be told to be silent."""
+        """Do nothing: the device cannot be stopped."""
 
     def close(self) -> None:
         """Let go of the port."""

@@ -1,8 +1,8 @@
-"""An arm's joints as balances of a diagnosis: `joint.N`, declared by the arm's own model.
+"""The torque equations of an arm's joints for a diagnosis: `joint.N`, declared by the arm's model.
 
-What the links need is one torque with parameters that all joints share (`estimation.arm.shared`).
-What belongs to a joint alone (friction, spring, drive inertia, offset) is declared in its balance,
-so that it is fitted anew beside every candidate.
+The links' torque has parameters that all joints share (`estimation.arm.shared`). The terms of one
+joint (friction, spring, drive inertia, offset) are declared in its equation, so that they are
+fitted again together with every candidate.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,21 +25,21 @@ ARMS = (PSM,)
 """Arms that recordings may be of."""
 
 CORRECTIONS = 3
-"""Changes of the links' parameters that each joint's balance fits anew beside every candidate."""
+"""Corrections of the links' parameters that each joint's equation fits with every candidate."""
 
 OWN = ("F", "Ke", "Ia", "tau0")
-"""How the names of parameters begin that belong to one joint and are declared in its balance."""
+"""Prefixes of the names of parameters that belong to one joint and are declared in its equation."""
 
 
 SAMPLES = 300
-"""Random samples that tell how many changes of the links a joint feels."""
+"""Random samples that determine how many corrections of the links are identifiable at a joint."""
 
 Columns = Callable[[Motion], FloatArray]
 
 
 @dataclass(frozen=True)
 class ArmBalances:
-    """An arm's joints as balances.
+    """The torque equations of an arm's joints.
 
     Attributes:
         name: The arm.
@@ -63,7 +63,7 @@ class ArmBalances:
 
 
 def balances_of(recording: Recording) -> ArmBalances | None:
-    """Return the balances of the arm whose joints a recording holds, or None for none known.
+    """Return the equations of the arm whose joints a recording contains; None for an unknown arm.
 
     The joints' kinds decide; joints beyond the arm's own, such as a gripper's, may follow.
     """
@@ -76,11 +76,11 @@ def balances_of(recording: Recording) -> ArmBalances | None:
 
 
 def serial(arm: Arm, recording: Recording) -> ArmBalances:
-    """Return the balances of a serial arm.
+    """Return the torque equations of a serial arm.
 
     Args:
         arm: The arm.
-        recording: Any of its recordings; tells the channels' names.
+        recording: Any of its recordings, for the channels' names.
     """
     names, base = joint_names(recording), base_of(arm)
     shared = np.array([not serial_names(arm)[k].startswith(OWN) for k in base.columns])
@@ -116,10 +116,10 @@ def serial(arm: Arm, recording: Recording) -> ArmBalances:
 
 
 def closed(chain: ClosedChain, sign_rad_s: float) -> ArmBalances:
-    """Return the balances of an arm with closed loops that pressures drive.
+    """Return the torque equations of a pressure-driven arm with closed loops.
 
-    Its first bodies are those of the actuated joints: their frictions are the joints' own, those of
-    the loops' bodies are shared. Pressures have a zero, so no run has an offset of its own.
+    Its first bodies are those of the actuated joints: their frictions belong to the joints, those
+    of the loops' bodies are shared. Pressures have a true zero, so runs have no separate offsets.
 
     Args:
         chain: The arm.
@@ -160,7 +160,7 @@ def _of_every_joint(own: JointNames, changes: int) -> list[Term]:
 
 
 def _changes(columns: Columns, shared: NDArray[np.bool_], joints: int) -> list[int]:
-    """Return how many changes of the links each joint can tell beside their torque."""
+    """Return how many corrections of the links are identifiable at each joint."""
     position, velocity, acceleration = np.random.default_rng(0).uniform(-1, 1, (3, SAMPLES, joints))
     table = columns(Motion(position, velocity, acceleration, 1.0))[:, :, shared]
     ranks = [int(np.linalg.matrix_rank(table[:, k])) for k in range(joints)]

@@ -1,7 +1,7 @@
-"""Base parameters: the combinations of an arm's parameters that its joint torques can tell.
+"""Base parameters: the combinations of an arm's parameters identifiable from its joint torques.
 
 M. Gautier, "Numerical calculation of the base inertial parameters of robots", 1991: a QR
-decomposition of the regressor at random motions tells which columns depend on those before them.
+decomposition of the regressor at random motions shows which columns depend on those before them.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from estimation.recording import FloatArray
 SAMPLES = 500
 BESIDE = 100
 DEPENDENT = 1e-9
-"""Share of its own norm below which what is left of a column is rounding."""
+"""Relative norm below which the residual of a column is rounding."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def _rank(name: str) -> tuple[int, int]:
 
 
 def _independent(columns: FloatArray) -> NDArray[np.bool_]:
-    """Say of each unit column whether it depends on those before it."""
+    """Return for each unit column whether it depends on those before it."""
     left = np.abs(np.diag(np.linalg.qr(columns, mode="r")))
     return np.asarray(left > DEPENDENT)
 

@@ -25,13 +25,13 @@ class ClosedChain:
     """An arm with closed loops.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         bodies: The spanning tree, parents first.
         tip: The fixed row from the tip's body to the tip.
         tip_body: Number of the tip's body, from 1.
         reach: Half the range of each actuated joint around zero, rad.
         gravity_m_s2: Gravity in the base frame.
-        source: Where the numbers come from, and what is assumed.
+        source: Source of the numbers, and what is assumed.
     """
 
     name: str

@@ -33,8 +33,8 @@ class Consistent:
     """A physically consistent fit.
 
     Attributes:
-        values: All parameters, in the order of `estimation.arm.regressor.names`; those that the
-            torques do not tell are the smallest that are consistent.
+        values: All parameters, in the order of `estimation.arm.regressor.names`; those that are
+            not identifiable from the torques get the smallest consistent values.
         base: Their base parameters, in the order of `estimation.arm.base.base_of`.
     """
 
@@ -95,7 +95,8 @@ def consistent_fit(
     ).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
         raise ArmError(
-            "No physically consistent parameters were found.", f"Clarabel says: {found.status}."
+            "No physically consistent parameters were found.",
+            f"Status of Clarabel: {found.status}.",
         )
     values = np.array(found.x) / length
     return Consistent(values, mapping @ values)
@@ -116,7 +117,7 @@ def pseudo_inertia(link: FloatArray) -> FloatArray:
 
 
 def _cones(clarabel: Any, arm: Arm) -> tuple[FloatArray, list[Any]]:
-    """Return rows that must lie in the cones: pseudo-inertias, then what is not negative."""
+    """Return rows that must lie in the cones: pseudo-inertias, then non-negative parameters."""
     every = names(arm)
     place = {name: k for k, name in enumerate(every)}
     blocks, cones = [], []

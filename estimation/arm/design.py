@@ -45,7 +45,7 @@ def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
         return Excitation(table[-1], table[:HARMONICS], table[HARMONICS:-1])
 
     def room(flat: FloatArray) -> FloatArray:
-        """Return what is left to each limit, as a share of it; not negative within."""
+        """Return the margin to each limit, relative to it; not negative within the limits."""
         motion = excitation(flat).motion(time)
         middle = (lower + upper) / 2
         moved = np.stack([motion.position - middle, motion.velocity, motion.acceleration])

@@ -1,7 +1,7 @@
 """Effects an arm's torque may hold beyond the thesis' model, each as columns by name.
 
 The rows of the columns are the arm's joints and, where cables couple a gripper to the wrist, the
-gripper: what its motor feels is felt in the wrist, so its torque helps to tell.
+gripper: the wrist carries the load of its motor, so its torque improves the identification.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ RIPPLE_ORDERS = (8, 12, 16, 20, 24, 32)
 """Periods of a ripple tried in 2 pi rad of a revolute joint: gear and motor orders are unknown."""
 
 TRACK_DAMPING = 100.0
-"""Times the common damping: most of a track's knots are hardly visited."""
+"""Factor on the common damping: most of a track's knots are rarely visited."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class ArmEffect:
     """One effect, as further columns of the torque regressor.
 
     Attributes:
-        name: What it is called, with its joint.
-        what: What it is, in one line.
+        name: Name, with its joint.
+        what: Description in one line.
         columns: Columns along a motion, shape (n, rows, parameters).
         dissipative: Whether physics forbids negative parameters.
         damping: How many times the common damping its fit gets.

@@ -13,7 +13,7 @@ from estimation.recording import FloatArray
 
 
 def slip(position: FloatArray, threshold: float) -> FloatArray:
-    """Return the stretch of elastic-slip elements, as a share of the one at which they slip.
+    """Return the deflection of elastic-slip elements, relative to that at which they slip.
 
     Args:
         position: Shape (n, drives); the elements start relaxed, so what they give is history-free
@@ -35,7 +35,7 @@ def _stretch(position, threshold):  # type: ignore[no-untyped-def]
 
 
 def creep(velocity: FloatArray, time_constant_s: float, period_s: float) -> FloatArray:
-    """Return the velocity that a damper sees behind a spring (one Maxwell element), at rest first.
+    """Return the velocity of a damper in series with a spring (a Maxwell element), 0 at the start.
 
     Args:
         velocity: Shape (n, ...).

@@ -1,7 +1,7 @@
-"""Finite Fourier series that tell an arm's parameters, with bounds that hold at every instant.
+"""Finite Fourier series that excite an arm's parameters, with bounds valid at every instant.
 
 Equation 2.14 of G. A. Piqué's thesis, five harmonics of 0.1 Hz; the condition number of the
-regressor with columns of unit length (equation 2.15) is what tells a good one; the searches are in
+regressor with columns of unit length (equation 2.15) is the criterion; the searches are in
 `estimation.arm.design`.
 """
 
@@ -21,7 +21,7 @@ GRID = 2000
 """Instants of a period at which limits are looked at; between them the series' slope bounds it."""
 
 JUDGED = 80
-"""Instants at which the regressor is taken: its condition hardly changes with more."""
+"""Instants at which the regressor is computed; with more, its condition number barely changes."""
 
 ACCELERATION_PER_SPEED = 4.0
 """Limit of acceleration, as a multiple of the speed limit, 1/s; assumed, the thesis states none."""

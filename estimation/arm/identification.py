@@ -11,7 +11,7 @@ from estimation.filters import LowPass, zero_phase
 from estimation.recording import FloatArray
 
 UNTOLD = 1e-10
-"""Smallest singular value, as a share of the largest, of columns that can still be told apart."""
+"""Smallest singular value, relative to the largest, of columns that are not collinear."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Fit:
 
     @property
     def errors(self) -> FloatArray:
-        """Standard errors, shape (parameters,). They know noise only, not what the model lacks."""
+        """Standard errors, shape (parameters,). They include noise, not model error."""
         # rounding may leave a damped parameter's variance just below zero
         spread: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return spread
@@ -77,12 +77,12 @@ def fit(
         torque: Shape (n, joints).
         weights: Weight of each joint, shape (joints,); None weighs all joints alike.
         damping: Added to the squared length of each weighted column, as a share of it: 0 is plain
-            least squares; small values hold back what the motion hardly tells.
+            least squares; small values damp weakly identifiable parameters.
         independent_share: Share of the samples that are independent of one another; after a
             low-pass about 2 cutoff / sample rate. Enters the standard errors only.
 
     Raises:
-        ArmError: Without damping, the motion does not tell the parameters apart.
+        ArmError: Without damping, the parameters are not identifiable from the motion.
     """
     joints = torque.shape[1]
     weight = np.ones(joints) if weights is None else weights
@@ -95,7 +95,7 @@ def fit(
     if damping == 0 and singular[-1] <= UNTOLD * singular[0]:
         worst = np.flatnonzero(np.abs(basis[-1]) > 0.1)
         raise ArmError(
-            "The motion does not tell the parameters apart.",
+            "The parameters cannot be identified from the motion.",
             f"The columns {', '.join(map(str, worst))} depend on one another.",
             "Reduce them to base parameters, or add damping.",
         )
@@ -115,8 +115,8 @@ def damped_around(
 ) -> FloatArray:
     """Return parameters by damped least squares around a first guess (del Sol et al. 2014).
 
-    theta = theta_0 + (A^T A + lambda^2 I)^-1 A^T (tau - A theta_0). The paper's equation 17 leaves
-    out the first theta_0, without which a perfect guess would give zero.
+    theta = theta_0 + (A^T A + lambda^2 I)^-1 A^T (tau - A theta_0). The paper's equation 17 omits
+    the first theta_0, without which a perfect guess would give zero.
 
     Args:
         columns: A, shape (n, joints, parameters).

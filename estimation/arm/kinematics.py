@@ -13,7 +13,7 @@ TIP = "tip"
 
 
 class ArmError(EstimationError):
-    """An arm's motion does not fit the arm, or does not tell its parameters."""
+    """An arm's motion does not fit the arm, or does not identify its parameters."""
 
 
 def pinocchio() -> Any:

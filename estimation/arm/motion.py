@@ -65,7 +65,7 @@ class JointNames:
         return f"joint_{self.number}_direction_ratio"
 
     def drive(self, number: int) -> str:
-        """Return the angle of a motor behind a coupling that this joint feels, computed."""
+        """Return the computed angle of a motor behind a coupling that acts on this joint."""
         return f"joint_{self.number}_drive_{number}_angle_rad"
 
 
@@ -107,7 +107,7 @@ def joint_channels(recording: Recording) -> tuple[FloatArray, FloatArray, FloatA
     `joint_<i>_position_m`, and their velocity and torque channels.
 
     Raises:
-        ArmError: There is no joint 1.
+        ArmError: The recording has no joint 1.
         MissingChannelError: A joint lacks one of its three channels.
     """
     blocks = [

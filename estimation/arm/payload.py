@@ -1,7 +1,7 @@
-"""A mass added to an arm, from the torque that a model without it leaves.
+"""A mass added to an arm, from the residual torque of a model without it.
 
 The mass is a point fixed to one link, at a known height along the link's axis and an unknown small
-distance beside it. Its torque is linear in the mass and, to first order, in mass times distance.
+distance from it. Its torque is linear in the mass and, to first order, in mass times distance.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
 SIDE_STEP_M = 0.01
-"""Step of the derivative by the distance beside the axis, m."""
+"""Step of the derivative by the distance from the axis, m."""
 
 LEAST_PERIODS = 3
 
@@ -102,11 +102,11 @@ def added_mass(
     """Estimate an added mass.
 
     Args:
-        residual: Torque that the model leaves, shape (n, joints).
+        residual: Residual torque of the model, shape (n, joints).
         unit: Torque of one kilogram on the axis, and its change by a step to either side; each of
             shape (n, joints).
         taller: Torque of one kilogram one standard error of the height further out.
-        noise: RMS of what the model leaves without the mass, shape (joints,).
+        noise: RMS of the residual without the mass, shape (joints,).
         samples_a_period: Samples of one period of the motion.
 
     Raises:

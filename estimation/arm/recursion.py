@@ -1,8 +1,8 @@
 """The links' torque regressor along a whole motion, compiled: one recursion from the base outwards.
 
 A torque is linear in a link's mass, first moments and inertia about its joint's origin (W. Khalil
-and E. Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9). Pinocchio gives the
-same columns sample by sample and is what the tests hold this against; called from Python 5000 times
+and E. Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9). Pinocchio computes
+the same columns sample by sample and is the reference in the tests; called from Python 5000 times
 it costs several times as much as its own work.
 """
 
@@ -21,7 +21,7 @@ LINK = ("m", "lx", "ly", "lz", "Lxx", "Lxy", "Lyy", "Lxz", "Lyz", "Lzz")
 """A link's parameters in Pinocchio's order: kg, kg m, kg m^2; about the joint's origin."""
 
 COUNTING = {"full": slice(0, 10), "first moments": slice(1, 4), "thin": slice(0, 2)}
-"""Which of them count, by what a body's table says of its link."""
+"""Which of them count, by the kind of link in a body's table."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Tree:
     """A tree of bodies, each on one joint along or about its own z axis.
 
     Attributes:
-        parents: Of each body the number of the body it hangs on, -1 for the base; parents first.
-        prismatic: Of each body whether its joint slides.
+        parents: Number of the parent body of each body, -1 for the base; parents first.
+        prismatic: Whether the joint of each body is prismatic.
         turns: Rotation of each joint's frame in its parent's at q = 0, shape (bodies, 3, 3).
         places: Its origin there, shape (bodies, 3), m.
         gravity: In the base frame, shape (3,), m/s^2.
@@ -88,7 +88,7 @@ def _fill(parents, prismatic, turns, places, gravity, q, v, a, to, table):  # ty
     spin, turning = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
     rising = np.zeros((bodies + 1, 3))
     rising[bodies] = -gravity
-    # of every joint, seen from a body: its axis, and its axis times the lever to that body
+    # for every joint, relative to a body: its axis, and its axis times the lever to that body
     axes, levers = np.zeros((bodies, bodies, 3)), np.zeros((bodies, bodies, 3))
     turn = np.empty((3, 3))
     for i in range(bodies):

@@ -1,9 +1,9 @@
 """What an arm's joints share: the links' parameters, fitted on all joints together.
 
-The links' torque stands as a channel beside the measured ones, with the changes that its fit is
-least sure of. The direction of each joint is made before the filter, since a filter and a sign do
-not commute. Wrist motors behind a coupling get channels of their own angles: their friction is a
-function of those, felt in several joints.
+The links' torque is an additional channel, with the corrections that its fit determines least. The
+direction of each joint is computed before the filter, since a filter and the sign function do not
+commute. Wrist motors behind a coupling get channels of their own angles: their friction is a
+function of those and acts on several joints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 
 DAMPING = 1e-9
-"""Of the shared fit: small enough not to bend what is told, enough for what is not told at all."""
+"""Damping of the shared fit: too small to bias identifiable parameters, enough for all others."""
 
 EDGE_S = 0.5
 """Left out of the shared fit at either end of a run: the filter works on a reflection there."""
@@ -31,8 +31,8 @@ class SharedFit:
 
     Attributes:
         values: Shape (parameters,).
-        corrections: Of each joint, the changes of the links' parameters that the fit is least sure
-            of, as that joint feels them: what an effect that is missing may have bent. Shape
+        corrections: For each joint, the least determined corrections of the links' parameters, by
+            their torque at that joint: the directions that a missing effect may have biased. Shape
             (joints, parameters, CORRECTIONS), one standard error each.
     """
 
@@ -45,7 +45,7 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
 
     Args:
         arm: The arm.
-        recordings: The runs that discover; others have no part in it.
+        recordings: The training runs; others are not used.
 
     Raises:
         ArmError: They are too short.
@@ -62,8 +62,8 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
     table, aim = np.concatenate(tables), np.concatenate(torques)
     if len(aim) < 2 * table.shape[2]:
         raise ArmError(
-            f"{len(aim)} samples do not tell the {table.shape[2]} parameters of {arm.name}.",
-            "They are what the runs that discover hold at the filter's rate.",
+            f"{len(aim)} samples are too few for the {table.shape[2]} parameters of {arm.name}.",
+            "They are the samples of the training runs at the filter's rate.",
             "Record longer runs.",
         )
     found = fit(table, aim, thesis_weights(aim), DAMPING)

@@ -20,11 +20,11 @@ class Block:
     """Columns that belong together: the base, or one effect.
 
     Attributes:
-        name: What they are.
+        name: Name.
         at: Their places among all columns.
         dissipative: Of each, whether it cannot be negative.
-        damping: Damping, as a share of the squared length of the block's columns: of each own one
-            where `own_length`, else of its longest, so that what is hardly visited stays small.
+        damping: Damping relative to the squared length of the block's columns: of each column
+            where `own_length`, else of the longest, so that rarely visited columns stay small.
         own_length: See `damping`.
     """
 
@@ -60,7 +60,7 @@ class Products:
         return cls(gram, right, np.sum(torque**2, axis=0), len(torque))
 
     def rms(self, at: NDArray[np.intp], values: FloatArray) -> FloatArray:
-        """Return the RMS error of each row that some columns leave with these parameters."""
+        """Return the RMS residual of each row with some columns and these parameters."""
         gram = self.gram[:, at[:, None], at]
         squares = self.square - 2 * self.right[:, at] @ values + (gram @ values) @ values
         left: FloatArray = np.sqrt(np.maximum(squares, 0.0) / self.samples)

@@ -35,13 +35,13 @@ class Joint:
     """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         kind: How it moves.
         row: Where it sits.
         lower: Lower end of its range.
         upper: Upper end of its range.
         speed: Largest speed.
-        link: What of its link's ten parameters counts, see `Link`.
+        link: Which of its link's ten parameters count, see `Link`.
         spring: Whether an elastic torque proportional to its position acts on it.
     """
 
@@ -65,9 +65,9 @@ class Body:
     """One body of an arm's spanning tree, on a joint along or about its z axis.
 
     Attributes:
-        name: What it is called.
-        parent: Number of the body it hangs on, from 1; 0 is the base.
-        row: Where its joint sits on that body.
+        name: Name.
+        parent: Number of the parent body, from 1; 0 is the base.
+        row: Position of its joint on that body.
         closure: How far its joint moves with each actuated joint: its row of G.
         prismatic: Whether its joint slides.
         link: As `Joint.link`.
@@ -85,10 +85,10 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class PointMass:
-    """A mass fixed to a link, beside what the link's own parameters say.
+    """A mass fixed to a link, in addition to the link's own parameters.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         link: The link it is fixed to, from 1.
         point_m: Where, in the link's frame, m.
         mass_kg: How much.
@@ -102,10 +102,10 @@ class PointMass:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """What is mounted on the last link: where its own tip is, and what it weighs.
+    """A tool mounted on the last link: its tip and its masses.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         tip: The fixed row from the last joint's frame to the tool's tip.
         masses: Its masses.
     """
@@ -120,19 +120,19 @@ class Arm:
     """An arm: its joints in a row, and the bodies of its loops where it has any.
 
     Attributes:
-        name: What it is called.
+        name: Name.
         joints: From the base to the tip.
         tip: The fixed row from the last joint's frame to the tip's.
         viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of
             the first by the speed of the second.
         gravity_m_s2: Gravity in the base frame.
-        source: Where the numbers come from.
+        source: Source of the numbers.
         wrist: First joint (from 0) that cables drive from coupled motors, or None.
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
         loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
             see `bodies`.
-        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` says
-            what they ask of the joints.
+        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns
+            their joint torque.
     """
 
     name: str
@@ -147,7 +147,7 @@ class Arm:
     carried: tuple[PointMass, ...] = ()
 
     def with_payload(self, *masses: PointMass) -> "Arm":
-        """Return the arm with masses added to what it carries."""
+        """Return the arm with additional masses."""
         return replace(self, carried=(*self.carried, *masses))
 
     def with_tool(self, tool: Tool) -> "Arm":

@@ -1,7 +1,7 @@
-"""The twin of an arm's declared model: its runs as they would be if nothing were missing.
+"""The simulated null of an arm: its runs simulated from the declared model alone.
 
 The positions are the measured ones; the torque is the declared model's on them, with friction that
-changes sign as sharply as declared, so that what filters do to it is in the twin as in the arm.
+changes sign as sharply as declared, so that filters affect simulated and measured torque alike.
 """
 
 from collections.abc import Collection, Sequence
@@ -18,7 +18,7 @@ from estimation.recording import FloatArray, Recording
 
 @dataclass(frozen=True)
 class ArmTwin:
-    """Seed to the runs that discover, their torque made by the declared model.
+    """Seed to the training runs, with torque from the declared model.
 
     Attributes:
         runs: The runs, with the declared torque in the torque channels.
@@ -30,11 +30,11 @@ class ArmTwin:
 
     @classmethod
     def of(cls, arm: ArmBalances, runs: Sequence[Recording], fitted: SharedFit) -> "ArmTwin":
-        """Make the twin of a fitted arm.
+        """Make the simulated null of a fitted arm.
 
         Args:
             arm: The arm.
-            runs: Runs that discover, with the links' torque.
+            runs: Training runs, with the links' torque.
             fitted: Declared parameters, from `estimation.arm.shared.shared_fit`.
         """
         made, loud = [], []
@@ -68,12 +68,12 @@ class ArmTwin:
 def laid_out(
     arm: ArmBalances, recordings: Sequence[Recording], discover: Collection[str]
 ) -> tuple[list[Recording], ArmTwin]:
-    """Return an arm's runs with what its joints share, fitted where it discovers, and its twin.
+    """Return an arm's runs with the shared link torque, fitted on training runs, and its null.
 
     Args:
         arm: The arm.
         recordings: Its runs.
-        discover: Names of those that discover; others have no part in the fit.
+        discover: Names of the training runs; others are not used in the fit.
     """
     fitted = shared_fit(arm, [run for run in recordings if run.name in discover])
     whole = with_links(arm, recordings, fitted)

@@ -1,4 +1,4 @@
-"""The wrench at an arm's tip from what its joints' torque leaves: offline, and live at 1 kHz.
+"""The wrench at an arm's tip from the residual of its joints' torque: offline, and live at 1 kHz.
 
 In contact, tau = model + J^T w (G. A. Piqué's thesis, 2018, equations 3.4 to 3.6), with w what the
 tip does to its surroundings: force first, N, then moment, N m.
@@ -18,8 +18,8 @@ from estimation.recording import FloatArray
 
 LIKELY_FORCE_N = 20.0
 LIKELY_MOMENT_N_M = 4.0
-"""Standard deviations of wrenches in surgery before anything is measured: what a singular direction
-falls back to. Wide, so that they hardly bend what the joints do tell."""
+"""Prior standard deviations of wrenches in surgery, which remain in a singular direction. They are
+wide, so that they barely bias the observable directions."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,7 @@ class Wrench:
 
     Attributes:
         value: Force and moment, shape (n, 6).
-        covariance: Shape (n, 6, 6). In directions that the joints do not tell it is that of the
-            wrenches thought likely beforehand, not zero.
+        covariance: Shape (n, 6, 6). In unobservable directions it is that of the prior, not zero.
     """
 
     value: FloatArray
@@ -161,7 +160,7 @@ class LiveWrench:
         """
         window, n = self._taps.shape[1], self._joints
         at = self._seen % window
-        # written twice, so that the last window is always one stretch of memory
+        # written twice, so that the last window is always contiguous in memory
         for row in (at, at + window):
             self._window[row, :n] = position
             self._window[row, n:] = torque
@@ -181,7 +180,7 @@ class LiveWrench:
             weighted @ jacobian.T + self._prior, weighted @ (smooth[0, n:] - model)
         )
         if failed:
-            raise ArmError("The wrench cannot be told from this sample.", f"Torque: {torque}.")
+            raise ArmError("The wrench cannot be computed from this sample.", f"Torque: {torque}.")
         found: FloatArray = wrench
         return found
 

@@ -1,6 +1,6 @@
 """Effects of a wrist that cables drive from motors behind a coupling, gripper included.
 
-A torque of a motor is felt in the joints by q = M q_motor and equal power: tau = M^-T tau_motor.
+A motor's torque acts on the joints by q = M q_motor and equal power: tau = M^-T tau_motor.
 """
 
 from collections.abc import Callable

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEAST_LEVELS = 3
-"""With two levels, leaving one out leaves nothing to learn the condition's effect from."""
+"""With two levels, the effect of the condition cannot be fitted after leaving one out."""
 
 
 def edges(

@@ -1,12 +1,11 @@
-"""Weights by ridge regression in which every run has an offset of its own.
+"""Weights by ridge regression with a separate offset of every run.
 
 The motor's friction changes from run to run by more than the fit errs within one: on the reference
 rig the mean error of a run scatters by 2 mN m. Plain least squares takes every sample as news; here
 the run's offset is a random effect. With equal correlation rho between all errors of a run, the
-generalised least squares of n samples leaves out a share s of each run's means: s = n rho / (1 +
-(n - 1) rho). The share is a setting, as neighbouring samples are no independent news either. What
-runs say of each other by their means is then fitted once more, with few weights: there are fewer
-runs than weights.
+generalised least squares of n samples removes a share s of each run's means: s = n rho / (1 +
+(n - 1) rho). The share is a setting, as neighbouring samples are not independent either. The means
+of the runs are then fitted again, with few weights: there are fewer runs than weights.
 
 Source: generalised least squares of the random-intercept model, N. M. Laird and J. H. Ware,
 "Random-effects models for longitudinal data", Biometrics 38 (1982).
@@ -24,11 +23,11 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How weights are found.
+    """Settings of the fit of the weights.
 
     Attributes:
         ridge: Penalty on a squared weight in units of its column's variance, a sample.
-        offset_share: Share of each run's means that the fit leaves out, 0 to below 1.
+        offset_share: Share of each run's means that the fit removes, 0 to below 1.
     """
 
     ridge: float = 1e-4
@@ -39,8 +38,8 @@ CHOICES = tuple(Settings(ridge, share) for share in (0.8, 0.5, 0.0) for ridge in
 """Settings that `chosen` chooses from, those that trust the runs' means least first."""
 
 HARDLY = 1e-4
-"""Spread of a column, relative to its size, below which it gets no weight: what little it varies
-would be blown up to the size of the others, and no number is left for them."""
+"""Spread of a column, relative to its size, below which it gets no weight: its small variation
+would be scaled to the size of the others, beyond the numerical precision."""
 
 BETWEEN_RIDGE = 1e-2
 """Penalty of the weights that the runs' means are fitted with; runs are fewer than samples."""
@@ -51,7 +50,7 @@ AS_GOOD = 1.02
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a fit must know of its columns.
+    """Properties of the columns that a fit needs.
 
     Attributes:
         stiffness: How stiffly each weight is held, relative to the ridge penalty, shape (p,).
@@ -160,7 +159,7 @@ class Pool:
     def spread(self) -> FloatArray:
         """Standard deviation of each column over all samples, shape (p,).
 
-        It is infinite where a column hardly varies, and 1 for the first column, the constant.
+        It is infinite for a nearly constant column, and 1 for the first column, the constant.
         """
         mean = self.total / self.count
         variance = np.diag(self.gram) / self.count - mean**2
@@ -173,11 +172,11 @@ class Pool:
 def solve(pool: Pool, shape: Shape, settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
 
-    A column that hardly varies gets no weight.
+    A nearly constant column gets no weight.
 
     Args:
         pool: The runs to fit.
-        shape: What the columns are.
+        shape: Properties of the columns.
         settings: How.
     """
     share, scale = settings.offset_share, pool.spread
@@ -204,13 +203,13 @@ def _ridge(
 def chosen(whole: Pool, folds: Sequence[Pool], shape: Shape) -> Settings:
     """Return the settings of the least error on runs left out of the fit in turn.
 
-    Of those that are as good as the best, it is the one that trusts the runs' means least: runs
-    left out at random tell little of runs that are unlike all others.
+    Among those that are as good as the best, it is the one that uses the runs' means least: runs
+    left out at random contain little information about runs that are unlike all others.
 
     Args:
         whole: The runs to fit, of one target; nothing else is looked at.
         folds: The same runs in parts.
-        shape: What the columns are.
+        shape: Properties of the columns.
     """
 
     def loss(settings: Settings) -> float:

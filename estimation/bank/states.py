@@ -1,23 +1,23 @@
 """The states an estimate is made of, and the products of them that get a weight.
 
-Everything known about one instant of the drive is a row of filtered channels. From it come the
-states, numbers of order one; products of states, each with a weight of its own; and the ripple, a
-Fourier series in the spindle's angle whose amplitudes depend on load and speed. Where the wrist
-moves, a second, slower series has amplitudes that depend on its pose: the cables rub elsewhere in
-every pose. No channel looks back further than `estimation.derived.TRAVEL_WINDOW_S`.
+One instant of the drive is a row of filtered channels. The states are computed from it, numbers of
+order one; then products of states, each with its own weight; and the ripple, a Fourier series in
+the spindle's angle whose amplitudes depend on load and speed. Where the wrist moves, a second,
+slower series has amplitudes that depend on its pose: the cables rub at other places in every pose.
+No channel uses more than the last `estimation.derived.TRAVEL_WINDOW_S`.
 
 States, t the motor's travel since the lowest angle of that window:
 
 - `q` spindle angle, `c` surrogate of the load, `v` speed, `a` acceleration, `i` inverse speed, `d`
-  how far the surrogate is below its highest value of the window;
-- `l5` to `l480`: the load so many ms ago. Friction that comes and goes with teeth and balls is in
-  the load now, and less in what it was on other teeth; `b5` to `b480`: the acceleration then;
+  difference of the surrogate to its highest value of the window;
+- `l5` to `l480`: the load that many ms earlier. Friction that varies with teeth and balls is in
+  the present load, and less in the load on other teeth; `b5` to `b480`: the acceleration then;
 - `k1` to `k4`: min(t, r) / r, r = 1 to 4 rad, and `n1` to `n3`: the same with r in proportion to
   the load. Both are Prandtl's stop operators after a reversal, the elements of a Maxwell-slip model
   of presliding friction; the second ones for friction that grows with the cable's tension. A drive
-  that has not turned within the window has slid, however slowly it went, so t grows as the turning
-  point leaves the window;
-- `h2`, `h4`: what the load has risen since the motor turned, while t is below 2 and 4 rad: a jaw
+  that has not reversed within the window has slid, at any speed, so t grows when the reversal is
+  older than the window;
+- `h2`, `h4`: increase of the load since the motor reversed, while t is below 2 and 4 rad: a jaw
   that sticks takes up the drive's changes;
 - `p` pose of the wrist, where there is one.
 
@@ -65,8 +65,8 @@ JUDGED = 4
 
 ORDERS = 29
 RIPPLE_STEP = 0.17
-"""Orders of the ripple, a motor turn: 29 multiples of 0.17. A stroke of the rig is 6 turns, so
-orders closer together cannot be told apart."""
+"""Orders of the ripple per motor turn: 29 multiples of 0.17. A stroke of the rig is 6 turns, so
+orders closer together are indistinguishable."""
 
 WRIST_ORDERS, WRIST_PERIOD_RAD = 20, 3.3
 """Orders of the wrist's series and its period, a little more than the range of all jaw stops."""
@@ -131,7 +131,7 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "hysteresis": CLIPS,
     RIPPLE: (),
 }
-"""Effects that an ablation leaves out, and their states; products of these states go with them."""
+"""Effects that an ablation removes, and their states; products of these states are removed too."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Bank:
     """Which channels are read and which products are made of them.
 
     Attributes:
-        surrogate: Channel that stands for the load; a key of `LOAD_SCALES`.
+        surrogate: Channel that represents the load; a key of `LOAD_SCALES`.
         pose: Channel of the wrist's pose in rad, or empty.
         without: Effects left out, keys of `EFFECTS`.
     """
@@ -194,7 +194,7 @@ class Bank:
 
     @cached_property
     def shape(self) -> Shape:
-        """What a fit must know of the columns."""
+        """Properties of the columns that a fit needs."""
         factors = [len(product) for product in self.products]
         factors += self.orders * [1, 1, 2, 2, 2, 2]
         factors += self.wrist_orders * [1 + power for power in range(WRIST_POWERS) for _ in "sc"]
@@ -203,7 +203,7 @@ class Bank:
         return Shape(np.asarray(stiffness), np.array(between))
 
     def design(self, rows: FloatArray) -> FloatArray:
-        """Return what the weights multiply, shape (n, size), for rows of channels, (n, channels).
+        """Return the columns of the weights, shape (n, size), for rows of channels, (n, channels).
 
         A value that is not finite makes its row so.
         """

@@ -1,4 +1,4 @@
-"""Physical effects, one file each. Adding an effect is adding a file to this folder."""
+"""Physical effects, one file each. To add an effect, add a file to this folder."""
 
 import difflib
 import importlib
@@ -25,7 +25,7 @@ __all__ = [
 
 
 class UnknownEffectError(UnknownNameError):
-    """No file of the catalogue holds the effect asked for."""
+    """The catalogue has no effect of the given id."""
 
 
 @cache
@@ -45,10 +45,10 @@ def catalogue() -> Mapping[str, Effect]:
 
 
 def effect(name: str) -> Effect:
-    """Return one effect by its id, of the catalogue or a term of a formula, `unknown.sign.bump`.
+    """Return one effect of the catalogue by its id, or a term of a formula: `unknown.sign.bump`.
 
     Raises:
-        UnknownEffectError: There is none of that id; the nearest one is named.
+        UnknownEffectError: No effect has that id. The message names the nearest one.
     """
     known = catalogue()
     if name not in known and (term := product(name)) is not None:

@@ -1,4 +1,4 @@
-"""Arm friction: a loss of constant size against a joint's direction, filtered as the torque."""
+"""Arm friction: Coulomb friction of an arm's joint, filtered like the measured torque."""
 
 from typing import ClassVar
 
@@ -8,8 +8,11 @@ from estimation.effects.effect import Parameter, Proportional
 class ArmFriction(Proportional):
     """Coulomb friction of an arm's joint, its sign taken before the filter.
 
-    Equation: torque = F direction. A filter and a sign do not commute: the direction is made from
-    barely filtered motion and then filtered as the torque is (`estimation.arm.shared`).
+    Equation: torque = F direction, F in N m (N for a prismatic joint). A filter and the sign
+    function do not commute, so the direction (-1 to 1) is computed from barely filtered motion and
+    then filtered like the torque (`estimation.arm.shared`).
+
+    Check: turn the joint slowly in both directions; the torque differs by 2 F at any speed.
 
     Source: G. A. Piqué's thesis, 2018, equation 2.5.
     """

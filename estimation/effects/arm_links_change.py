@@ -1,4 +1,4 @@
-"""Change of the arm links: what their parameters may be off by, as one joint feels it."""
+"""Arm link correction: torque at one joint of a correction of the links' parameters."""
 
 from typing import ClassVar
 
@@ -6,10 +6,13 @@ from estimation.effects.effect import Parameter, Proportional
 
 
 class ArmLinksChange(Proportional):
-    """A change of the links' parameters along a direction that their fit is least sure of.
+    """A correction of the links' parameters along a poorly determined direction of their fit.
 
-    Equation: torque = errors change, in standard errors of the fit on all joints together
-    (`estimation.arm.shared`); more than three are not what that fit allows.
+    Equation: torque = errors change. `change` is the torque for one standard error of the fit on
+    all joints together (`estimation.arm.shared`), in N m (N for a prismatic joint); `errors` has no
+    unit. The bound of three standard errors is the range that the shared fit allows.
+
+    Check: record another path with the other joints moving.
 
     Source: the covariance of weighted least squares.
     """

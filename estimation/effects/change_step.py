@@ -1,4 +1,4 @@
-"""A change: friction that is another from one moment of a run on."""
+"""Friction change within a run: Coulomb friction that changes at one instant of a run."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the time of the first."""
+    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
         if not state[0]:
             state[0], state[1] = 1.0, now[i, 1]
@@ -20,9 +20,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class FrictionStep(Remembering):
-    """Something comes loose, jams or is let go within a run.
+    """A part that comes loose, jams or is released within a run.
 
-    Equation: torque = F tanh(speed / width) from the time `since` on, counted from the run's start.
+    Equation: torque = F tanh(speed / width) for t >= since, t from the run's start. F in N m, width
+    in rad/s, since in s.
+
+    Check: inspect screws, cable guides and the gripped object after the run.
 
     Source: Page 1955 (a change of a parameter at an unknown point).
     """
@@ -30,12 +33,10 @@ class FrictionStep(Remembering):
     id = "change.step"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "clock": "time_s"}
-    amplitudes = (Parameter("friction", "target", "loss after the change less that before"),)
+    amplitudes = (Parameter("friction", "target", "loss after the change minus before"),)
     shape = (
         Parameter("since", "clock", "time of the change in its run", 1.0, 30.0, points=10),
-        Parameter(
-            "width", "speed", "speed at which 76 % of the direction is there", 1e-2, 50.0, points=4
-        ),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=4),
     )
     walk = _walk
     rest = (0.0, 0.0)

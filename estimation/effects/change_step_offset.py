@@ -1,4 +1,4 @@
-"""A change of level: an offset that comes at one moment of a run."""
+"""Offset change within a run: an offset that changes at one instant of a run."""
 
 from typing import ClassVar
 
@@ -10,7 +10,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the time of the first."""
+    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
         if not state[0]:
             state[0], state[1] = 1.0, now[i, 0]
@@ -18,9 +18,11 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class OffsetStep(Remembering):
-    """A cable jumps a groove, a screw slips, a sensor is knocked.
+    """A cable that jumps out of its groove, a screw that slips, or a sensor that was knocked.
 
-    Equation: torque = b from the time `since` on, counted from the run's start.
+    Equation: torque = b for t >= since, t from the run's start. b in N m, since in s.
+
+    Check: read the unloaded sensor before and after the run, and inspect cable and sensor mount.
 
     Source: Page 1955 (a change of a parameter at an unknown point).
     """
@@ -38,7 +40,7 @@ class OffsetStep(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"clock": "time_s"}
-    amplitudes = (Parameter("offset", "target", "level after the change less that before"),)
+    amplitudes = (Parameter("offset", "target", "level after the change minus before"),)
     shape = (Parameter("since", "clock", "time of the change in its run", 0.5, 60.0, points=33),)
     walk = _walk
     rest = (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Torque coupling: part of another joint's torque acts on this one."""
+"""Torque coupling: a fraction of another joint's torque acts on this joint."""
 
 from typing import ClassVar
 
@@ -6,9 +6,11 @@ from estimation.effects.effect import Parameter, Proportional
 
 
 class TorqueCoupling(Proportional):
-    """A cable that runs over another joint bears on it with its tension.
+    """The tension of another joint's cable loads this joint, which the cable crosses.
 
-    Equation: torque = c other torque.
+    Equation: torque = c other torque, both in N m, c without unit.
+
+    Check: load the other joint alone and read this joint's torque.
 
     Source: the virtual work of a coupled transmission; the transpose of its kinematic coupling.
     """
@@ -16,6 +18,6 @@ class TorqueCoupling(Proportional):
     id = "coupling.torque"
     balances: ClassVar = {"joint": 1, "grasp": 1, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"other_torque": "joint_1_torque_n_m"}
-    amplitudes = (Parameter("ratio", "target / other_torque", "share of the other's torque"),)
+    amplitudes = (Parameter("ratio", "target / other_torque", "fraction of the other's torque"),)
     confused_with = ("sensor.crosstalk", "coupling.kinematic")
     told_apart_by = "the other joint loaded alone, with this one at rest and moving"

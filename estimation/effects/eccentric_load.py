@@ -1,4 +1,4 @@
-"""Eccentricity: a lever arm that changes over the turn, so that a load is felt as a wave."""
+"""Eccentricity: a lever arm that varies over a turn, so that the load causes a periodic torque."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class EccentricLoad(Pointwise):
-    """A pulley or a gear off its centre. The order need not be whole.
+    """A pulley or a gear that is off centre. The order need not be an integer.
 
-    Equation: torque = load (a sin(order angle) + b cos(order angle)).
+    Equation: torque = load (a sin(order angle) + b cos(order angle)), load in N m, angle in rad, a
+    and b without unit, order in periods per turn.
+
+    Check: measure the runout of pulleys and gears with a dial gauge.
 
     Source: the moment of a force about an axis: a lever arm r + e cos(angle) in place of r.
     """
@@ -23,7 +26,7 @@ class EccentricLoad(Pointwise):
         Parameter("sine", "target / load", "eccentricity along one axis, of the lever arm"),
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )
-    shape = (Parameter("order", "1", "periods a turn", 0.5, 16.5, linear=True, points=33),)
+    shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
     confused_with = (
         "ripple.current",
         "ripple.output",

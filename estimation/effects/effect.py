@@ -1,9 +1,9 @@
-"""What a physical effect is: equation, inputs, parameters, offline columns and live step.
+"""The interface of a physical effect: equation, inputs, parameters, offline columns and live step.
 
-An effect adds `sum amplitude_i * column_i` to one side of a balance. It is linear in its
+An effect adds `sum amplitude_i * column_i` to one side of an equation. It is linear in its
 amplitudes; parameters inside the columns (a width, a time constant) are its shape. Inputs are named
-by their role (`speed`, `load`), so that the same effect serves the motor, the jaw or an arm joint;
-a model says which channel plays which role and on which side of the balance the effect stands.
+by their role (`speed`, `load`), so that the same effect serves the motor, the jaw or an arm joint.
+A model assigns a channel to each role and a side of the equation to the effect.
 """
 
 from abc import ABC, abstractmethod
@@ -23,13 +23,13 @@ class Parameter:
     Attributes:
         name: Name, unique in the effect.
         unit: Unit expression over `target` and the effect's roles, such as `target / speed`.
-        description: What it means.
-        lower: Smallest value that makes physical sense, in SI units.
-        upper: Largest value that makes physical sense.
-        linear: Of a shape parameter: it is searched on a linear scale and may be zero or negative,
-            such as a position; else on a logarithmic one.
-        points: Of a shape parameter: how many values between its bounds a search tries before it
-            refines the best. An order needs many: between two of them lies a narrow peak.
+        description: Meaning in words.
+        lower: Smallest physically meaningful value, in SI units.
+        upper: Largest physically meaningful value.
+        linear: For a shape parameter: True if it is searched on a linear scale and may be zero or
+            negative, such as a position; otherwise the scale is logarithmic.
+        points: For a shape parameter: number of values between its bounds that a search tries
+            before it refines the best one. An order needs many values, as its peaks are narrow.
     """
 
     name: str
@@ -41,42 +41,44 @@ class Parameter:
     points: int = 13
 
     def grid(self) -> FloatArray:
-        """Return the values a search tries first, shape (points,), from `lower` to `upper`."""
+        """Return the initial values of a search, shape (points,), from `lower` to `upper`."""
         if self.linear:
             return np.linspace(self.lower, self.upper, self.points)
         return np.geomspace(self.lower, self.upper, self.points)
 
 
 class Effect(ABC):
-    """One physical effect. A subclass in a file of this package joins the catalogue by being there.
+    """One physical effect. The catalogue finds every subclass in a file of this package.
 
-    Its docstring states the equation and the source. Class attributes:
+    The docstring of a subclass contains the physics, the equation with units, a check for a
+    technician and the source. Class attributes:
 
     Attributes:
         id: Name of the effect, unique in the catalogue, such as `friction.coulomb`.
-        family: What a diagnosis calls it; the id unless stated. Several forms of one cause share a
-            family, and the id of a form is its family with one more word
+        family: Name that a diagnosis reports; the id by default. Several functional forms of one
+            physical effect share a family, and the id of a form is its family with one more word
             (`hysteresis.presliding.lugre`).
-        balances: Balances a search may add it to, and the side it stands on there: 1 adds to the
-            target, -1 takes from it, so that a bound on an amplitude means the same everywhere.
-            `joint` stands for every `joint.N`. Empty for what is only ever declared, such as the
-            torque constant. Which channel plays a role in which balance is told by
-            `estimation.effects.roles`.
-        roles: Role of each input, and the channel that plays it unless a model says otherwise.
-        amplitudes: Linear parameters, one a column.
+        balances: Equations that a search may add it to, and its side there: 1 adds to the target,
+            -1 subtracts from it, so that a bound on an amplitude has the same meaning in all of
+            them. `joint` stands for every `joint.N`. Empty for an effect that is only declared,
+            such as the torque constant. `estimation.effects.roles` assigns channels to the roles in
+            each equation.
+        roles: Role of each input, and its default channel.
+        amplitudes: Linear parameters, one per column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
-        projected_roles: Roles a search takes as the other sensors tell them, not as measured: those
-            whose noise the columns could take out of a residual. A model that runs reads them.
-        confused_with: Ids of effects that look alike when the excitation is poor.
-        told_apart_by: The experiment that tells them apart.
-        same_as: Families that only that experiment tells from it: where both read the same
-            channels, each is named with the other beside it.
-        other_below: Shape parameters at whose lower bound it turns into another effect.
-        bends: Roles along which another form than the equation's may be the true one: names are
-            compared with forms that bend there.
-        any_function_of: Variables of which any function, whatever its form, is this effect: a map
-            of them is no other name.
-        at_rest: Whether it says what acts at rest: a search tries it where samples at rest count.
+        projected_roles: Roles for which a search uses a signal predicted from the other sensors
+            instead of the measured one, because the columns could otherwise fit its noise. A model
+            in use reads the measured signal.
+        confused_with: Ids of effects that are similar when the excitation is poor.
+        told_apart_by: The experiment that distinguishes them.
+        same_as: Families that only that experiment distinguishes from it. Where both read the same
+            channels, each is reported with the other.
+        other_below: Shape parameters at whose lower bound it becomes another effect.
+        bends: Roles along which the true functional form may differ from the equation: effects are
+            compared after relaxing their form there.
+        any_function_of: Variables for which any function belongs to this effect: a non-parametric
+            model of them is not a different effect.
+        at_rest: Whether it describes standstill. A search tries it where static samples count.
     """
 
     id: ClassVar[str]
@@ -95,7 +97,7 @@ class Effect(ABC):
     any_function_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Let the family be the id where none is stated."""
+        """Set the family to the id by default."""
         if "id" in vars(cls) and "family" not in vars(cls):
             cls.family = cls.id
 
@@ -119,7 +121,7 @@ class Effect(ABC):
     def step(
         self, inputs: Mapping[str, float], shape: Sequence[float], state: list[float]
     ) -> Sequence[float]:
-        """Return one row of the columns for one live sample, the same to rounding.
+        """Return one row of the columns for one live sample, equal to `columns` to rounding.
 
         Args:
             inputs: Role to value in SI units.
@@ -154,16 +156,16 @@ Walk = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]
 
 
 class Remembering(Effect):
-    """An effect with memory: each row of its columns depends on what came before in its run.
+    """An effect with memory: each row of its columns depends on the earlier samples of its run.
 
-    One compiled function walks over the samples of a run, and over a single one live. A state
-    that moves with time has the role `clock` among its roles, so that it does not depend on the
-    rate of the samples; what it forgets with time counts from the first sample it was given.
-    A sample with an input that is not finite gives NaN and leaves the state as it was.
+    One compiled function loops over the samples of a run, or takes a single sample live. A state
+    that changes with time uses the role `clock`, so that it does not depend on the sample rate; its
+    decay starts at the first sample. A sample with an input that is not finite gives NaN and does
+    not change the state.
 
     Attributes:
         walk: The compiled function; the columns of its first argument are the roles in order.
-        rest: State before the first sample. The first value of most is 0 until a sample has come.
+        rest: State before the first sample. The first value of most is 0 until the first sample.
     """
 
     walk: ClassVar[Walk]

@@ -1,4 +1,4 @@
-"""Capstan friction: a cable wrapped on a surface passes on less than it is pulled with."""
+"""Capstan friction: friction of a cable wrapped over a surface, exponential in the wrap angle."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,10 +9,15 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class Capstan(Pointwise):
-    """Loss of a cable over a constant angle of wrap.
+    """Friction of a cable over a constant wrap angle.
 
-    Equation: torque = c load (exp(wrap tanh(speed / width)) - 1), wrap being the coefficient of
-    friction times the angle. Pulling, the tension grows by exp(wrap); letting go, it falls by it.
+    Equation: torque = c load (exp(wrap tanh(speed / width)) - 1). `wrap` is the coefficient of
+    friction times the wrap angle, without unit; load in N m, width in rad/s, c without unit. The
+    tension is multiplied by exp(wrap) when the cable is pulled and divided by it when it is
+    released.
+
+    Check: inspect the cable and its guides for wear and dirt; the ratio of the torques of pulling
+    and releasing is exp(2 wrap).
 
     Source: the capstan equation of Euler and Eytelwein.
     """
@@ -20,18 +25,16 @@ class Capstan(Pointwise):
     id = "friction.capstan"
     balances: ClassVar = {"cable": 1, "grasp": -1, "pitch": -1, "yaw": -1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "distal_torque_n_m"}
-    amplitudes = (Parameter("carried", "target / load", "share of the load carried", lower=0.0),)
+    amplitudes = (Parameter("carried", "target / load", "fraction of the load", lower=0.0),)
     shape = (
         Parameter("wrap", "1", "coefficient of friction times angle of wrap", 0.03, 3.0, points=4),
-        Parameter(
-            "width", "speed", "speed at which 76 % of the direction is there", 1e-2, 50.0, points=6
-        ),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
     confused_with = ("friction.load", "friction.position")
-    same_as = ("friction.load",)  # what its two directions differ by is within the ratio
+    same_as = ("friction.load",)  # the ratio can absorb the difference of the two directions
     bends = ("load",)
-    told_apart_by = "the same motion at another angle of wrap, such as another pose of the wrist"
+    told_apart_by = "the same motion at another wrap angle, such as another pose of the wrist"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (inputs["load"] * np.expm1(shape[0] * np.tanh(inputs["speed"] / shape[1])),)

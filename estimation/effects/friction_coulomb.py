@@ -1,4 +1,4 @@
-"""Coulomb friction: a loss of constant size against the direction of motion."""
+"""Coulomb friction: a constant torque against the direction of motion."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,8 +13,10 @@ from estimation.recording import FloatArray
 class CoulombFriction(Effect):
     """Coulomb friction with a smooth change of sign.
 
-    Equation: torque = F tanh(speed / width). The width is fitted too: the filter smears a reversal,
-    and a wrong width looks like Stribeck friction.
+    Equation: torque = F tanh(speed / width), F in N m, width in rad/s. The width is fitted too: the
+    filter smooths a reversal, and a wrong width looks like Stribeck friction.
+
+    Check: move slowly in both directions without load; the torque differs by 2 F at any speed.
 
     Source: the classic friction model; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -30,7 +32,7 @@ class CoulombFriction(Effect):
     }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
-    shape = (Parameter("width", "speed", "speed at which 76 % of the loss is there", 1e-3, 1e2),)
+    shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
     confused_with = ("friction.stribeck", "hysteresis.presliding")
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 

@@ -1,4 +1,4 @@
-"""Coulomb asymmetry: another loss when closing than when opening."""
+"""Coulomb asymmetry: different Coulomb friction in closing and in opening."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class CoulombAsymmetry(Pointwise):
-    """The part of Coulomb friction that does not change its sign with the motion.
+    """The part of Coulomb friction that does not change its sign with the direction of motion.
 
-    Equation: torque = F |tanh(speed / width)|.
+    Equation: torque = F |tanh(speed / width)|, F in N m, width in rad/s. F is half the friction of
+    closing minus half that of opening.
+
+    Check: compare slow motion in both directions with the torque at standstill.
 
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -19,15 +22,11 @@ class CoulombAsymmetry(Pointwise):
     id = "friction.coulomb_asymmetry"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
-    amplitudes = (
-        Parameter("asymmetry", "target", "half the loss of closing less that of opening"),
-    )
-    shape = (
-        Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
-    )
+    amplitudes = (Parameter("asymmetry", "target", "half the loss of closing minus opening"),)
+    shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
     confused_with = ("sensor.offset", "gravity.payload")
-    told_apart_by = "rest periods, and slow motion in both directions"
+    told_apart_by = "standstill periods, and slow motion in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (np.abs(np.tanh(inputs["speed"] / shape[0])),)

@@ -1,4 +1,4 @@
-"""Drag: a loss with the square of speed."""
+"""Quadratic drag: friction proportional to the square of speed."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,11 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class Drag(Pointwise):
-    """Quadratic drag, of churned grease or air.
+    """Quadratic drag of churned grease or of air.
 
-    Equation: torque = c speed |speed|.
+    Equation: torque = c speed |speed|, speed in rad/s, c in N m s^2/rad^2.
+
+    Check: run at several constant speeds up to the highest; check the amount and type of grease.
 
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -25,5 +27,5 @@ class Drag(Pointwise):
     told_apart_by = "a staircase of constant speeds up to the highest"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (inputs["speed"] * np.abs(inputs["speed"]),)

@@ -1,4 +1,4 @@
-"""Dwell: friction that grows while a contact rests and is worn off by sliding."""
+"""Dwell friction: static friction that grows with the time at standstill."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, its time, what the contact has grown (0 to 1)."""
+    """Fill the rows; state: started (0 or 1), its time, what the contact has grown (0 to 1)."""
     for i in range(len(now)):
         speed, clock = now[i, 0], now[i, 1]
         if state[0]:
@@ -25,10 +25,13 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class Dwell(Remembering):
-    """Break-away friction by the time of rest before it.
+    """Break-away friction that depends on the time at standstill before it.
 
-    Equation: torque = F z tanh(speed / width); dz/dt = (1 - z) / time - z |speed| / way. A run
-    starts after a long rest: z = 1.
+    Equation: torque = F z tanh(speed / width); dz/dt = (1 - z) / time - z |speed| / way. F in N m,
+    width in rad/s, time in s, way in rad; z is the state of the contact, 0 to 1. A run starts after
+    a long standstill: z = 1.
+
+    Check: repeat the same motion after pauses of several lengths.
 
     Source: Dieterich 1979 and Ruina 1983 (the ageing law of rate-and-state friction), with a state
     that is bounded.
@@ -39,13 +42,11 @@ class Dwell(Remembering):
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "clock": "time_s"}
     amplitudes = (Parameter("friction", "target", "loss after a long rest", lower=0.0),)
     shape = (
-        Parameter("time", "clock", "rest after which 63 % has grown", 0.1, 10.0, points=3),
-        Parameter("way", "speed * clock", "slip after which 37 % is left", 0.01, 30.0, points=4),
-        Parameter(
-            "width", "speed", "speed at which 76 % of the direction is there", 0.05, 20.0, points=3
-        ),
+        Parameter("time", "clock", "standstill to reach 63 %", 0.1, 10.0, points=3),
+        Parameter("way", "speed * clock", "slip after which 37 % remains", 0.01, 30.0, points=4),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 0.05, 20.0, points=3),
     )
     walk = _walk
     rest = (0.0, 0.0, 1.0)
     confused_with = ("friction.stribeck", "hysteresis.presliding", "friction.warmup")
-    told_apart_by = "the same motion after rests of several lengths"
+    told_apart_by = "the same motion after pauses of several lengths"

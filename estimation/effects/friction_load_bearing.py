@@ -1,4 +1,4 @@
-"""Friction of a loaded plain bearing: in proportion to what is left behind it, and it lets go."""
+"""Loaded plain bearing: friction proportional to the downstream load, with relaxation."""
 
 import math
 from typing import ClassVar
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, last travel, last time, bristle."""
+    """Fill the rows; state: started (0 or 1), last travel, last time, bristle."""
     share, reach, time, kept = shape[0], shape[1], shape[2], shape[3]
     for i in range(len(now)):
         travel, drive, time_s, speed = now[i, 0], now[i, 1], now[i, 2], now[i, 3]
@@ -32,12 +32,17 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class LoadedBearing(Remembering):
-    """A wrist's bearing: it loses a share of the load behind it, and held, lets go of some of that.
+    """Friction of a wrist's plain bearing, proportional to its downstream load.
 
-    Equation: load = drive / (1 + m s): the loss is m s of what arrives, not of what is sent, so a
-    bearing that loses the same share gives back more in opening than it takes in closing.
-    ds = (sign(d travel) - s) |d travel| / reach - (s - kept sign s) dt / time where |s| > kept. The
-    loss without load, the drag and what accelerates the moving parts are weighed alike.
+    Part of it relaxes while the joint is held.
+
+    Equation: load = drive / (1 + m s). The friction is m s times the downstream load, so it is
+    larger relative to the drive in opening than in closing. ds = (sign(d travel) - s) |d travel| /
+    reach - (s - kept sign s) dt / time where |s| > kept. Friction without load, drag and inertia
+    are divided by 1 + m s too. drive in A, load in N m, m without unit, reach in rad, time in s.
+
+    Check: hold a grasp for thirty seconds and observe the decay of the current's estimate; inspect
+    and lubricate the bearing.
 
     Source: Coulomb's law for a bearing under its own load; s after Dahl 1968; the decay of the
     estimate while a grasp is held is shown in Zhao and Nelson 2016, Figures 11 and 12.
@@ -54,18 +59,16 @@ class LoadedBearing(Remembering):
         "axis_acceleration": "grasp_acceleration_rad_s2",
     }
     amplitudes = (
-        Parameter("gain", "target / axis_current", "load for a unit of drive", lower=0.0),
+        Parameter("gain", "target / axis_current", "load per unit of drive", lower=0.0),
         Parameter("friction", "target", "loss without load, and the drive's zero"),
-        Parameter("damping", "target / axis_speed", "drag for one unit of speed", lower=0.0),
-        Parameter("inertia", "target / axis_acceleration", "what accelerates the parts", lower=0.0),
+        Parameter("damping", "target / axis_speed", "drag per unit of speed", lower=0.0),
+        Parameter("inertia", "target / axis_acceleration", "inertia of the parts", lower=0.0),
     )
     shape = (
-        Parameter("share", "1", "loss for a unit of load", 0.03, 0.9, points=4),
-        Parameter(
-            "reach", "axis_angle", "way after which 63 % of it is there", 1e-3, 1e-1, points=3
-        ),
-        Parameter("time", "clock", "time after which 63 % of that is gone", 0.5, 30.0, points=3),
-        Parameter("kept", "1", "share that stays while it is held", 0.2, 0.98, points=3),
+        Parameter("share", "1", "loss per unit of load", 0.03, 0.9, points=4),
+        Parameter("reach", "axis_angle", "travel to reach 63 %", 1e-3, 1e-1, points=3),
+        Parameter("time", "clock", "time after which 63 % has decayed", 0.5, 30.0, points=3),
+        Parameter("kept", "1", "fraction that remains while it is held", 0.2, 0.98, points=3),
     )
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0)

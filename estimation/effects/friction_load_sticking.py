@@ -1,4 +1,4 @@
-"""Friction that grows with the load and sticks at rest."""
+"""Load-dependent static friction: friction that grows with the drive and sticks at standstill."""
 
 from typing import ClassVar
 
@@ -17,10 +17,13 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class StickingLoadFriction(Remembering):
-    """Teeth and cables that lose a share of what they carry; at rest they hold it.
+    """Friction of teeth and cables, proportional to the transmitted torque, also at standstill.
 
-    Equation: torque = (F + mu |drive|) z; dz = d drive / (limit + share |drive|) +
-    (sign(d travel) - z) |d travel| / reach, -1 <= z <= 1.
+    Equation: torque = (F + mu |drive|) z; dz = d drive / (limit + share |drive|) + (sign(d travel)
+    - z) |d travel| / reach, -1 <= z <= 1. F in N m, drive and limit in the unit of the drive (A or
+    N m), reach in rad, mu in N m per unit of drive, share without unit.
+
+    Check: repeat the same motion at two loads with pauses; inspect teeth and cable guides.
 
     Source: Karnopp 1985 and Dahl 1968 for z; Bittencourt and Gunnarsson 2012 for friction that
     grows with load.
@@ -32,7 +35,7 @@ class StickingLoadFriction(Remembering):
     roles: ClassVar = {"travel": "motor_angle_rad", "drive": "motor_current_a"}
     amplitudes = (
         Parameter("friction", "target", "loss without load"),
-        Parameter("loss", "target / drive", "share of the drive that is lost", lower=0.0),
+        Parameter("loss", "target / drive", "fraction of the drive that is lost", lower=0.0),
     )
     shape = SHAPE
     walk = _walk
@@ -45,4 +48,4 @@ class StickingLoadFriction(Remembering):
         "friction.capstan",
         "hysteresis.presliding",
     )
-    told_apart_by = "the same motion at two loads, with rests on the way"
+    told_apart_by = "the same motion at two loads, with pauses"

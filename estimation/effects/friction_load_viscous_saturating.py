@@ -1,4 +1,4 @@
-"""Load-viscous friction of a film that thins: damping under load that speed wears off."""
+"""Saturating load-viscous friction: damping that grows with load and falls with speed."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class SaturatingLoadViscousFriction(Pointwise):
-    """Viscous friction of a loaded film that is sheared thinner the faster it is sheared.
+    """Viscous friction of a loaded film whose viscosity falls with the shear rate.
 
-    Equation: torque = c |load| speed / (1 + |speed| / knee).
+    Equation: torque = c |load| speed / (1 + |speed| / knee), load in N m, speed and knee in rad/s,
+    c in s/rad.
+
+    Check: run at several constant speeds at two loads; check the lubricant.
 
     Source: Bair and Winer 1979 (a lubricant under pressure bears a limiting shear stress).
     """
@@ -21,15 +24,15 @@ class SaturatingLoadViscousFriction(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "motor_load_n_m"}
     amplitudes = (
-        Parameter("damping", "target / load / speed", "damping for one unit of load", lower=0.0),
+        Parameter("damping", "target / load / speed", "damping per unit of load", lower=0.0),
     )
-    shape = (Parameter("knee", "speed", "speed at which half of it is left", 0.1, 500.0, points=9),)
+    shape = (Parameter("knee", "speed", "speed at which half remains", 0.1, 500.0, points=9),)
     confused_with = ("friction.load", "friction.viscous")
     bends = ("load", "speed")
     told_apart_by = "a staircase of speeds at two loads"
     other_below = ("knee",)
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         speed = inputs["speed"]
         return (np.abs(inputs["load"]) * speed / (1.0 + np.abs(speed) / shape[0]),)

@@ -1,4 +1,4 @@
-"""Friction that changes along the travel and sticks at rest."""
+"""Position-dependent static friction: friction that varies along the travel and sticks."""
 
 from typing import ClassVar
 
@@ -19,10 +19,15 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class StickingPositionFriction(Remembering):
-    """Guides, gears and cables that are tighter in one place than in another; at rest they hold.
+    """Friction of guides, gears and cables that varies along the travel, also at standstill.
 
-    Equation: torque = (F + a x + b x^2 + c x^3) z, x the position; dz = d drive / (limit +
-    share |drive|) + (sign(d travel) - z) |d travel| / reach, -1 <= z <= 1.
+    Equation: torque = (F + a x + b x^2 + c x^3) z, x the position in rad; dz = d drive / (limit +
+    share |drive|) + (sign(d travel) - z) |d travel| / reach, -1 <= z <= 1. F in N m, a in N m/rad,
+    b in N m/rad^2, c in N m/rad^3, limit in the unit of the drive, reach in rad, share without
+    unit.
+
+    Check: move slowly over the whole travel at two loads with pauses, and inspect the places of
+    large friction.
 
     Source: Karnopp 1985 and Dahl 1968 for z; Armstrong-Helouvry 1991, "Control of machines with
     friction", for friction that depends on position.
@@ -38,9 +43,9 @@ class StickingPositionFriction(Remembering):
     }
     amplitudes = (
         Parameter("friction", "target", "loss at position 0"),
-        Parameter("slope", "target / position", "its change with position"),
-        Parameter("bend", "target / position / position", "its change with position squared"),
-        Parameter("twist", "target / position / position / position", "with position cubed"),
+        Parameter("slope", "target / position", "linear change with position"),
+        Parameter("bend", "target / position / position", "quadratic change with position"),
+        Parameter("twist", "target / position / position / position", "cubic change with position"),
     )
     shape = SHAPE
     walk = _walk
@@ -53,4 +58,4 @@ class StickingPositionFriction(Remembering):
         "spring.position",
         "hysteresis.presliding",
     )
-    told_apart_by = "slow sweeps over the whole travel, at two loads, with rests on the way"
+    told_apart_by = "slow sweeps over the whole travel, at two loads, with pauses"

@@ -1,4 +1,4 @@
-"""Stribeck friction: a greater loss at low speed."""
+"""Stribeck friction: friction that is larger at low speed."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class Stribeck(Pointwise):
-    """The part of friction that falls as a film of lubricant builds up.
+    """The part of friction that decreases with speed as a film of lubricant builds up.
 
-    Equation: torque = F exp(-(speed / fall)^2) tanh(speed / width).
+    Equation: torque = F exp(-(speed / fall)^2) tanh(speed / width), F in N m, fall and width in
+    rad/s.
+
+    Check: run at several slow constant speeds around zero; check the lubricant.
 
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -20,16 +23,16 @@ class Stribeck(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (
-        Parameter("friction", "target", "loss at low speed beyond that at speed", lower=0.0),
+        Parameter("friction", "target", "loss at low speed minus that at speed", lower=0.0),
     )
     shape = (
-        Parameter("fall", "speed", "speed at which 37 % of it is left", 1e-2, 1e2),
-        Parameter("width", "speed", "speed at which 76 % of the direction is there", 1e-3, 1e2),
+        Parameter("fall", "speed", "speed at which 37 % remains", 1e-2, 1e2),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),
     )
     confused_with = ("friction.coulomb", "hysteresis.presliding", "sensor.delay")
     bends = ("speed",)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (np.exp(-((inputs["speed"] / shape[0]) ** 2)) * np.tanh(inputs["speed"] / shape[1]),)

@@ -1,4 +1,4 @@
-"""Viscous friction: a loss in proportion to speed."""
+"""Viscous friction: friction proportional to speed."""
 
 from typing import ClassVar
 
@@ -8,7 +8,10 @@ from estimation.effects.effect import Parameter, Proportional
 class ViscousFriction(Proportional):
     """Viscous friction of grease and bearings.
 
-    Equation: torque = b speed.
+    Equation: torque = b speed, speed in rad/s, b in N m s/rad.
+
+    Check: run at several constant speeds in both directions; check amount and temperature of the
+    grease.
 
     Source: the classic friction model; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -23,6 +26,6 @@ class ViscousFriction(Proportional):
         "joint": 1,
     }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
-    amplitudes = (Parameter("damping", "target / speed", "loss for one rad/s", lower=0.0),)
+    amplitudes = (Parameter("damping", "target / speed", "loss per rad/s", lower=0.0),)
     confused_with = ("friction.drag", "sensor.delay")
     told_apart_by = "a staircase of constant speeds in both directions"

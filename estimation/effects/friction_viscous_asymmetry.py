@@ -1,4 +1,4 @@
-"""Viscous asymmetry: another slope of the loss when closing."""
+"""Viscous asymmetry: different viscous damping in closing and in opening."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class ViscousAsymmetry(Pointwise):
-    """The part of viscous friction that does not change its sign with the motion.
+    """The part of viscous friction that does not change its sign with the direction of motion.
 
-    Equation: torque = b |speed|.
+    Equation: torque = b |speed|, speed in rad/s, b in N m s/rad: half the damping of closing minus
+    half that of opening.
+
+    Check: run at several constant speeds in both directions.
 
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
     """
@@ -20,14 +23,12 @@ class ViscousAsymmetry(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (
-        Parameter(
-            "asymmetry", "target / speed", "half the damping of closing less that of opening"
-        ),
+        Parameter("asymmetry", "target / speed", "half the damping of closing minus opening"),
     )
     confused_with = ("friction.coulomb_asymmetry", "friction.drag")
     bends = ("speed",)
     told_apart_by = "a staircase of constant speeds in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["speed"]),)

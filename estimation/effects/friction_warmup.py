@@ -1,4 +1,4 @@
-"""Warm-up: friction that settles while a run lasts."""
+"""Warm-up friction: friction that changes exponentially with time within a run."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the time of the first."""
+    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
         if not state[0]:
             state[0], state[1] = 1.0, now[i, 1]
@@ -20,25 +20,28 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class Warmup(Remembering):
-    """Friction of cold grease that fades, or of a warming fit that grows: then it is negative.
+    """Friction of cold grease that decreases with warming.
 
-    Equation: torque = F exp(-t / time) tanh(speed / width), t since the run's first sample.
+    A negative F is friction that grows, such as of a fit that expands.
 
-    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint
-    as it warms), to first order in temperature.
+    Equation: torque = F exp(-t / time) tanh(speed / width), t from the run's first sample. F in
+    N m, time in s, width in rad/s.
+
+    Check: let the rig run until it is warm and repeat the first run.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
+    it warms), to first order in temperature.
     """
 
     id = "friction.warmup"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "clock": "time_s"}
-    amplitudes = (Parameter("friction", "target", "loss at the start beyond that of long after"),)
+    amplitudes = (Parameter("friction", "target", "loss at the start minus the final loss"),)
     shape = (
-        Parameter("time", "clock", "time after which 37 % is left", 0.5, 60.0, points=6),
-        Parameter(
-            "width", "speed", "speed at which 76 % of the direction is there", 1e-2, 50.0, points=6
-        ),
+        Parameter("time", "clock", "time after which 37 % remains", 0.5, 60.0, points=6),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
     walk = _walk
     rest = (0.0, 0.0)
     confused_with = ("change.step", "friction.dwell", "sensor.drift", "motor.thermal")
-    told_apart_by = "the first run once more at the end, and once more after a night's rest"
+    told_apart_by = "the first run repeated at the end, and again after a night"

@@ -1,4 +1,4 @@
-"""Payload: the weight of what hangs on the joint."""
+"""Payload: gravity torque of a mass on the joint."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,12 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class Payload(Pointwise):
-    """A mass off the axis of rotation, the axis being level.
+    """A mass at a distance from the axis of rotation, with a horizontal axis.
 
-    Equation: torque = m g l (a sin(tilt) + b cos(tilt)).
+    Equation: torque = m g l (a sin(tilt) + b cos(tilt)), tilt in rad. The amplitudes are m g l a
+    and m g l b in N m.
+
+    Check: repeat a slow motion with the rig tilted; check for attached cables and tools.
 
     Source: Newton's law of gravitation near the ground; the gravity term of any manipulator.
     """
@@ -27,7 +30,7 @@ class Payload(Pointwise):
     told_apart_by = "the same slow sweep with the rig tilted"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (
             np.sin(inputs["tilt"]),
             np.cos(inputs["tilt"]),

@@ -1,4 +1,4 @@
-"""The first three harmonics of a wave, for effects whose wave is not a pure sine."""
+"""The first three harmonics, for periodic effects that are not a pure sine."""
 
 from typing import Any
 

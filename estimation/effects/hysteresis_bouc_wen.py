@@ -1,4 +1,4 @@
-"""Hysteresis after Bouc and Wen: a force that follows travel in a loop with rounded corners."""
+"""Bouc-Wen hysteresis: a force with a smooth hysteresis loop over travel."""
 
 from typing import ClassVar
 
@@ -8,12 +8,12 @@ from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
 STEP, SATED = 0.5, 8.0
-"""Longest piece of a path integrated at once, and a path after which it slides, in reaches."""
+"""Longest step of the integration, and the travel after which it slides, in units of reach."""
 
 
 @numba.njit(cache=True)
 def power(size: float, sharpness: float) -> float:
-    """Return size^sharpness; the grid's three by products, several times faster than a power."""
+    """Return size^sharpness; by products for 1, 2 and 4, several times faster than a power."""
     if sharpness == 1.0:
         return size
     if sharpness == 2.0:
@@ -25,13 +25,13 @@ def power(size: float, sharpness: float) -> float:
 
 @numba.njit(cache=True)
 def slope(z: float, way: float, sharpness: float) -> float:
-    """Return dz along the way: 1 while it unloads, 1 - |z|^sharpness while it loads."""
+    """Return dz / d travel in units of reach: 1 in unloading, 1 - |z|^sharpness in loading."""
     return 1.0 - power(abs(z), sharpness) if z * way > 0.0 else 1.0
 
 
 @numba.njit(cache=True)
 def follow(z: float, moved: float, sharpness: float) -> float:
-    """Return z after a path without reversal, `moved` in reaches (classic Runge-Kutta rule)."""
+    """Return z after a travel without reversal, in units of reach (classic Runge-Kutta method)."""
     if abs(moved) > SATED:
         return 1.0 if moved > 0.0 else -1.0
     pieces = int(abs(moved) / STEP) + 1
@@ -48,7 +48,7 @@ def follow(z: float, moved: float, sharpness: float) -> float:
 
 @numba.njit(cache=True)
 def walk_loop(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the last travel, the hysteretic part -1 to 1."""
+    """Fill the rows; state: started (0 or 1), the last travel, the hysteretic part -1 to 1."""
     for i in range(len(now)):
         moved = (now[i, 0] - state[1]) / shape[0] if state[0] else 0.0
         state[0], state[1] = 1.0, now[i, 0]
@@ -58,13 +58,15 @@ def walk_loop(now: FloatArray, shape: FloatArray, state: FloatArray, rows: Float
 
 
 class BoucWen(Remembering):
-    """A loop that opens with travel: wires that rub on each other, a rubber mount.
+    """Hysteresis with rounded corners, such as of rubbing wires or of a rubber mount.
 
-    Equation: torque = F z; dz / d travel = (1 - |z|^n (1 + sign(z d travel)) / 2) / reach, n being
-    the sharpness, z = 0 at the start.
+    Equation: torque = F z; dz / d travel = (1 - |z|^n (1 + sign(z d travel)) / 2) / reach, z = 0 at
+    the start. F in N m, reach in rad, n is the sharpness without unit.
 
-    Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with
-    beta = gamma.
+    Check: reverse the motion with decreasing amplitude and plot torque against travel.
+
+    Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with beta =
+    gamma.
     """
 
     id = "hysteresis.bouc_wen"
@@ -72,8 +74,8 @@ class BoucWen(Remembering):
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "half the height of the loop", lower=0.0),)
     shape = (
-        Parameter("reach", "travel", "way from loop's middle to its end", 1e-3, 10.0, points=12),
-        Parameter("sharpness", "1", "how sharp its corners are", 1.0, 4.0, points=3),
+        Parameter("reach", "travel", "travel from middle to end of loop", 1e-3, 10.0, points=12),
+        Parameter("sharpness", "1", "sharpness of the corners", 1.0, 4.0, points=3),
     )
     walk = walk_loop
     rest = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Hysteresis of a spring: a twist that lags behind the load in a loop."""
+"""Hysteresis of a spring: a deflection with a smooth hysteresis loop over load."""
 
 from typing import ClassVar
 
@@ -12,21 +12,24 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; the state is that of `walk_loop`."""
+    """Fill the rows; the state is that of `walk_loop`."""
     if not state[0]:
         state[0], state[1] = 1.0, shape[2] * now[0, 0]
     walk_loop(now, shape, state, rows)
 
 
 class Twist(Remembering):
-    """What wires that rub on each other keep back of a cable's or a shaft's deflection.
+    """The part of a cable's or a shaft's deflection that is delayed by rubbing wires.
 
-    Equation: deflection lost = F z; dz / d load = (1 - |z|^n (1 + sign(z d load)) / 2) / reach,
-    n being the sharpness. A run starts as loaded in one go from settled times its first load,
-    where z = 0.
+    Equation: deflection lost = F z; dz / d load = (1 - |z|^n (1 + sign(z d load)) / 2) / reach. F
+    in rad, reach in N m, n is the sharpness without unit. At the start of a run the loop is that of
+    a single loading from `settled` times the first load, where z = 0.
 
-    Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with
-    beta = gamma, the load in the place of the deflection.
+    Check: load slowly up and down with growing and decreasing amplitude and plot deflection against
+    load.
+
+    Source: Bouc 1967 and Wen 1976, "Method for random vibration of hysteretic systems", with beta =
+    gamma, the load in the place of the deflection.
     """
 
     id = "hysteresis.bouc_wen.twist"
@@ -35,11 +38,11 @@ class Twist(Remembering):
     roles: ClassVar = {"load": "distal_torque_n_m"}
     amplitudes = (Parameter("lost", "target", "half the width of the loop", lower=0.0),)
     shape = (
-        Parameter("reach", "load", "load from the loop's middle to its end", 1e-3, 1.0, points=9),
-        Parameter("sharpness", "1", "how sharp its corners are", 1.0, 4.0, points=3),
+        Parameter("reach", "load", "load from middle to end of loop", 1e-3, 1.0, points=9),
+        Parameter("sharpness", "1", "sharpness of the corners", 1.0, 4.0, points=3),
         SETTLED,
     )
     walk = _walk
     rest = (0.0, 0.0, 0.0)
     confused_with = ("hysteresis.presliding", "transmission.backlash", "transmission.relaxation")
-    told_apart_by = "loads that swell and shrink slowly, and the same ten times slower"
+    told_apart_by = "loads of slowly growing and shrinking amplitude, and the same ten times slower"

@@ -1,4 +1,4 @@
-"""Presliding after Dahl: a contact that bends before it slides."""
+"""Presliding (Dahl): a contact that deflects elastically before it slides."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the last travel, the deflection / its limit."""
+    """Fill the rows; state: started (0 or 1), the last travel, the deflection / its limit."""
     for i in range(len(now)):
         travel = now[i, 0]
         moved = (travel - state[1]) / shape[0] if state[0] else 0.0
@@ -23,9 +23,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class Presliding(Remembering):
-    """Friction that builds up over a short way after each reversal.
+    """Friction that builds up over a short travel after each reversal.
 
-    Equation: torque = F z; dz / d travel = (1 - z sign(d travel)) / reach, z = 0 at the start.
+    Equation: torque = F z; dz / d travel = (1 - z sign(d travel)) / reach, z = 0 at the start. F in
+    N m, reach in rad.
+
+    Check: reverse with very small amplitudes and plot torque against travel.
 
     Source: Dahl 1968, "A solid friction model", with exponent 1.
     """
@@ -40,8 +43,8 @@ class Presliding(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"travel": "spindle_angle_rad"}
-    amplitudes = (Parameter("friction", "target", "loss once it slides", lower=0.0),)
-    shape = (Parameter("reach", "travel", "way after which 63 % of it is there", 1e-3, 1e1),)
+    amplitudes = (Parameter("friction", "target", "loss in sliding", lower=0.0),)
+    shape = (Parameter("reach", "travel", "travel to reach 63 %", 1e-3, 1e1),)
     walk = _walk
     rest = (0.0, 0.0, 0.0)
     confused_with = (

@@ -1,4 +1,4 @@
-"""Presliding after Maxwell: several contacts side by side, each with its own way to slide."""
+"""Presliding (Maxwell slip): several parallel contacts, each with its own presliding distance."""
 
 from typing import ClassVar
 
@@ -8,12 +8,12 @@ from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
 SPREAD = (1.0, 3.0, 9.0)
-"""Ways to slide of the elements, in units of the shortest."""
+"""Presliding distances of the elements, in units of the shortest."""
 
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the last travel, each element's bend / its limit."""
+    """Fill the rows; state: started (0 or 1), the last travel, each element's bend / its limit."""
     for i in range(len(now)):
         moved = (now[i, 0] - state[1]) / shape[0] if state[0] else 0.0
         state[0], state[1] = 1.0, now[i, 0]
@@ -23,10 +23,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class MaxwellSlip(Remembering):
-    """A bank of springs in series with dry contacts.
+    """Parallel springs, each in series with a dry contact.
 
-    Equation: torque = sum F_k z_k; z_k follows travel / (reach s_k) and stays within -1 and 1,
-    s = 1, 3, 9; z = 0 at the start.
+    Equation: torque = sum F_k z_k; z_k follows travel / (reach s_k) and stays within -1 and 1, s =
+    1, 3, 9; z = 0 at the start. F_k in N m, reach in rad.
+
+    Check: reverse with decreasing amplitude and plot torque against travel.
 
     Source: Lampaert, Al-Bender and Swevers 2003 (generalised Maxwell-slip model), its elements in
     quasi-static motion.
@@ -45,10 +47,10 @@ class MaxwellSlip(Remembering):
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (
         Parameter("short", "target", "loss of the contact that slides first", lower=0.0),
-        Parameter("middle", "target", "loss of the next", lower=0.0),
-        Parameter("long", "target", "loss of the last", lower=0.0),
+        Parameter("middle", "target", "loss of the second contact", lower=0.0),
+        Parameter("long", "target", "loss of the third contact", lower=0.0),
     )
-    shape = (Parameter("reach", "travel", "way to slide of the first", 3e-4, 3.0, points=13),)
+    shape = (Parameter("reach", "travel", "travel until the first slides", 3e-4, 3.0, points=13),)
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0, 0.0)
     confused_with = (

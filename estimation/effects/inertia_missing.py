@@ -8,9 +8,12 @@ from estimation.effects.effect import Parameter, Proportional
 class Inertia(Proportional):
     """Inertia of the rotor, the gearhead or the jaw.
 
-    Equation: torque = J acceleration.
+    Equation: torque = J acceleration, acceleration in rad/s^2, J in kg m^2.
 
-    Source: Newton's second law; the motor balance of any servo joint.
+    Check: repeat the motion at twice the frequency; compare J with the data sheets of motor and
+    gear.
+
+    Source: Newton's second law; the equation of motion of any servo joint.
     """
 
     id = "inertia.missing"

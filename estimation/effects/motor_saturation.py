@@ -1,4 +1,4 @@
-"""Saturation: torque that falls behind a large current."""
+"""Magnetic saturation: a torque constant that falls at large currents."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,11 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class Saturation(Pointwise):
-    """The magnetic circuit saturates: torque = K knee tanh(current / knee).
+    """Saturation of the magnetic circuit: torque = K knee tanh(current / knee).
 
-    Equation: loss = K (current - knee tanh(current / knee)).
+    Equation: loss = K (current - knee tanh(current / knee)), K in N m/A, current and knee in A.
+
+    Check: measure the stall torque at several currents of both signs.
 
     Source: the saturating magnetisation curve of any iron circuit, by a hyperbolic tangent.
     """
@@ -22,11 +24,11 @@ class Saturation(Pointwise):
     amplitudes = (
         Parameter("gain", "target / current", "torque constant at small currents", lower=0.0),
     )
-    shape = (Parameter("knee", "current", "current at which the magnet saturates", 0.05, 5.0),)
+    shape = (Parameter("knee", "current", "current at which it saturates", 0.05, 5.0),)
     confused_with = ("sensor.gain_nonlinear", "friction.load")
     bends = ("current",)
     told_apart_by = "stall at several currents of both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (inputs["current"] - shape[0] * np.tanh(inputs["current"] / shape[0]),)

@@ -1,4 +1,4 @@
-"""Thermal loss of torque: magnets that weaken as the windings' heat reaches them."""
+"""Thermal torque loss: a torque constant that falls with the heat of the current."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the last time, the last current, the heat."""
+    """Fill the rows; state: started (0 or 1), the last time, the last current, the heat."""
     for i in range(len(now)):
         time, current = now[i, 0], now[i, 1]
         past = time - state[1] if state[0] else 0.0
@@ -23,9 +23,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class ThermalLoss(Remembering):
-    """The torque constant falls with the heat of the current's own losses.
+    """The torque constant falls as the heat of the windings reaches the magnets.
 
     Equation: loss = c current heat; d heat / dt = (current^2 - heat) / T, heat = 0 at the start.
+    current in A, heat in A^2, T in s, c in N m/A^3.
+
+    Check: measure the motor's temperature, and repeat a run at once and after the motor has cooled.
 
     Source: the one-body thermal model of a motor, IEC 60034-11, and a magnet's remanence that falls
     in proportion to its temperature.
@@ -38,7 +41,7 @@ class ThermalLoss(Remembering):
         Parameter(
             "loss",
             "target / current / current / current",
-            "fall of the torque constant for one unit of heat",
+            "fall of the torque constant per unit of heat",
             lower=0.0,
         ),
     )
@@ -46,4 +49,4 @@ class ThermalLoss(Remembering):
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0)
     confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
-    told_apart_by = "a run repeated at once after itself, and again after the motor has cooled"
+    told_apart_by = "a run repeated immediately, and again after the motor has cooled"

@@ -1,4 +1,4 @@
-"""Thermal loss of torque by the measured temperature of the motor."""
+"""Thermal torque loss by temperature: a torque constant that falls with motor temperature."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -6,13 +6,16 @@ from typing import Any, ClassVar
 from estimation.effects.effect import Parameter, Pointwise
 
 REFERENCE_K = 298.15
-"""Temperature at which data sheets give a torque constant, K."""
+"""Reference temperature of the torque constant in data sheets, K."""
 
 
 class MeasuredThermalLoss(Pointwise):
-    """The torque constant falls in proportion to the motor's temperature.
+    """The torque constant falls in proportion to the motor's measured temperature.
 
-    Equation: loss = c current (temperature - 298.15 K).
+    Equation: loss = c current (temperature - 298.15 K), current in A, temperature in K, c in N m/(A
+    K).
+
+    Check: compare c with the temperature coefficient of the data sheet.
 
     Source: the reversible temperature coefficient of a magnet's remanence, IEC 60404-8-1.
     """
@@ -25,12 +28,12 @@ class MeasuredThermalLoss(Pointwise):
         Parameter(
             "loss",
             "target / current / temperature",
-            "fall of the torque constant for one kelvin",
+            "fall of the torque constant per kelvin",
             lower=0.0,
         ),
     )
     confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
-    told_apart_by = "a run repeated at once after itself, and again after the motor has cooled"
+    told_apart_by = "a run repeated immediately, and again after the motor has cooled"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return the current times the warming."""

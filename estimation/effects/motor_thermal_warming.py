@@ -1,4 +1,4 @@
-"""Thermal loss of torque over the time of a run, whatever heats the motor."""
+"""Thermal torque loss over a run: a torque constant that settles to its warm value."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the time of the first."""
+    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
         if not state[0]:
             state[0], state[1] = 1.0, now[i, 0]
@@ -19,9 +19,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class WarmingLoss(Remembering):
-    """The torque constant settles to its warm value by an exponential.
+    """The torque constant settles to its warm value, whatever the source of heat.
 
-    Equation: loss = c current (1 - exp(-t / T)), t from the first sample of the run.
+    Equation: loss = c current (1 - exp(-t / T)), t from the first sample of the run. current in A,
+    c in N m/A, T in s.
+
+    Check: repeat a run at once and after the motor has cooled.
 
     Source: Newton's law of cooling under a steady mean load, and a magnet's remanence that falls in
     proportion to its temperature.
@@ -38,4 +41,4 @@ class WarmingLoss(Remembering):
     walk = _walk
     rest = (0.0, 0.0)
     confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
-    told_apart_by = "a run repeated at once after itself, and again after the motor has cooled"
+    told_apart_by = "a run repeated immediately, and again after the motor has cooled"

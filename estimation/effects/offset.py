@@ -1,4 +1,4 @@
-"""Offset: a constant in the balance, such as the zero of a torque sensor."""
+"""Offset: a constant in the equation, such as the zero of a torque sensor."""
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
@@ -12,7 +12,9 @@ from estimation.recording import FloatArray
 class Offset(Effect):
     """A constant.
 
-    Equation: torque = b.
+    Equation: torque = b, b in N m.
+
+    Check: read the unloaded sensor at standstill before and after a run.
 
     Source: O'Neill et al. 2018, section II.E (the linear fit's intercept).
     """
@@ -21,7 +23,7 @@ class Offset(Effect):
     roles: ClassVar = {"clock": "time_s"}
     amplitudes = (Parameter("offset", "target", "the constant"),)
     confused_with = ("sensor.drift", "friction.coulomb_asymmetry")
-    told_apart_by = "the unloaded sensor at rest before and after a run"
+    told_apart_by = "the unloaded sensor at standstill before and after a run"
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
         """Return a column of ones, shape (n, 1)."""

@@ -1,4 +1,4 @@
-"""Current ripple: a torque constant that varies over the motor's turn."""
+"""Current ripple: a torque constant that varies with the motor angle."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,14 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class CurrentRipple(Pointwise):
-    """Ripple of the magnet's flux through the windings. The order need not be whole.
+    """Variation of the magnets' flux through the windings over a turn.
 
-    Equation: torque = current (a sin(order angle) + b cos(order angle)).
+    The order need not be an integer.
+
+    Equation: torque = current (a sin(order angle) + b cos(order angle)), current in A, angle in
+    rad, a and b in N m/A, order in periods per turn.
+
+    Check: turn slowly at two currents; the ripple grows in proportion to the current.
 
     Source: Piccoli and Yim 2016 (mutual torque ripple).
     """
@@ -23,7 +28,7 @@ class CurrentRipple(Pointwise):
         Parameter("sine", "target / current", "amplitude of the sine"),
         Parameter("cosine", "target / current", "amplitude of the cosine"),
     )
-    shape = (Parameter("order", "1", "periods a turn", 0.5, 20.5, linear=True, points=401),)
+    shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
     confused_with = ("ripple.motor", "eccentric.load")
     told_apart_by = "the same slow sweep at two currents"
 

@@ -1,4 +1,4 @@
-"""Motor ripple: torque that repeats with the motor's turn."""
+"""Motor torque ripple: torque that is periodic in the motor angle (cogging)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,9 +9,13 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class MotorRipple(Pointwise):
-    """Cogging and commutation of the motor. The order need not be whole.
+    """Cogging and commutation of the motor. The order need not be an integer.
 
-    Equation: torque = a sin(order angle) + b cos(order angle).
+    Equation: torque = a sin(order angle) + b cos(order angle), a and b in N m, angle in rad, order
+    in periods per turn.
+
+    Check: turn the shaft slowly without current and feel the cogging; compare the order with the
+    numbers of poles, slots and commutator segments.
 
     Source: Piccoli and Yim 2016 (cogging maps of motors).
     """
@@ -24,9 +28,9 @@ class MotorRipple(Pointwise):
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
-    shape = (Parameter("order", "1", "periods a turn", 0.5, 20.5, linear=True, points=401),)
+    shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
     confused_with = ("ripple.output", "ripple.current", "sensor.encoder_inl")
-    told_apart_by = "a sweep at a slow constant speed, and a coast without current"
+    told_apart_by = "a sweep at a slow constant speed, and coasting without current"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return sine and cosine."""

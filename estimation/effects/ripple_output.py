@@ -1,4 +1,4 @@
-"""Output ripple: what repeats with the turn of the output, behind the gearhead."""
+"""Output ripple: torque or angle that is periodic in the output angle, after the gearhead."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,11 +9,13 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class OutputRipple(Pointwise):
-    """A wave over the spindle's turn: a bent shaft, teeth of the last stage, a notched pulley.
+    """A periodic error over the spindle's turn: bent shaft, gear teeth or notched pulley.
 
-    Equation: torque or angle = a sin(order angle) + b cos(order angle). The order need not be
-    whole. It stays below the gear ratio: a wave that comes once a turn of the motor, or several
-    times, is the motor's.
+    Equation: torque or angle = a sin(order angle) + b cos(order angle), a and b in the target's
+    unit (N m or rad), angle in rad, order in periods per turn. The order need not be an integer. It
+    is below the gear ratio: a period of one motor turn or less belongs to the motor.
+
+    Check: measure the runout of the output shaft and pulley; inspect the last gear stage.
 
     Source: order tracking of rotating machines; Randall 2011, "Vibration-based Condition
     Monitoring", section 3.6.
@@ -33,8 +35,8 @@ class OutputRipple(Pointwise):
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
-    # a spindle turns by a third: two orders nearer than 0.5 are the same wave to it
-    shape = (Parameter("order", "1", "periods a turn", 1.0, 32.0, linear=True, points=63),)
+    # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
+    shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=63),)
     confused_with = (
         "ripple.motor",
         "sensor.encoder_inl",

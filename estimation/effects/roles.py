@@ -1,10 +1,10 @@
-"""Which channel plays which role of an effect in which balance.
+"""The channel of each role of an effect in each equation.
 
-The cleanest sensor that carries a quantity plays it: speed comes from the motor's encoder. Behind
-the gearbox, for cable and stretch, it comes from the spindle's: what winds up turns the motor and
-not the spindle (on measured data the motor's speed doubles the cable's error), and the jaw's coarse
-encoder makes a delay that is not there. A load is never the balance's own target: noise shared by
-both sides of a balance looks like an effect.
+Each quantity comes from its least noisy sensor: speed comes from the motor's encoder. After the
+gearbox, for cable and stretch, it comes from the spindle's encoder: gear wind-up turns the motor
+and not the spindle (on measured data the motor's speed doubles the cable's error), and the jaw's
+coarse encoder causes an apparent delay. A load is never the target of the same equation: noise
+shared by both sides of an equation looks like an effect.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,13 +18,13 @@ JOINTS = range(1, 8)
 """Joints of the arm that may act on one another."""
 
 AXES = ("grasp", "pitch", "yaw")
-"""Axes of a wristed grasper, as what is done with them shows them."""
+"""Axes of a wristed grasper in the space of the task."""
 
 MOTORS = ("yaw", "jaw_1", "jaw_2")
-"""The same grasper's axes as its motors turn them."""
+"""The same grasper's axes in the space of its motors."""
 
 ANGLES = ("position", "travel", "motor_angle", "output_angle", "encoder", "stop", "tilt")
-"""Roles that the angle of an axis plays where it has no other encoder."""
+"""Roles of the angle of an axis with a single encoder."""
 
 _MOTION = {
     "speed": ("motor_velocity_rad_s",),
@@ -44,7 +44,7 @@ _MOTION = {
 
 _BEHIND_THE_GEAR = _MOTION | {
     "speed": ("spindle_velocity_rad_s",),
-    # of the jaw, which swings on its cable
+    # of the jaw, which oscillates on its cable
     "acceleration": ("motor_acceleration_rad_s2", "jaw_acceleration_rad_s2"),
 }
 
@@ -99,21 +99,21 @@ CHANNELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "tilt": ("spindle_angle_rad",),
     },
 }
-"""Balance to role to channels, each a way to play the role of its own."""
+"""Equation to role to channels; each channel is one alternative for the role."""
 
 
 class Entry(NamedTuple):
-    """One way an effect may enter a balance: its side, and the channel of each role."""
+    """One way to add an effect to an equation: its side, and the channel of each role."""
 
     sign: int
     channels: Mapping[str, str]
 
 
 def _of_joint(joint: int) -> list[Mapping[str, tuple[str, ...]]]:
-    """Return the roles in the torque balance of one joint of an arm.
+    """Return the roles in the torque equation of one joint of an arm.
 
-    Once for a joint that turns, once for one that slides, and once for each motor of a cable-driven
-    wrist that the joint feels: an effect sits in one of these and takes all its motion from there.
+    One mapping for a revolute joint, one for a prismatic joint, and one for each motor of a
+    cable-driven wrist that acts on the joint. An effect takes all its motion from one of them.
     """
     own = f"joint_{joint}"
     others = [f"joint_{other}" for other in JOINTS if other != joint]
@@ -139,7 +139,7 @@ def _either(names: Sequence[str], *units: str) -> tuple[str, ...]:
 
 
 def _moving(position: str, velocity: str, acceleration: str) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles that one motion plays."""
+    """Return the roles of one motion."""
     return {
         "speed": (velocity,),
         "acceleration": (acceleration,),
@@ -151,7 +151,7 @@ def _moving(position: str, velocity: str, acceleration: str) -> Mapping[str, tup
 
 
 def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
-    """Return the roles in the balance of one axis of a wrist, from its own motor's current."""
+    """Return the roles in the equation of one axis of a wrist, from its own motor's current."""
     others = [other for other in (AXES if axis in AXES else MOTORS) if other != axis]
     current, angle = f"{axis}_current_a", f"{axis}_angle_rad"
     return _MOTION | {
@@ -173,7 +173,7 @@ def _of_axis(axis: str) -> Mapping[str, tuple[str, ...]]:
 
 
 def _known(kind: str, number: str) -> list[Mapping[str, tuple[str, ...]]]:
-    """Return the roles of a balance, once for each motion that may be in it."""
+    """Return the roles of an equation, one mapping for each motion that may be in it."""
     if kind == "joint":
         return _of_joint(int(number))
     if kind == "calibration":
@@ -199,9 +199,9 @@ OF_SENSOR: Mapping[str, int] = {
     "sensor.gain_nonlinear": 1,
     "sensor.crosstalk": 1,
 }
-"""Effects that may enter the balance of a sensor's calibration, `reference = calibrated`, and their
-side. What makes a sensor lag behind its load adds to the reference while the load rises. Where the
-load is known exactly the balance is `read = applied`."""
+"""Candidate effects for the equation of a sensor's calibration, `reference = calibrated`, and their
+side. An effect that makes a sensor lag its load adds to the reference while the load rises. Where
+the load is known exactly the equation is `read = applied`."""
 
 _CALIBRATED = ("calibrated_n", "applied_n", "applied_n_m")
 _SENSOR = {
@@ -220,7 +220,7 @@ OF_ENCODER: Mapping[str, int] = {
     "sensor.delay": 1,
     "sensor.drift": 1,
 }
-"""Effects that may enter the balance of an encoder's calibration against another one."""
+"""Candidate effects for the equation of an encoder's calibration against another one."""
 
 _ENCODER = {
     "encoder": ("reference_angle_rad",),
@@ -231,11 +231,11 @@ _ENCODER = {
 }
 
 PARTS = {"current": "motor", "gearbox": "gearbox"}
-"""Calibrations of a part of the rig, and the balance of the rig that each is."""
+"""Calibrations of a part of the rig, and the corresponding equation of the rig."""
 
 
 def _side(effect: Effect, kind: str, number: str) -> int | None:
-    """Return the side of a balance that an effect stands on; None where it has no business."""
+    """Return the side of an effect in an equation; None if the effect does not apply."""
     if kind == "calibration" and number in PARTS:
         return effect.balances.get(PARTS[number])
     if kind == "calibration":
@@ -246,11 +246,11 @@ def _side(effect: Effect, kind: str, number: str) -> int | None:
 
 
 def entries(effect: Effect, balance: str) -> list[Entry]:
-    """Return the ways an effect may enter a balance; none when it has no business there.
+    """Return the ways to add an effect to an equation; empty if it does not apply there.
 
     Args:
         effect: An effect of the catalogue.
-        balance: Balance id, such as `motor` or `joint.3`.
+        balance: Id of the equation, such as `motor` or `joint.3`.
     """
     kind, _, number = balance.partition(".")
     sign = _side(effect, kind, number)

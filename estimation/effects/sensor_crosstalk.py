@@ -1,4 +1,4 @@
-"""Crosstalk: a sensor that answers to what another one measures."""
+"""Sensor crosstalk: a sensor that responds to another measured quantity."""
 
 from typing import ClassVar
 
@@ -6,11 +6,15 @@ from estimation.effects.effect import Parameter, Proportional
 
 
 class Crosstalk(Proportional):
-    """A share of another quantity in a torque reading: motor current, another axis, a bent mount.
+    """A fraction of another quantity in a torque reading.
 
-    Equation: error = a other_reading. What leaks into the target or into a regressor: motor from
-    the jaw's angle, gearbox from the current or the distal torque, cable from the current, stretch
-    from the proximal torque or the current.
+    The other quantity is the motor current or another axis; a bent mount is one cause.
+
+    Equation: error = a other_reading, a in the target's unit per unit of the other reading. The
+    other quantity in each equation: jaw angle for the motor, current or distal torque for the
+    gearbox, current for the cable, proximal torque or current for the stretch.
+
+    Check: vary the other quantity while the sensor is unloaded; check the shielding of its wires.
 
     Source: the cross-axis terms of the calibration matrix of multi-axis transducers, ISO 376:2011
     and any six-axis sensor's certificate.
@@ -19,7 +23,7 @@ class Crosstalk(Proportional):
     id = "sensor.crosstalk"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1}
     roles: ClassVar = {"other_reading": "motor_current_a"}
-    amplitudes = (Parameter("share", "target / other_reading", "what one unit of it adds"),)
-    projected_roles = ("other_reading",)  # what the balance lacks is in the other reading too
+    amplitudes = (Parameter("share", "target / other_reading", "reading added per unit of it"),)
+    projected_roles = ("other_reading",)  # an unmodelled effect is in the other reading too
     confused_with = ("friction.load", "spring.position", "coupling.torque", "gravity.payload")
     told_apart_by = "the other quantity moved while the sensor is unloaded"

@@ -1,4 +1,4 @@
-"""Sensor delay: a reading that arrives late as a whole."""
+"""Sensor delay: a reading with a constant transport delay."""
 
 from typing import ClassVar
 
@@ -8,11 +8,11 @@ from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
 PLACES = 64
-"""Samples the ring remembers."""
+"""Number of samples in the ring buffer."""
 
 SPAN = 60
-"""Parts of a delay; samples nearer to one another than one part are not all remembered, so that the
-ring reaches over the delay at any rate."""
+"""Parts of a delay; samples closer together than one part are not all stored, so that the ring
+buffer covers the delay at any sample rate."""
 
 _COUNT, _TIMES = 0, 1
 _VALUES = _TIMES + PLACES
@@ -20,17 +20,17 @@ _VALUES = _TIMES + PLACES
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: samples remembered so far, their times as a ring, their values as a ring."""
+    """Fill the rows; state: number of stored samples, ring of their times, ring of their values."""
     delay = shape[0]
     for i in range(len(now)):
         time, value = now[i, 0], now[i, 1]
         count = int(state[_COUNT])
-        later, late_value = time, value  # the youngest known point not before the time asked for
+        later, late_value = time, value  # the known point at or after the delayed time
         past = value
         for back in range(1, min(count, PLACES) + 1):
             place = (count - back) % PLACES
             earlier, early_value = state[_TIMES + place], state[_VALUES + place]
-            past = early_value  # before the first sample it has always been the first value
+            past = early_value  # before the first sample the value is the first one
             if earlier <= time - delay:
                 if later > earlier:
                     share = (time - delay - earlier) / (later - earlier)
@@ -46,13 +46,16 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class SensorDelay(Remembering):
-    """A reading that is late by a constant time, which need not be whole samples.
+    """A reading that is late by a constant time, which need not be a multiple of the sample period.
 
-    Equation: error = a (reading(t - d) - reading(t)), straight between samples. A late target shows
-    through what the balance says of it (a > 0), a late regressor as the opposite (a < 0): motor by
-    the projected load or the current, gearbox by the proximal torque, cable by the distal torque,
-    stretch by the distal torque or the spindle's angle, which stands for the jaw's too. Where the
-    motion is slow against the delay, only the product a d is told.
+    Equation: error = a (reading(t - d) - reading(t)), linear between samples, a in the target's
+    unit per unit of the reading, d in s. A late target appears through the model's prediction of it
+    (a > 0), a late regressor with the opposite sign (a < 0): motor by the projected load or the
+    current, gearbox by the proximal torque, cable by the distal torque, stretch by the distal
+    torque or the spindle's angle, which also represents the jaw's. Where the motion is slow
+    compared with the delay, only the product a d is identifiable.
+
+    Check: compare the filter settings and sample timing of the channels; a chirp shows the delay.
 
     Source: transport delay of sampled instruments; Ljung 1999, "System Identification", chapter 4.
     """
@@ -67,9 +70,9 @@ class SensorDelay(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
-    # a late reading weighs as much as the reading: 1 for the target's own, at most 1.5 on the rig
+    # a late reading has the weight of the reading: 1 for the target, at most 1.5 on the rig
     amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
-    shape = (Parameter("delay", "clock", "how late it is", 2e-4, 5e-2, points=6),)
+    shape = (Parameter("delay", "clock", "transport delay", 2e-4, 5e-2, points=6),)
     walk = _walk
     rest = (0.0,) * (_VALUES + PLACES)
     projected_roles = ("reading",)

@@ -1,4 +1,4 @@
-"""Logarithmic drift: a zero that moves ever more slowly and never settles."""
+"""Logarithmic sensor drift: a zero that changes with the logarithm of time."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the time of the first."""
+    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
         if not state[0]:
             state[0], state[1] = 1.0, now[i, 0]
@@ -19,9 +19,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class LogarithmicDrift(Remembering):
-    """A zero that moves by the same amount in each decade of time, as polymers relax.
+    """A zero that changes by the same amount in each decade of time, as polymers relax.
 
-    Equation: error = a ln(1 + t / T), t from the first sample of the run.
+    Equation: error = a ln(1 + t / T), t from the first sample of the run. a in the target's unit, T
+    in s.
+
+    Check: read the unloaded sensor at standstill before, during and after a run.
 
     Source: drift of piezoresistive force sensors, stated by their makers as % for each decade of
     time; Hall et al. 2008 for force-sensing resistors.
@@ -31,9 +34,9 @@ class LogarithmicDrift(Remembering):
     family = "sensor.drift"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"clock": "time_s"}
-    amplitudes = (Parameter("drift", "target", "change while time grows 2.7 times"),)
-    shape = (Parameter("onset", "clock", "time after which it slows down", 0.05, 50.0, points=4),)
+    amplitudes = (Parameter("drift", "target", "change per factor 2.7 of time"),)
+    shape = (Parameter("onset", "clock", "time when the change slows", 0.05, 50.0, points=4),)
     walk = _walk
     rest = (0.0, 0.0)
     confused_with = ("sensor.creep", "friction.warmup", "motor.thermal", "change.step")
-    told_apart_by = "the unloaded sensor at rest before, during and after a run"
+    told_apart_by = "the unloaded sensor at standstill before, during and after a run"

@@ -1,4 +1,4 @@
-"""Encoder error: a reading of an angle that is wrong by a wave over its turn."""
+"""Encoder non-linearity: an angle reading with an error periodic in the angle."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,12 +9,19 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class EncoderNonlinearity(Pointwise):
-    """An encoder off its centre (order 1), a tilted magnet (2), unequal phases (4, or its lines).
+    """A periodic error of an encoder over its turn.
 
-    Equation: error = a sin(order angle) + b cos(order angle). In the balances of angles only: the
-    motor's or the spindle's encoder in the gearbox's, the spindle's or the jaw's in the stretch's.
-    The jaw's own encoder is the target there, and the waves of an angle add up to the angle itself,
-    so its error is taken over what spindle and load say of that angle.
+    Its causes are eccentricity (order 1), a tilted magnet (2), or unequal phases (4, or the number
+    of lines).
+
+    Equation: error = a sin(order angle) + b cos(order angle), a and b in rad, angle in rad, order
+    in periods per turn. It is a candidate in the equations of angles only: the motor's or the
+    spindle's encoder in the gearbox's, the spindle's or the jaw's in the stretch's. The jaw's
+    encoder is the target there, and enough harmonics of an angle can represent the angle itself, so
+    its error is computed over the prediction of that angle from spindle and load.
+
+    Check: turn slowly without load, and again with the other sensor turned by half a turn; check
+    the encoder's mount.
 
     Source: integral non-linearity of magnetic angle encoders by harmonics of the turn, as their
     makers' data sheets give it.
@@ -27,9 +34,11 @@ class EncoderNonlinearity(Pointwise):
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
-    shape = (Parameter("order", "1", "periods a turn", 1.0, 32.0, linear=True, points=32),)
+    shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=32),)
     confused_with = ("ripple.motor", "ripple.output", "coupling.kinematic", "eccentric.load")
-    told_apart_by = "a slow sweep without load, and the same with the other sensor turned by half"
+    told_apart_by = (
+        "a slow sweep without load, repeated with the other sensor turned by half a turn"
+    )
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return sine and cosine."""

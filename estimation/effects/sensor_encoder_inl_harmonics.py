@@ -1,4 +1,4 @@
-"""Encoder error with harmonics: a wave over the turn that is not a pure sine."""
+"""Encoder non-linearity with harmonics: a periodic angle error with harmonics."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,18 +9,21 @@ from estimation.effects.sensor_encoder_inl import EncoderNonlinearity
 
 
 class EncoderHarmonics(EncoderNonlinearity):
-    """An encoder whose wave is not a pure sine.
+    """An encoder whose periodic error is not a pure sine.
 
-    Equation: error = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order angle).
+    Equation: error = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order angle), a_n
+    and b_n in rad, angle in rad, order in periods per turn.
 
-    Source: the harmonics that amplitude, offset and phase errors of the two tracks leave, as makers
+    Check: turn slowly without load, and again with the other sensor turned by half a turn.
+
+    Source: the harmonics caused by amplitude, offset and phase errors of the two tracks, as makers
     of magnetic angle encoders state them.
     """
 
     id = "sensor.encoder_inl.harmonics"
     family = "sensor.encoder_inl"
     amplitudes = HARMONIC_AMPLITUDES
-    shape = (Parameter("order", "1", "periods a turn", 1.0, 16.0, linear=True, points=16),)
+    shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return sine and cosine of each harmonic."""

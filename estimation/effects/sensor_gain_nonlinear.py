@@ -1,4 +1,4 @@
-"""Non-linear gain: a sensor whose slope changes over its range."""
+"""Sensor non-linearity: a sensor whose gain changes over its range."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -7,12 +7,14 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class NonlinearGain(Pointwise):
-    """The square and the cube of a reading, as the certificate of a sensor gives them.
+    """The quadratic and cubic terms of a reading, as in the certificate of a sensor.
 
-    Equation: error = a reading^2 + b reading^3. The bend of the target shows through what the
-    balance says of it, the bend of a regressor by itself: motor by the projected load or the
-    current, gearbox by the proximal torque, cable by the distal torque, stretch by the distal
-    torque or the spindle's angle.
+    Equation: error = a reading^2 + b reading^3, a and b in the target's unit per power of the
+    reading. Non-linearity of the target appears through the model's prediction of it, non-linearity
+    of a regressor directly: motor by the projected load or the current, gearbox by the proximal
+    torque, cable by the distal torque, stretch by the distal torque or the spindle's angle.
+
+    Check: load the sensor with reference weights over its whole range, with both signs.
 
     Source: polynomial calibration of force transducers, ISO 376:2011, annex (cubic fit).
     """
@@ -21,8 +23,8 @@ class NonlinearGain(Pointwise):
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"reading": "motor_load_n_m"}
     amplitudes = (
-        Parameter("square", "target / reading / reading", "part that bends to one side"),
-        Parameter("cube", "target / reading / reading / reading", "part that bends to both"),
+        Parameter("square", "target / reading / reading", "quadratic term"),
+        Parameter("cube", "target / reading / reading / reading", "cubic term"),
     )
     confused_with = (
         "motor.saturation",

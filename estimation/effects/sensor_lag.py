@@ -1,4 +1,4 @@
-"""Sensor lag: a reading that follows what it measures as a first-order lag does."""
+"""Sensor lag: a reading with a first-order low-pass filter."""
 
 from typing import ClassVar
 
@@ -7,12 +7,15 @@ from estimation.effects.first_order import AT_REST, behind
 
 
 class SensorLag(Remembering):
-    """A reading behind a first-order filter that the others do not go through.
+    """A reading behind a first-order low-pass filter that the other channels do not have.
 
-    Equation: error = a (lagged - reading); d lagged / dt = (reading - lagged) / T, at rest on the
-    first sample. A late target shows through what the balance says of it (a > 0), a late regressor
-    as the opposite (a < 0): motor by the projected load or the current, gearbox by the proximal
-    torque, cable by the distal torque, stretch by the distal torque or the spindle's angle.
+    Equation: error = a (lagged - reading); d lagged / dt = (reading - lagged) / T, steady on the
+    first sample, a in the target's unit per unit of the reading, T in s. A late target appears
+    through the model's prediction of it (a > 0), a late regressor with the opposite sign (a < 0):
+    motor by the projected load or the current, gearbox by the proximal torque, cable by the distal
+    torque, stretch by the distal torque or the spindle's angle.
+
+    Check: compare the filter settings of the amplifiers.
 
     Source: any anti-aliasing filter or bridge amplifier; Ljung 1999, "System Identification",
     section 13.7 (filters of the channels must match).
@@ -28,7 +31,7 @@ class SensorLag(Remembering):
         "joint": 1,
     }
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
-    # a late reading weighs as much as the reading: 1 for the target's own, at most 1.5 on the rig
+    # a late reading has the weight of the reading: 1 for the target, at most 1.5 on the rig
     amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
     shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 0.2, points=6),)
     walk = behind
@@ -42,4 +45,4 @@ class SensorLag(Remembering):
         "friction.viscous",
         "transmission.relaxation",
     )
-    told_apart_by = "a chirp: the lag's phase bends with frequency, and its gain falls"
+    told_apart_by = "a chirp: the lag's gain falls with frequency"

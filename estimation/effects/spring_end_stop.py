@@ -1,4 +1,4 @@
-"""End stop: a spring that is met beyond some angle."""
+"""End stop: a contact spring beyond a limit angle."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,11 +9,13 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class EndStop(Pointwise):
-    """A stop, a fold of a hose or an object met on closing.
+    """A stop, a fold of a hose or an object that is contacted on closing.
 
-    Where it is met lies near one end of the travel: a stop that is never left is a spring.
+    The contact is near one end of the travel: a stop that is always in contact is a spring.
 
-    Equation: torque = k max(angle - onset, 0).
+    Equation: torque = k max(angle - onset, 0), angle and onset in rad, k in N m/rad.
+
+    Check: move slowly by hand to the end of the travel and look for the contact.
 
     Source: Hooke's law with a contact that does not pull.
     """
@@ -21,11 +23,11 @@ class EndStop(Pointwise):
     id = "spring.end_stop"
     balances: ClassVar = {"cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"stop": "jaw_angle_rad"}
-    amplitudes = (Parameter("stiffness", "target / stop", "torque a radian beyond", lower=0.0),)
-    shape = (Parameter("onset", "stop", "angle at which it is met", -0.7, 2.5, True, 41),)
+    amplitudes = (Parameter("stiffness", "target / stop", "torque per radian beyond", lower=0.0),)
+    shape = (Parameter("onset", "stop", "angle of first contact", -0.7, 2.5, True, 41),)
     confused_with = ("spring.position", "gravity.payload", "transmission.stiffening")
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (np.maximum(inputs["stop"] - shape[0], 0.0),)

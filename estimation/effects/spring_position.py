@@ -1,4 +1,4 @@
-"""Spring: torque in proportion to position."""
+"""Spring: torque proportional to position."""
 
 from typing import ClassVar
 
@@ -8,7 +8,10 @@ from estimation.effects.effect import Parameter, Proportional
 class PositionSpring(Proportional):
     """A spring between the moving part and the frame: a hose, a wire, a return spring.
 
-    Equation: torque = k position. Where the spring is relaxed is told by the balance's offset.
+    Equation: torque = k position, position in rad, k in N m/rad. The equation's offset determines
+    the relaxed position.
+
+    Check: move slowly without load in both directions; look for hoses and wires that are pulled.
 
     Source: Hooke's law.
     """
@@ -16,6 +19,6 @@ class PositionSpring(Proportional):
     id = "spring.position"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
-    amplitudes = (Parameter("stiffness", "target / position", "torque for one radian"),)
+    amplitudes = (Parameter("stiffness", "target / position", "torque per radian"),)
     confused_with = ("transmission.stiffening", "gravity.payload", "friction.position")
     told_apart_by = "a slow free sweep without load, in both directions"

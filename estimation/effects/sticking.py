@@ -1,8 +1,8 @@
-"""The share of friction that acts when a contact may stick: a state of travel and drive.
+"""The active fraction of friction of a contact that may stick: a state of travel and drive.
 
-At rest friction is whatever balances the drive, up to its limit. No speed tells that value, and an
-encoder is too coarse for the deflection that would; but the drive's changes since the contact stuck
-add up to it. So the state follows the drive while it sticks and the travel while it slides.
+At standstill friction equals the drive, up to its limit. That value does not follow from the speed,
+and an encoder is too coarse for the deflection; but it is the sum of the drive's changes since the
+contact stuck. So the state follows the drive while it sticks and the travel while it slides.
 """
 
 import numba
@@ -12,21 +12,21 @@ from estimation.effects.effect import Parameter
 from estimation.recording import FloatArray
 
 REST = (0.0, 0.0, 0.0, 0.0)
-"""Whether a sample has come, its travel, its drive, and the share of friction that acts."""
+"""Started (0 or 1), last travel, last drive, and the active fraction of friction."""
 
 SHAPE = (
-    Parameter("reach", "travel", "way after which 63 % of sliding friction is there", 3e-3, 3e0),
-    Parameter("limit", "drive", "drive that sticking friction holds without load", 5e-3, 3e-1),
-    Parameter("share", "1", "more of it for each unit of drive", 3e-2, 3e0),
+    Parameter("reach", "travel", "travel to reach 63 % of sliding friction", 3e-3, 3e0),
+    Parameter("limit", "drive", "drive held by static friction without load", 5e-3, 3e-1),
+    Parameter("share", "1", "increase of the limit per unit of drive", 3e-2, 3e0),
 )
 
 
 @numba.njit(cache=True)
 def advance(travel: float, drive: float, shape: FloatArray, state: FloatArray) -> float:
-    """Return the share of friction that acts, -1 to 1, after one more sample.
+    """Return the active fraction of friction, -1 to 1, after one more sample.
 
-    Source: Karnopp 1985, "Computer simulation of stick-slip friction", for what acts while it
-    sticks; Dahl 1968, "A solid friction model", for the way from sticking to sliding.
+    Source: Karnopp 1985, "Computer simulation of stick-slip friction", for sticking; Dahl 1968, "A
+    solid friction model", for the transition from sticking to sliding.
     """
     if state[0] == 0.0:
         state[0], state[1], state[2] = 1.0, travel, drive

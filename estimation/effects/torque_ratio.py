@@ -1,4 +1,4 @@
-"""Torque ratio: torque at one end of the transmission in proportion to the other end's."""
+"""Torque ratio: torque at one end of the transmission proportional to the other end's."""
 
 from typing import ClassVar
 
@@ -8,13 +8,15 @@ from estimation.effects.effect import Parameter, Proportional
 class TorqueRatio(Proportional):
     """Ideal transmission of torque by cable and pulleys.
 
-    Equation: torque = ratio x load.
+    Equation: torque = ratio x load, both in N m, the ratio without unit.
+
+    Check: compare the ratio with the pulley diameters.
 
     Source: O'Neill et al. 2018, section II.A (spindle and jaw torque sensors at the two ends).
     """
 
     id = "transmission.ratio"
     roles: ClassVar = {"load": "distal_torque_n_m"}
-    amplitudes = (Parameter("ratio", "target / load", "torque here for one unit there"),)
+    amplitudes = (Parameter("ratio", "target / load", "torque here per unit of torque there"),)
     confused_with = ("friction.load", "friction.capstan")
     told_apart_by = "loading and unloading at the same slow speed"

@@ -1,4 +1,4 @@
-"""Backlash by travel: play that is crossed after each reversal."""
+"""Backlash by travel: free travel that is crossed after each reversal."""
 
 from typing import ClassVar
 
@@ -10,7 +10,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, the last travel, the place in the play -1 to 1."""
+    """Fill the rows; state: started (0 or 1), the last travel, the place in the play -1 to 1."""
     for i in range(len(now)):
         moved = (now[i, 0] - state[1]) / shape[0] if state[0] else 0.0
         state[0], state[1] = 1.0, now[i, 0]
@@ -19,10 +19,12 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class Play(Remembering):
-    """Slack that the driving end crosses while the driven end, held by friction, stands still.
+    """Free travel of the driving end while friction holds the driven end at standstill.
 
     Equation: deflection = gap z; z follows travel / reach and stays within -1 and 1, z = 0 at the
-    start.
+    start. gap in rad, reach in rad.
+
+    Check: reverse slowly under a load of constant sign and measure the free travel.
 
     Source: Nordin and Gutman 2002 (models of mechanical systems with backlash), the play operator.
     """
@@ -31,9 +33,9 @@ class Play(Remembering):
     family = "transmission.backlash"
     balances: ClassVar = {"stretch": -1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}
-    amplitudes = (Parameter("gap", "target", "half the play", lower=0.0),)
+    amplitudes = (Parameter("gap", "target", "half the free travel", lower=0.0),)
     shape = (Parameter("reach", "travel", "half the travel that crosses it", 1e-3, 0.5),)
     walk = _walk
     rest = (0.0, 0.0, 0.0)
     confused_with = ("hysteresis.presliding", "hysteresis.bouc_wen", "friction.coulomb")
-    told_apart_by = "slow reversals against a load that never changes its side"
+    told_apart_by = "slow reversals under a load of constant sign"

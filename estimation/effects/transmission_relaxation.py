@@ -1,4 +1,4 @@
-"""Relaxation: a transmission that goes on yielding after the load has come."""
+"""Relaxation: a deflection that continues after the load is constant."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 
 @numba.njit(cache=True)
 def walk_lag(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Walk; state: whether a sample has come, its time and load, the load less its lag.
+    """Fill the rows; state: started (0 or 1), its time and load, the load less its lag.
 
     Where there are several columns, each is `SLOWER` times slower than the one before.
     """
@@ -36,7 +36,7 @@ def walk_lag(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatA
 
 
 SETTLED = Parameter(
-    "settled", "1", "share of the first load that it has settled under", 0, 1, linear=True, points=2
+    "settled", "1", "fraction of the first load that has settled", 0, 1, linear=True, points=2
 )
 
 SLOWER = 8.0
@@ -44,10 +44,14 @@ SLOWER = 8.0
 
 
 class Relaxation(Remembering):
-    """The standard linear solid: what a cable has not yet yielded of its final deflection.
+    """The standard linear solid: the part of the final deflection that a cable has not yet reached.
 
     Equation: deflection lost = c (load - x); dx/dt = (load - x) / time, x = settled times the load
-    at the start: a run may begin soon after its load has come.
+    at the start, because a run may begin soon after its load was applied. load in N m, c in
+    rad/(N m), time in s, settled without unit.
+
+    Check: apply a step of load, hold it, and record the deflection; check the cable's pretension
+    and age.
 
     Source: the standard linear solid of Zener 1948.
     """
@@ -56,10 +60,10 @@ class Relaxation(Remembering):
     balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m", "clock": "time_s"}
     amplitudes = (
-        Parameter("compliance", "target / load", "compliance that comes with time", lower=0.0),
+        Parameter("compliance", "target / load", "compliance of the slow part", lower=0.0),
     )
     shape = (
-        Parameter("time", "clock", "time after which 63 % of it has come", 0.02, 30.0),
+        Parameter("time", "clock", "time to reach 63 %", 0.02, 30.0),
         SETTLED,
     )
     walk = walk_lag

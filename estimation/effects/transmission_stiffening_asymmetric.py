@@ -1,4 +1,4 @@
-"""Asymmetric stiffness: another stiffness to either side."""
+"""Asymmetric stiffness: different stiffness in the two directions of load."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -9,11 +9,14 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class AsymmetricStiffness(Pointwise):
-    """A transmission that yields more to one side than to the other.
+    """A transmission that deflects more in one direction of load than in the other.
 
-    Equation: deflection = c |load|.
+    Equation: deflection = c |load|, load in N m, c in rad/(N m): half the compliance of closing
+    minus half that of opening.
 
-    Source: Hooke's law with a constant of its own for either side.
+    Check: load slowly to both sides against a reference weight and compare the slopes.
+
+    Source: Hooke's law with a separate constant for either side.
     """
 
     id = "transmission.stiffening.asymmetric"
@@ -21,11 +24,11 @@ class AsymmetricStiffness(Pointwise):
     balances: ClassVar = {"gearbox": 1, "stretch": -1}
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (
-        Parameter("asymmetry", "target / load", "half the compliance of closing less of opening"),
+        Parameter("asymmetry", "target / load", "half the compliance of closing minus opening"),
     )
     confused_with = ("transmission.backlash", "sensor.gain_nonlinear")
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["load"]),)

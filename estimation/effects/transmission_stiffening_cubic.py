@@ -1,4 +1,4 @@
-"""Cubic stiffening: the first odd term of a bent stiffness curve."""
+"""Cubic stiffening: the first odd non-linear term of a stiffness curve."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -7,9 +7,11 @@ from estimation.effects.effect import Parameter, Pointwise
 
 
 class CubicStiffening(Pointwise):
-    """A stiffness curve that bends without a knee; negative where it softens.
+    """A stiffness curve that bends without a knee; c is negative where it softens.
 
-    Equation: deflection lost = c load^3.
+    Equation: deflection lost = c load^3, load in N m, c in rad/(N m)^3.
+
+    Check: load slowly to both sides against a reference weight and plot deflection against load.
 
     Source: the stiffness of flexible gears by an odd polynomial, Tuttle and Seering 1996.
     """
@@ -25,5 +27,5 @@ class CubicStiffening(Pointwise):
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or array for each amplitude."""
+        """Return one value or one array per amplitude."""
         return (inputs["load"] ** 3,)

@@ -1,4 +1,4 @@
-"""Terms of a formula that no effect of the catalogue stands for: products of plain functions."""
+"""Terms of a formula outside the catalogue: products of elementary functions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -21,9 +21,9 @@ class Form(NamedTuple):
     """One function of one variable.
 
     Attributes:
-        of: Values and shape to the function's values.
+        of: Function of the variable's values and the shape.
         shape: Name, unit over the role `{role}`, and meaning of each shape parameter.
-        text: The function in words; `{x}` is the variable, `{0}`, `{1}` are the shape.
+        text: The formula as text; `{x}` is the variable, `{0}`, `{1}` are the shape.
     """
 
     of: Callable[..., Any]
@@ -31,8 +31,8 @@ class Form(NamedTuple):
     text: str
 
 
-_WIDTH = ("width", "{role}", "over so much it changes")
-_PLACE = ("place", "1", "where its middle is, in widths")
+_WIDTH = ("width", "{role}", "width of the change")
+_PLACE = ("place", "1", "position of its middle, in widths")
 
 FORMS: Mapping[str, Form] = {
     "value": Form(lambda x: x, (), "{x}"),
@@ -42,12 +42,12 @@ FORMS: Mapping[str, Form] = {
     "sign": Form(lambda x, width: np.tanh(x / width), (_WIDTH,), "tanh({x} / {0:.3g})"),
     "sine": Form(
         lambda x, order: np.sin(order * x),
-        (("order", "1 / {role}", "radians a unit"),),
+        (("order", "1 / {role}", "radians per unit"),),
         "sin({0:.4g} {x})",
     ),
     "cosine": Form(
         lambda x, order: np.cos(order * x),
-        (("order", "1 / {role}", "radians a unit"),),
+        (("order", "1 / {role}", "radians per unit"),),
         "cos({0:.4g} {x})",
     ),
     "bump": Form(
@@ -61,13 +61,13 @@ FORMS: Mapping[str, Form] = {
         "step({x}; {middle:.3g}, {0:.3g})",
     ),
     "play": Form(
-        lambda x, _: x,  # `followed` walks it
+        lambda x, _: x,  # computed by `followed`
         (("width", "{role}", "half the travel that crosses it"),),
         "play({x}; {0:.3g})",
     ),
 }
 """Functions of one variable. `bump(x; c, s)` is exp(-((x - c) / s)^2), `step(x; c, s)` rises
-from 0 to 1 within about s of c, `play(x; s)` is how far a slack of s on either side is crossed."""
+from 0 to 1 within about s of c, `play(x; s)` is the position in a free travel of +-s."""
 
 
 class Product(Effect):
@@ -76,8 +76,8 @@ class Product(Effect):
     Equation: torque = a f(first) g(second), f and g from `FORMS`, named in the id as in
     `unknown.sign.bump`.
 
-    Source: a search over products of plain functions, as in orthogonal matching pursuit (Pati,
-    Rezaiifar and Krishnaprasad 1993); it stands for no known cause.
+    Source: a search over products of elementary functions, as in orthogonal matching pursuit (Pati,
+    Rezaiifar and Krishnaprasad 1993). It has no physical interpretation.
     """
 
     forms: ClassVar[tuple[str, ...]]
@@ -96,7 +96,7 @@ class Product(Effect):
         return made[:, None]
 
     def start(self) -> list[float]:
-        """Return where the play of each factor stands: nowhere before the first sample."""
+        """Return the follower of each factor with free travel: NaN before the first sample."""
         return [np.nan] * self.forms.count("play")
 
     def step(
@@ -126,7 +126,7 @@ class Product(Effect):
         return factors
 
     def in_words(self, variables: Mapping[str, str], shape: Sequence[float]) -> str:
-        """Return the product as a person writes it.
+        """Return the product as a readable formula.
 
         Args:
             variables: Role to the name of its variable.
@@ -139,7 +139,7 @@ class Product(Effect):
         return " ".join(words)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Travel to other processes by name."""
+        """Serialise by name, for other processes."""
         return product, (self.id,)
 
 
@@ -150,7 +150,7 @@ def product_id(*forms: str) -> str:
 
 @cache
 def product(name: str) -> Product | None:
-    """Return the product of that id; None when it names none."""
+    """Return the product of that id; None if the id is not of a product."""
     family, *forms = name.split(".")
     if family != UNKNOWN or not 1 <= len(forms) <= MOST_FACTORS or not set(forms) <= set(FORMS):
         return None
@@ -166,7 +166,7 @@ def product(name: str) -> Product | None:
             "family": UNKNOWN,
             "forms": tuple(forms),
             "roles": roles,
-            "amplitudes": (Parameter("amplitude", unit, "its size"),),
+            "amplitudes": (Parameter("amplitude", unit, "amplitude"),),
             "shape": tuple(
                 _parameter(role, *known)
                 for role, form in zip(roles, forms, strict=True)
@@ -191,12 +191,12 @@ def _parameter(role: str, name: str, unit: str, meaning: str) -> Parameter:
 
 @numba.njit(cache=True)
 def followed(values: FloatArray, half: float, follower: float, crossed: FloatArray) -> float:
-    """Write how far a slack is crossed, -1 to 1, into `crossed`, and return where it stands.
+    """Write the position within a free travel, -1 to 1, into `crossed`; return the follower.
 
     Args:
-        values: What drives, shape (n,); a value that is not finite gives NaN and moves nothing.
-        half: Half the slack, in their unit.
-        follower: Where what follows stands before the first value; NaN takes the first value.
+        values: Driving values, shape (n,); a value that is not finite gives NaN and has no effect.
+        half: Half the free travel, in their unit.
+        follower: Position of the driven side before the first value; NaN takes the first value.
         crossed: Shape (n,), written.
     """
     for k in range(len(values)):

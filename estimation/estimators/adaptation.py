@@ -2,12 +2,13 @@
 
 The weights of the source are the mean of a Gaussian prior; how far each may move depends on what
 differs between instruments. Of a state estimator, the zero and the spring of the cables and wrist,
-functions of position alone, differ most and move easily; the gain of the load, which is the
-motor's, hardly; the rest somewhat. A single run at one load cannot tell a zero from a gain, so this
-order decides. Of a network the hidden layer is kept and the output layer moves, as in transfer
-learning for instruments of the da Vinci: J. Zhang, N. Yilmaz, U. Tumerdem, P. Kazanzides,
-"Learning based estimation of 7 DOF instrument and environment interaction forces on the da Vinci
-Research Kit" (2022), where a network of another instrument is trained on with a little data.
+functions of position alone, differ most and have a wide prior; the gain of the load, which is the
+motor's, a narrow one; the rest a medium one. Zero and gain are not distinguishable in a single run
+at one load, so the prior decides. A network keeps its hidden layer, and its output layer is fitted
+again, as in transfer learning for instruments of the da Vinci: J. Zhang, N. Yilmaz, U. Tumerdem, P.
+Kazanzides, "Learning based estimation of 7 DOF instrument and environment interaction forces on the
+da Vinci Research Kit" (2022), where a network of another instrument is trained on with a little
+data.
 
 The stiffnesses of states were chosen on two instruments of the public data set
 MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryland_L_2.
@@ -37,7 +38,7 @@ POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 
 OUTPUT, NODE_SPREAD = 0.1, 0.3
 """Stiffness of the weights of a network's output layer, and the spread it is relative to: that of a
-logistic node at work. A node that hardly moves in the runs at hand must keep its weight."""
+logistic node at work. A node that barely varies in the given runs must keep its weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,7 @@ class Evidence:
         return estimator.network(self.rows)[:, 0]
 
     def covered(self, estimator: Adaptable) -> NDArray[np.bool_] | None:
-        """Say of which samples the interval holds the truth, shape (n,); None without interval."""
+        """Return for which samples the interval covers the sensor, shape (n,); None without one."""
         if not isinstance(estimator, BankEstimator) or estimator.interval is None:
             return None
         found = estimator.of_rows(self.rows)
@@ -111,10 +112,10 @@ def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
         runs: Runs of the new one.
 
     Raises:
-        NetworkError: There is no run.
+        NetworkError: The campaign is empty.
     """
     if not runs:
-        raise NetworkError("There is no closing sample to adapt the estimator with.")
+        raise NetworkError("No closing samples to adapt the estimator with.")
     if isinstance(source, BankEstimator):
         return adapted_states(source, reduced(source, runs))
     return _adapted_network(source, runs)
@@ -124,7 +125,7 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     """Return an estimator of the same kind fitted on these runs alone.
 
     Raises:
-        NetworkError: There is no run, or torch is missing.
+        NetworkError: The campaign is empty, or torch is missing.
     """
     if isinstance(like, BankEstimator):
         return fit_runs(reduced(like, runs), like.bank, like.target)

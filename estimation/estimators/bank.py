@@ -33,7 +33,7 @@ class Estimates:
 
     Attributes:
         value: The estimate, in the target's unit.
-        half_width: Half the width of the interval that covers 95 %, NaN where it is not known.
+        half_width: Half the width of the interval that covers 95 %, NaN where unknown.
         inside: Whether position, load, speed and acceleration lie in the range fitted on.
     """
 
@@ -50,7 +50,7 @@ class BankEstimator:
         bank: The states and products.
         target: Channel that is estimated.
         weights: Weight of each product, shape (size,).
-        interval: What is known of the error; None where too few runs were fitted to know it.
+        interval: The error's interval; None where too few runs were fitted.
         ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
@@ -235,10 +235,10 @@ def fit_runs(
         coverage: Share of the samples of unseen runs that the interval covers.
 
     Raises:
-        NetworkError: There is no run.
+        NetworkError: The campaign is empty.
     """
     if not runs:
-        raise NetworkError("There is no closing sample to fit a state estimator on.")
+        raise NetworkError("No closing samples to fit a state estimator on.")
     whole = Pool.of([run.normal for run in runs])
     interval = None
     if len(runs) >= INNER_FOLDS:
@@ -298,7 +298,7 @@ class BankRecipe:
         """Fit on the valid closing samples of the runs that are not excluded.
 
         Raises:
-            NetworkError: There is no closing sample.
+            NetworkError: The campaign has no closing samples.
             MissingChannelError: A run lacks a channel.
         """
         runs, instruments = [], set()

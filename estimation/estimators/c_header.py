@@ -51,7 +51,7 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         sample_rate_hz: Rate at which the step is called.
 
     Raises:
-        ExportError: The name is no identifier, or a channel cannot be computed in C.
+        ExportError: The name is not a C identifier, or a channel cannot be computed in C.
         FilterError: The filter does not fit the rate.
     """
     if re.fullmatch(r"[a-z_][a-z0-9_]*", name) is None:

@@ -1,11 +1,11 @@
-"""Which instrument an estimator was fitted on, and that it is asked about no other one."""
+"""The instrument that an estimator was fitted on, and the refusal of any other one."""
 
 from estimation.errors import EstimationError
 from estimation.recording import Recording
 
 
 class InstrumentError(EstimationError):
-    """An estimator is asked about an instrument it was not fitted on."""
+    """An estimator is applied to an instrument that it was not fitted on."""
 
 
 def instrument_of(recording: Recording) -> str:
@@ -19,8 +19,8 @@ def require_own(instrument: str, recording: Recording) -> None:
     """Refuse a recording of another instrument; an instrument that is not known is not refused.
 
     Args:
-        instrument: What the estimator was fitted on; empty where it does not matter.
-        recording: What it is asked about.
+        instrument: The instrument of the fit; empty where it does not matter.
+        recording: The recording to be estimated.
 
     Raises:
         InstrumentError: The recording is of another instrument.
@@ -30,7 +30,7 @@ def require_own(instrument: str, recording: Recording) -> None:
         raise InstrumentError(
             f"The estimator was fitted on {instrument}, the recording is of {other}.",
             "Another instrument has other friction and another zero.",
-            "Adapt it: rig adapt MODEL PATH --runs NAMES; or tell rig replay --any-instrument.",
+            "Adapt it: rig adapt MODEL PATH --runs NAMES; or use rig replay --any-instrument.",
         )
 
 

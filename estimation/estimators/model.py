@@ -1,4 +1,4 @@
-"""Linear and physical estimators: a balance of effects."""
+"""Linear and physical estimators: an equation of effects."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -25,7 +25,7 @@ STATE_INPUTS = (
     "motor_acceleration_rad_s2",
     "motor_travel_rad",
 )
-"""Inputs of a network with physical states, beside what stands for the load."""
+"""Inputs of a network with physical states, in addition to the load."""
 
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
@@ -70,7 +70,7 @@ class NetworkEstimator:
         return replace(self, instrument="")
 
     def inside(self, recording: Recording, causal: bool = False) -> NDArray[np.bool_]:
-        """Say of each sample whether every input lies in the range trained on, shape (n,)."""
+        """Return for each sample whether every input lies in the training range, shape (n,)."""
         return self.network.inside(self.rows(recording, causal))
 
     def rows(self, recording: Recording, causal: bool = False) -> FloatArray:
@@ -169,7 +169,7 @@ class NetworkRecipe:
     def fit_rest(
         self, campaign: Campaign, known: Callable[[Recording], FloatArray]
     ) -> NetworkEstimator:
-        """Train on what another estimate leaves of the target.
+        """Train on the residual of another estimate of the target.
 
         Args:
             campaign: The runs.
@@ -185,7 +185,7 @@ class NetworkRecipe:
             rows.append(np.column_stack([kept[name] for name in self.inputs])[:: self.every])
             rest.append(kept[self.target][:: self.every, None])
         if not rows:
-            raise files.NetworkError("There is no run to train the network on.")
+            raise files.NetworkError("No runs to train the network on.")
         names = (self.inputs, (self.target,))
         trained = train(np.concatenate(rows), np.concatenate(rest), names, self.settings)
         return NetworkEstimator(trained.network, self.low_pass, only_one(instruments))

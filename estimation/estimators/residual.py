@@ -1,4 +1,4 @@
-"""A physical model and a small network on what it leaves."""
+"""A physical model and a small network on its residual."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ class ResidualStepper:
 
 @dataclass(frozen=True)
 class ResidualRecipe:
-    """Fits a model, then a network on what it leaves.
+    """Fits a model, then a network on its residual.
 
     Attributes:
         model: The declared model.

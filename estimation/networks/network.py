@@ -90,7 +90,7 @@ class Network:
         return nodes
 
     def inside(self, rows: ArrayLike) -> np.ndarray:
-        """Say of which rows, shape (n, d), every input lies in the range trained on, shape (n,)."""
+        """Return which rows, shape (n, d), have every input in the training range, shape (n,)."""
         x = np.atleast_2d(np.asarray(rows, dtype=np.float64))
         inside: np.ndarray = np.all((x >= self.input_range[0]) & (x <= self.input_range[1]), axis=1)
         return inside

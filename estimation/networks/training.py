@@ -31,7 +31,7 @@ BLOCK = 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a network is trained.
+    """Settings of the training.
 
     Attributes:
         nodes: Hidden nodes.
@@ -50,7 +50,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """How a training went.
+    """Result of a training.
 
     Attributes:
         network: The trained network.
@@ -72,7 +72,7 @@ class Training:
 
 
 def has_torch() -> bool:
-    """Say whether torch is installed."""
+    """Whether torch is installed."""
     from importlib.util import find_spec
 
     return find_spec("torch") is not None

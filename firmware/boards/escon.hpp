@@ -1,4 +1,4 @@
-// An ESCON 24/2 at a board: what code asks for a current, and what current a reading tells. The twin
+// An ESCON 24/2 at a board: the code for a current, and the current of a reading. The twin
 // of drivers/escon/scaling.py. No Arduino here, so that it runs on any host.
 #pragma once
 

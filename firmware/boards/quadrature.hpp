@@ -25,7 +25,7 @@ class WideCounter {
     std::uint32_t total_ = 0;  // wraps like the hardware's
 };
 
-// A decoder in software: told both levels at every edge of either line, by an interrupt.
+// A decoder in software: it gets both levels at every edge of either line, by an interrupt.
 class EdgeDecoder {
   public:
     void start(bool a, bool b) { state_ = state_of(a, b); }
@@ -43,7 +43,7 @@ class EdgeDecoder {
         }
     }
 
-    // Missing for good once an edge was skipped: nobody knows where the shaft is any more.
+    // Missing for good once an edge was skipped: the position of the shaft is then unknown.
     std::int32_t count() const { return skipped_ ? kMissing : count_; }
 
   private:

@@ -1,6 +1,6 @@
 // The firmware as a process of its own, in real time, on a pseudo-terminal: what a board on USB is to
 // a host, with a small plant in place of the rig. Prints the terminal's path and runs until it is
-// told to end or its parent is gone.
+// terminated or its parent is gone.
 //   build/rig_firmware [reference | grasper]
 #include <cerrno>
 #include <csignal>
@@ -60,7 +60,7 @@ class PtyHardware {
     }
 
   private:
-    // nothing there, nobody at the other end, or no room: the same to a board
+    // nothing there, no reader at the other end, or no room: the same to a board
     static std::size_t some(ssize_t count) { return count > 0 ? static_cast<std::size_t>(count) : 0; }
 
     int master_;
@@ -84,7 +84,7 @@ void run(int master, const char* serial) {
     static rig::App<Profile, Hardware, kTransmitCapacity> app(hardware, serial);
     const std::uint64_t began_ns = now_ns();
     for (std::uint64_t tick = 1; !ended; ++tick) {
-        // the clock says when a tick is due, so a process that slept too long catches up
+        // the clock decides when a tick is due, so a process that slept too long catches up
         const std::uint64_t due_ns = began_ns + tick * kTickNs;
         if (now_ns() < due_ns) sleep_until(due_ns);
         app.exchange();

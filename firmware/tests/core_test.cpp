@@ -182,7 +182,7 @@ TEST_CASE("a USB line that was gone for a moment is written to again") {
     CHECK(Serial.out.size() > rig::kSerialSize);
 }
 
-TEST_CASE("an enabled controller that is not ready tells no current") {
+TEST_CASE("an enabled controller that is not ready reports no current") {
     rig::ReferenceHardware teensy;
     teensy.begin();
     board.analog[rig::wiring::kDriveCurrentPin] = 2048;

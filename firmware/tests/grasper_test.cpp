@@ -135,7 +135,7 @@ TEST_CASE("a board starts with all motors off, 0 A asked of each, and ticks at 2
     CHECK(board.duties[wiring::kSetPin[2]] == 2048);
 }
 
-TEST_CASE("what is wired to a motor is read with it, and one that is not ready tells no current") {
+TEST_CASE("what is wired to a motor is read with it, and one that is not ready reports no current") {
     rig::GrasperHardware grasper;
     grasper.begin();
     for (std::size_t k = 0; k < Profile::kMotors; ++k) {

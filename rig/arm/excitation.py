@@ -84,7 +84,7 @@ def run_excitation(
     """Search from several starts by both ways.
 
     Args:
-        starts: How many; from seed 0.
+        starts: Number of starts; from seed 0.
         evaluations: Condition numbers each search may take of each start.
         on_start: Called after each start.
 

@@ -1,7 +1,7 @@
 """A mass added to a patient-side manipulator's insertion axis, from its joints' torque.
 
-A model is fitted to a run without the mass and estimates runs with it; what is left on the joints
-that lift the mass is the mass.
+A model is fitted to a run without the mass and estimates runs with it; the residual of the joints
+that lift the mass determines the mass.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,7 +54,7 @@ class Payload:
         height_m: Height of the mass above the remote centre, m.
         height_error_m: Its standard error, m.
         runs: Names of the runs.
-        masses: What was found on each.
+        masses: Estimated mass on each.
         provenance: When and from what this was made.
     """
 
@@ -179,6 +179,6 @@ def table(study: Payload) -> TextTable:
         ["run", "mass", "from", "to", "J1 alone", "J2 alone"],
         rows,
         f"At {100 * study.height_m:g} cm above the remote centre, standard error"
-        f" {100 * study.height_error_m:g} cm; how far beside the axis is found too. The interval is"
-        " two standard errors: scatter over periods, half the difference of the joints, the lever.",
+        f" {100 * study.height_error_m:g} cm; its distance from the axis is estimated. The interval"
+        " is two standard errors: scatter over periods, half the joints' difference, the lever.",
     )

@@ -27,13 +27,13 @@ RATE_SHARE = 10.0
 """Samples kept a second, in cutoffs of the torque's filter."""
 
 DAMPING = 1e-3
-"""Of the fits with effects: their columns are many and hardly told apart on one path."""
+"""Of the fits with effects: their columns are many and nearly collinear on one path."""
 
 LEAST_GAIN = 0.005
 """Mean relative gain over the joints below which the search stops."""
 
 GRIPPER_SHARE = 0.3
-"""Weight of the gripper's own torque: it helps to tell the wrist's drives and is not scored."""
+"""Weight of the gripper's own torque: it helps to identify the wrist's drives and is not scored."""
 
 
 def open_paths(data: Path, names: Sequence[str]) -> list[Recording]:
@@ -66,7 +66,7 @@ class Trial:
 
     Attributes:
         effect: Its name.
-        what: What it is.
+        what: Description.
         kept_in_round: Round of the search that kept it, from 1; None if dropped.
         gain_percent: Mean relative gain over the joints, on the test path of the search: in the
             round that kept it, else in the last round.

@@ -58,7 +58,7 @@ class SimulatedArm:
 
 
 def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:
-    """Return what an arm's sensors tell as a recording; six joints are the PSM's, others turn.
+    """Return an arm's sensor readings as a recording; six joints are the PSM's, others turn.
 
     Args:
         name: Name of the run.
@@ -78,7 +78,7 @@ def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float
 
 @dataclass(frozen=True)
 class ArmRun:
-    """What the arm's own sensors tell of a run, and the truth.
+    """The readings of the arm's own sensors in a run, and the true values.
 
     Attributes:
         position: Measured positions, shape (n, joints).
@@ -201,7 +201,7 @@ def pin(
 
 
 def passed_on(motion: Motion, wrench: FloatArray) -> FloatArray:
-    """Return what a pin passes on to what holds it: beyond `GRIP_N_M` it turns in the gripper."""
+    """Return the wrench that a pin transmits: beyond `GRIP_N_M` it turns in the gripper."""
     axis, tip = _shaft(motion)
     torsion = np.einsum("ni,ni->n", wrench[:, 3:] - np.cross(tip, wrench[:, :3]), axis)
     lost = torsion - np.clip(torsion, -GRIP_N_M, GRIP_N_M)
@@ -209,7 +209,7 @@ def passed_on(motion: Motion, wrench: FloatArray) -> FloatArray:
 
 
 def _touching(rng: np.random.Generator, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return smooth waves along three axes, shape (n, 3), and how far the tip touches, (n,)."""
+    """Return smooth periodic motions along three axes, shape (n, 3), and the tip contact, (n,)."""
     time = np.arange(len(motion)) * motion.period_s
     waves = np.zeros((len(motion), 3))
     for f in rng.uniform(0.1, 0.7, 5):
@@ -239,7 +239,7 @@ def _shaft(motion: Motion) -> tuple[FloatArray, FloatArray]:
 def simulate(
     arm: SimulatedArm, motion: Motion, rng: np.random.Generator, wrench: FloatArray | None = None
 ) -> ArmRun:
-    """Return what the arm's sensors tell of a motion, with a wrench at its tip or in free space."""
+    """Return the readings of the arm's sensors in a motion, with a tip wrench or in free space."""
     declared = regressor(PSM, motion) @ arm.values
     applied = np.zeros((len(motion), 6)) if wrench is None else wrench
     external = np.einsum("nij,ni->nj", spatial_jacobians(PSM, motion.position), applied)

@@ -1,7 +1,7 @@
 """Effects of an arm chosen on one path alone, so that another path is untouched by the choice.
 
-The path is cut into stretches, at the same places of every period: what fits one period fits the
-next by heart. Every other stretch is fitted and the rest tested on, and back.
+The path is cut into segments, at the same places of every period. Periods repeat, so a random
+split would leak. Every other segment is fitted and the rest is the test, and back.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,8 @@ from estimation.recording import Recording
 from rig.arm.search import RATE_SHARE, Prepared, search
 
 STRETCHES = 8
-"""Of a period: each longer than the filter remembers, and half of them see most of the range."""
+"""Of a period: each is longer than the filter's memory, and half of them cover most of the
+range."""
 
 
 def period_of(run: Recording) -> float | None:
@@ -34,7 +35,7 @@ def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) ->
 
     Args:
         path: The path, prepared with these effects.
-        run: What it was prepared from.
+        run: The original run.
         tried: The candidates.
     """
     samples = np.arange(len(path.torque))

@@ -1,8 +1,8 @@
-"""The further devices of a rig, read beside the logger and put on its time.
+"""The further devices of a rig, read with the logger and converted to its time.
 
-A device that only streams tells no clock: its samples are numbered, and the line from their numbers
-to the host's clock is fitted through the earliest arrivals. The logger's clock is a line of the
-host's too, so both are on one time base, each with the residual of its fit.
+A device that only streams has no readable clock: its samples are numbered, and the line from their
+numbers to the host's clock is fitted through the earliest arrivals. The logger's clock is a line of
+the host's too, so both are on one time base, each with the residual of its fit.
 """
 
 from collections import deque
@@ -21,7 +21,7 @@ from rig.log.schema import Field, Stream
 REFIT_S = 0.5
 ARRIVALS_KEPT = 2000
 BATCHES_KEPT = 20_000
-"""Kept while nobody asks; older ones are let go."""
+"""Batches kept without a reader; older ones are dropped."""
 MOST_READS = 64
 """Most reads of one device a turn; a device that has more waits for the next."""
 
@@ -44,7 +44,7 @@ class Beside:
 
 
 class Companion:
-    """One device beside the logger.
+    """One device in addition to the logger.
 
     Args:
         name: Its name in the configuration.
@@ -83,7 +83,7 @@ class Companion:
         """Take in what has come by now, without waiting for it.
 
         Raises:
-            DriverError: It is gone, or says that something is wrong.
+            DriverError: It is gone, or reports a fault.
         """
         due = (now_s - self._began_s) * self.rate_hz
         for _ in range(MOST_READS):

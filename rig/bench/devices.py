@@ -32,7 +32,7 @@ def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
     """Yield name and a function that opens it, of the logger and of each further device."""
     counts = {line.counts for line in config.calibration_set().channels.values()}
     if config.logger.driver == "epos4":
-        counts -= {"current"}  # a drive that is switched off tells no current at all
+        counts -= {"current"}  # a drive that is switched off reports no current
     profile = machine_of(config).profile
     wired = [channel for channel in raw_channels(profile) if channel.field in counts]
     yield (

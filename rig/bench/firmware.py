@@ -20,7 +20,7 @@ from rig.machines.choose import machine_of
 
 SOURCES = Path(__file__).parents[2] / "firmware"
 STDERR = 2
-"""Where tools say what they do: stdout is for results."""
+"""Stream for the output of tools: stdout is for results."""
 BOARDS = ("teensy35", "teensy41", "teensy41-grasper")
 
 
@@ -33,11 +33,11 @@ class Versions:
     """Which firmware is where.
 
     Attributes:
-        program: What this program speaks.
-        sources: What the source tree would build; says so where there is none.
-        board: What the board says of itself, or why it says nothing.
-        fits: Whether program and board speak one protocol.
-        remarks: What to know and to type.
+        program: Protocol of this program.
+        sources: The build of the source tree, or a note that there is none.
+        board: The board's identity, or the reason why it is unknown.
+        fits: Whether program and board have the same protocol.
+        remarks: Remarks, with the next command.
     """
 
     program: str
@@ -82,7 +82,7 @@ _TABLE = [
 
 
 def compare(config: Config) -> Versions:
-    """Ask the board which firmware it has and hold it against program and sources."""
+    """Read the board's firmware version and compare it with program and sources."""
     profile = machine_of(config).profile
     version = protocol.version_text(protocol.FIRMWARE_VERSION)
     program = f"{version}, {profile.name} protocol {profile.protocol_hash:08x}"
@@ -95,7 +95,7 @@ def compare(config: Config) -> Versions:
         return Versions(program, told, f"{error.what} {error.why}", False, (f"fix: {error.fix}",))
     except DriverError as error:
         return Versions(program, told, f"{error.what}", False, (f"fix: {error.fix}",))
-    remarks: tuple[str, ...] = ("Program and board speak one protocol.",)
+    remarks: tuple[str, ...] = ("Program and board have the same protocol.",)
     if sources is not None and board.build_hash and board.build_hash != sources:
         remarks += (
             "The board was built from other sources. To bring it up to date: rig firmware"
@@ -103,7 +103,7 @@ def compare(config: Config) -> Versions:
         )
     if not board.build_hash:
         remarks += (
-            "The board is the fake in Python, or says no build. To compile: rig firmware build",
+            "The board is the fake in Python, or reports no build. To compile: rig firmware build",
         )
     said = f"{board.serial}, {board.firmware_version}, protocol {board.protocol_hash:08x}"
     return Versions(program, told, f"{said}, build {board.build_hash:08x}", True, remarks)
@@ -113,7 +113,7 @@ def build() -> Path:
     """Build the library the simulated rig runs, and return its path.
 
     Raises:
-        UsageError: There is no source tree, no make or no compiler.
+        UsageError: The source tree, make or the compiler is missing.
         FirmwareToolError: The compiler fails.
     """
     _require_sources()

@@ -1,8 +1,8 @@
 """Which board is flashed: the only Teensy that is plugged in, by its serial number, disarmed.
 
-A Teensy's loader takes the first board it finds and cannot be told another, so a second one on the
-same computer is refused. Grasper and master carry the same image: only the serial number tells them
-apart.
+A Teensy's loader takes the first board it finds and cannot select another, so a second one on the
+same computer is refused. Grasper and master carry the same image: only the serial number
+distinguishes them.
 """
 
 from collections.abc import Sequence
@@ -85,7 +85,7 @@ def _the_one(ports: Sequence[tuple[str, str]]) -> tuple[str, str]:
 
 
 def _state(port: str, profile: Profile) -> str:
-    """Return what the board says of its state.
+    """Return the state reported by the board.
 
     Raises:
         PortBusyError: Another program has it.

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and a lost terminal while a rig is connected: the first of them asks to leave.
+"""Ctrl-C, SIGTERM and a lost terminal while a rig is connected: the first of them requests the end.
 
 No further one stops that. A terminal is lost with its window or its connection; what is still
 written to it then goes nowhere, so that no failed write breaks into the way out.

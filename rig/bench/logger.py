@@ -10,7 +10,7 @@ VIRTUAL_CAN_URL = "sim://virtual-can"
 
 
 def is_real_time(config: Config) -> bool:
-    """Say whether the logger samples by itself, as time passes."""
+    """Whether the logger samples by itself, as time passes."""
     return not config.is_simulated or config.logger.url in (PTY_URL, VIRTUAL_CAN_URL)
 
 

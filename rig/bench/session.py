@@ -160,7 +160,7 @@ class Session:
             yield self._read()
 
     def play(self, *setpoints: NDArray[np.float64]) -> Iterator[Reading]:
-        """Arm the rig and play a trajectory; each sample says which setpoint it played.
+        """Arm the rig and play a trajectory; each sample has the number of its setpoint.
 
         Args:
             setpoints: What is asked for at the board's rate, closing-positive, each of shape (n,):
@@ -186,10 +186,10 @@ class Session:
     def follow(
         self, setpoints: Iterator[tuple[NDArray[np.float64], ...]], lead_s: float = LEAD_S
     ) -> Iterator[Reading]:
-        """Arm the rig and play setpoints that are decided while it goes, until there are no more.
+        """Arm the rig and play setpoints that are computed during the run, until there are no more.
 
-        A piece is asked for `lead_s` before it is played, so what a reading tells can change what
-        comes so much later.
+        A piece is requested `lead_s` before it is played, so a reading can change setpoints from
+        then on.
 
         Args:
             setpoints: Pieces of what `play` takes, each of shape (n,), n from 1 to the profile's
@@ -277,7 +277,7 @@ class Session:
         return trip_error(report, self.calibrations, state, self.machine)
 
     def _queue(self, *columns: NDArray[np.int32]) -> None:
-        """Queue setpoints; a board that has tripped since it was read says over what."""
+        """Queue setpoints; raise the trip of a board that has tripped since the last read."""
         try:
             self._logger.queue(*columns)
         except CommandRefusedError as error:
@@ -291,7 +291,8 @@ class Session:
         """Look for what the board itself tripped over.
 
         Raises:
-            SafetyTripError: It did and is in its safe state; says over what, and how late.
+            SafetyTripError: It did and is in its safe state; the message has the limit and the
+                delay.
         """
         trip = tripped(reading)
         if self._watch is not None and trip is not None:

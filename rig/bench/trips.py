@@ -21,8 +21,8 @@ from rig.machines.reading import Reading, has_status
 
 WORDS: dict[Trip, tuple[str, str]] = {
     Trip.HOST_SILENT: (
-        "The board heard nothing from this computer for too long",
-        "Look for what kept this computer busy; [safety] watchdog_s says how long it may be.",
+        "The board received nothing from this computer for too long",
+        "Look for the load on this computer; [safety] watchdog_s sets the permitted time.",
     ),
     Trip.OVER_CURRENT: (
         "The motor current crossed its limit",
@@ -132,7 +132,7 @@ def _numbers(report: TripReport, calibrations: CalibrationSet, machine: Machine)
 
 
 def tripped(reading: Reading) -> tuple[Trip, bool] | None:
-    """Return what the board tripped over and whether it holds, None where it did not."""
+    """Return the crossed limit and whether the board holds, None without a trip."""
     newest = int(reading.counts["status"][-1])
     if not newest & (STATUS_LIMIT_TRIPPED | STATUS_WATCHDOG_TRIPPED):
         return None

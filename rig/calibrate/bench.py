@@ -1,4 +1,4 @@
-"""The bench of a guided calibration: the logger, and a force sensor beside it.
+"""The bench of a guided calibration: the logger and a force sensor.
 
 Each step opens the devices and closes them again, so that the rig is disarmed and nothing waits in
 a buffer while hands are in it.
@@ -150,7 +150,7 @@ def read_for(device: Device, duration_s: float) -> Batch:
 
 
 def _caught_up(device: Device, before: list[Batch], elapsed_s: float) -> list[Batch]:
-    """Return what a device sent until it is as far as the logger, or has nothing more."""
+    """Return the data of a device up to the logger's time, or all that it has."""
     got = sum(len(batch) for batch in before)
     batches: list[Batch] = []
     while got / device.channels[0].rate_hz < elapsed_s:
@@ -188,7 +188,7 @@ def _force_times(device: Device, batch: Batch) -> NDArray[np.float64]:
 
 
 def _said(device: Device) -> dict[str, float | str]:
-    """Return what a force sensor says of itself: serial, and counts a unit where it tells."""
+    """Return the identity of a force sensor: serial, and counts per unit where available."""
     said: dict[str, float | str] = {"force_sensor": device.name}
     for name, value in (getattr(device, "counts_per_unit", None) or {}).items():
         said[name] = value

@@ -3,7 +3,7 @@
 A resistor's calibration is `reference = calibrated`. Where weights are known exactly (`torque`,
 `ft`) it is `read = applied`: the noisy side is the target, else its noise would pass for an effect.
 A part's (`current`, `gearbox`, `encoder`) is the equation of its session. Samples that a session
-leaves out because the rig does not move steadily are flagged here: no fit or search sees them.
+excludes because the rig does not move steadily are flagged here: fits and searches ignore them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ class Declared:
     """What one calibration declares.
 
     Attributes:
-        model: Its equation, a model of the balance `calibration.KIND`.
+        model: Its equation, a model named `calibration.KIND`.
         recordings: The runs it was made from.
     """
 
@@ -46,12 +46,12 @@ class Declared:
 
 
 def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) -> Declared:
-    """Return what a calibration declares.
+    """Return the equation and runs that a calibration declares.
 
     Args:
         kind: Kind of calibration.
-        result: What it came to.
-        measurements: What it came from, in the order of the steps.
+        result: Its result.
+        measurements: Its measurements, in the order of the steps.
 
     Raises:
         UsageError: Nothing is known of the kind.
@@ -59,7 +59,7 @@ def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) 
     if kind not in MAKERS:
         raise UsageError(
             f"A calibration of the kind {kind} cannot be diagnosed.",
-            "It keeps no runs, or nobody has declared its equation.",
+            "It stores no runs, or no equation is declared for it.",
             f"Kinds that can: {', '.join(MAKERS)}.",
         )
     return MAKERS[kind](result, measurements)
@@ -82,7 +82,7 @@ def _torque(result: Result, measurements: Sequence[Measurement]) -> Declared:
     for measurement in measurements:
         said, counts = measurement.recording.conditions, measurement.counts
         if "mass_kg" not in said or counts is None:
-            continue  # the shunt is no torque
+            continue  # the shunt is not a torque
         torque = float(weight_torque_n_m(float(said["mass_kg"]), float(said["arm_m"])))
         read = (counts[result.input].astype(np.float64) - line["zero"]) * line["slope"]
         columns = {"applied_n_m": np.full(len(read), torque), "read_n_m": read}
@@ -218,7 +218,7 @@ def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
         Term(effect("motor.torque_constant"), 1, {"source": source}),
         Term(effect("sensor.offset"), 1),
     )
-    about = "What the calibrated sensor says, against what it was given."
+    about = "The calibrated reading of the sensor against its reference."
     return Model(kind, f"calibration.{kind}", target, terms, about, low_pass, False, "all")
 
 
@@ -227,14 +227,14 @@ def _of_part(kind: str, target: str, terms: tuple[Term, ...], about: str) -> Mod
 
 
 def _moving(recording: Recording) -> Recording:
-    """Return a run with the samples flagged that a session leaves out: at rest or turning."""
+    """Return a run with the samples flagged that a session excludes: at rest or turning."""
     speed = zero_phase_channels(recording, [SPINDLE_SPEED], STEADY)[SPINDLE_SPEED]
     left_out = np.where(stands(speed, recording.sample_rate_hz), np.uint8(Flag.SUSPECT), 0)
     return replace(recording, flags=(recording.flags | left_out).astype(np.uint8))
 
 
 def _in_a_row(name: str, steps: Sequence[Recording]) -> Recording:
-    """Return what rested in several steps as one run, one step after the other."""
+    """Return the static parts of several steps as one run, one step after the other."""
     columns = {
         channel: np.concatenate([step[channel] for step in steps]) for channel in steps[0].columns
     }

@@ -18,7 +18,7 @@ from rig.log.reader import read_log
 
 
 def declared_by_record(record: CalibrationRecord) -> Declared:
-    """Return what a record declares, and the runs it was made from.
+    """Return the declared equation of a record, and the runs it was made from.
 
     Raises:
         UsageError: Its kind cannot be diagnosed, or its raw logs are gone.
@@ -38,7 +38,7 @@ def declared_by_record(record: CalibrationRecord) -> Declared:
 
 
 def declared_by_folder(folder: Path) -> Declared:
-    """Return what the plainest calibration from a folder's raw logs declares, and these runs.
+    """Return the declared equation of the simplest calibration from raw logs, and its runs.
 
     Plain is the force-sensing resistor's curve, the gear's stiffness, the encoder's line: what a
     session may add to these is then what the diagnosis finds.
@@ -49,7 +49,7 @@ def declared_by_folder(folder: Path) -> Declared:
     """
     kind, measurements, lines = read_raw(folder)
     first = _plain(kind, measurements).conclude(measurements, lines).results
-    # an encoder's wave is in the second result, which says how it reads against the other one
+    # an encoder's periodic error is in the second result, the comparison with the other encoder
     return declared_by(kind, first[-1] if kind == "encoder" else first[0], measurements)
 
 
@@ -76,7 +76,7 @@ def _plain(kind: str, measurements: list[Measurement]) -> Procedure:
     }
     if kind not in known:
         raise UsageError(
-            f"Nobody knows how to conclude a calibration of the kind {kind}.",
+            f"Unknown kind of calibration: {kind}.",
             f"Known: {', '.join(known)}.",
         )
     return known[kind]

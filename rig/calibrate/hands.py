@@ -1,4 +1,4 @@
-"""Hands in the simulated world: they do what a step asks a person to do, and the sensors see it."""
+"""Simulated hands: they carry out the instruction of a step in the simulation."""
 
 import hashlib
 
@@ -59,7 +59,7 @@ class HandledBench:
         load_ma: NDArray[np.int32],
         drive: Drive,
     ) -> NDArray[np.int32]:
-        """Run the bench and add what hands do; see `drivers.teensy.fake.Bench.advance`."""
+        """Run the bench with the actions of the hands; see `drivers.teensy.fake.Bench.advance`."""
         rows = self._inner.advance(ticks, target, load_ma, drive)
         for column in np.flatnonzero(self._added):
             limit = self._sensors.torque_limit_count
@@ -99,7 +99,7 @@ class LoadedRdt(RdtFake):
 GRAVITY_M_S2 = 9.80665
 TOOL_KG = 0.215
 TOOL_CENTRE_M = np.array([0.004, -0.002, 0.031])
-"""Mass and centre of mass of the simulated tool, which a session does not know."""
+"""Mass and centre of mass of the simulated tool, which are unknown to a session."""
 
 
 class SimulatedHands:

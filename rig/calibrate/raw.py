@@ -68,7 +68,7 @@ def read_raw(folder: Path) -> tuple[str, list[Measurement], CalibrationSet]:
     for path in paths:
         log = read_log(path)
         if log.run is None or KIND not in log.run.details:
-            raise UsageError(f"{path} is no raw log of a calibration.")
+            raise UsageError(f"{path} is not a raw log of a calibration.")
         kinds.add(str(log.run.details[KIND]))
         counts = log.topics[COUNTS].rows if COUNTS in log.topics else None
         said = dict(log.run.details["devices"])

@@ -16,7 +16,7 @@ from rig.output.figures import scattered
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """What a record says besides its numbers.
+    """The text fields of a record.
 
     Attributes:
         operator: Who made it.
@@ -39,8 +39,8 @@ class Kept:
 
     Attributes:
         records: The records, by hash.
-        folder: Where their raw logs are.
-        conclusion: What the session came to.
+        folder: Folder of their raw logs.
+        conclusion: Conclusion of the session.
     """
 
     records: dict[str, CalibrationRecord]
@@ -65,7 +65,7 @@ def keep(
     conclusion = procedure.conclude(measurements, lines)
     left = conclusion.residuals
     drawn = scattered(left.series, left.label, left.unit, f"Residuals over {left.label}")
-    # a file of its own says whose names it uses
+    # a separate file needs its namespace
     figure = str(drawn).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     with whole_folder(folder) as part:

@@ -16,7 +16,7 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "u"))
 
 
 def reading(procedure: Procedure, measured: Sequence[Measurement], lines: CalibrationSet) -> str:
-    """Return what the last step read: the procedure's own words, else mean and spread."""
+    """Return the reading of the last step: the procedure's own text, else mean and spread."""
     own = getattr(procedure, "reading", None)
     if own is not None:
         return str(own(measured, lines))

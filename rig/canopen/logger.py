@@ -1,12 +1,13 @@
 """The logger of a rig that has none: its logic in this computer, behind it a drive on CANopen.
 
-The drive knows torque and position; guards, position loop, queue of setpoints and watchdog are the
-logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to a
-logger like any other. What a board does better: a pause of this computer is a pause of the position
-loop; the drive then keeps its last torque until its own watch on this computer's heartbeat ends it.
+The drive handles torque and position; guards, position loop, queue of setpoints and watchdog are
+the logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to
+a logger like any other. What a board does better: a pause of this computer is a pause of the
+position loop; the drive then keeps its last torque until its own watch on this computer's heartbeat
+ends it.
 
-In virtual time a tick is run whenever somebody reads. In real time the ticks have a process of
-their own (`rig.canopen.process`), so that they wait for nobody.
+In virtual time a tick runs at every read. In real time the ticks run in a separate
+process (`rig.canopen.process`), so that nothing delays them.
 """
 
 import numpy as np
@@ -33,7 +34,7 @@ from drivers.transport.can_bus import CanBus
 
 SERIAL_PREFIX = "EPOS4-"
 TICKS_A_READ = 20
-"""Most ticks between looks at what the host has to say; shorter than any patience of the board."""
+"""Most ticks between polls of the host; shorter than any watchdog time of the board."""
 ANSWER_S = 0.005
 MOST_MISSED = 3
 """SYNCs on end without an answer after which the motor's position is missing."""
@@ -42,8 +43,8 @@ MOST_MISSED = 3
 class Epos4Bench:
     """The drive as `drivers.teensy.fake.Bench`: inputs from it, torque to it.
 
-    The spindle is the motor's encoder; current is told by torque, 1 mA a count; what the drive does
-    not measure is 0.
+    The spindle is the motor's encoder; current is computed from torque, 1 mA per count; quantities
+    that the drive does not measure are 0.
 
     Args:
         device: The drive, started.
@@ -81,10 +82,10 @@ class Epos4Bench:
         return rows
 
     def follow(self, in_force: bool) -> None:
-        """Put the power stage in force, or take it out, and return when the drive has said so.
+        """Switch the power stage on or off, and return when the drive has confirmed it.
 
         Raises:
-            DriverError: It has not said so.
+            DriverError: It has not confirmed it.
         """
         if in_force and not self._powered:
             self._powered = True  # a drive that failed half-way is to be disarmed
@@ -99,7 +100,7 @@ class Epos4Bench:
         self._powered = False
 
     def _judge_by_time(self, drive: Drive) -> None:
-        """Let guard and controller see the way of one tick where more time than that has passed."""
+        """Scale the travel to one tick for guard and controller where more time has passed."""
         if drive.guard[PRIMED]:
             watch = drive.guard[MOTOR_WATCH:]
             judge_by_time(watch, self._position_count, self._ticks_since)

@@ -1,8 +1,8 @@
-"""The logger's logic on a CANopen drive in real time, in a process of its own: it waits for nobody.
+"""The logger's logic on a CANopen drive in real time, in a separate process without delays.
 
 The program that records talks to it as to a board on USB: the logger's bytes, over a pair of
-sockets without a name. What goes wrong in there is told on its standard output, a line of JSON
-each, and raised here. It ends, the drive disarmed, when this end is closed or its program is gone.
+sockets without a name. It reports errors on its standard output, one line of JSON each, and
+they are raised here. It ends, the drive disarmed, when this end is closed or its program is gone.
 """
 
 import json
@@ -22,7 +22,7 @@ STARTS_S = 90.0
 """Time for the drive to be set up; the code is compiled the first time."""
 ENDS_S = 3.0
 TAKES_S = 1.0
-"""Time for the process to take what is sent; it looks every 2 ms."""
+"""Time for the process to read sent data; it polls every 2 ms."""
 LARGEST_READ = 65536
 _KINDS: dict[str, type[DriverError]] = {
     name: kind
@@ -146,10 +146,10 @@ class CanopenProcess:
                 return
 
     def _hear(self) -> bool:
-        """Take what the process says; return whether it is ready.
+        """Read the messages of the process; return whether it is ready.
 
         Raises:
-            DriverError: It tells of one.
+            DriverError: It reports one.
         """
         said = os.read(self._told, LARGEST_READ)
         if not said:

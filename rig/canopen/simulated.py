@@ -1,6 +1,6 @@
 """The simulated rig behind an EPOS4: the drive's fake on a virtual bus, the plant as its motor.
 
-Not modelled beyond what the drive's fake leaves out: the load motor, which this rig does not have.
+Not modelled, in addition to the limits of the drive's fake: the load motor, which this rig lacks.
 """
 
 import ctypes

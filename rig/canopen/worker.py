@@ -3,7 +3,7 @@
     python -m rig.canopen.worker FD < configuration as JSON
 
 Bytes of the logger's protocol go to and fro over the socket FD; a line of JSON on standard output
-says that it is ready, and each thing that went wrong.
+reports that it is ready, and each error.
 """
 
 import json
@@ -22,11 +22,11 @@ from rig.canopen.logger import CanopenLogger
 from rig.configuration.config import Config
 
 PERIOD_S = 0.002
-"""Ticks between two looks at what the host has to say."""
+"""Ticks between two polls of the host."""
 LATE_S = 0.05
 """How late a SYNC may be on a real bus and still be sent."""
 SAID_EVERY_S = 0.5
-"""An error that stays is said again after this time."""
+"""A persistent error is reported again after this time."""
 LARGEST_READ = 65536
 
 
@@ -110,7 +110,7 @@ def _sent(host: socket.socket, data: bytes) -> int:
     except BlockingIOError:
         return 0
     except OSError:
-        return len(data)  # nobody is there; the next look says so
+        return len(data)  # the other end is closed; the next poll reports it
 
 
 def _tell(error: DriverError) -> None:
@@ -123,7 +123,7 @@ def _say(message: dict[str, object]) -> None:
         sys.stdout.write(json.dumps(message) + "\n")
         sys.stdout.flush()
     except OSError:
-        pass  # nobody listens any more
+        pass  # the other end is closed
 
 
 if __name__ == "__main__":

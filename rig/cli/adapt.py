@@ -14,14 +14,14 @@ def adapt(
     path: Annotated[Path, typer.Argument(help="Recordings of the other instrument.")],
     runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Where the adapted estimator goes.")
+        Path | None, typer.Option("--out", "-o", help="File of the adapted estimator.")
     ] = None,
     scratch: Annotated[
         bool, typer.Option(help="Also fit on the other instrument's runs alone, in folds.")
     ] = True,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
     json: JsonFlag = False,
     json_out: Annotated[

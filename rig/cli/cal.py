@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 cal_app = typer.Typer(
     name="cal",
-    help="Keep calibrations, look at them, and choose the active ones.",
+    help="Store, show and choose calibrations.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -33,29 +33,29 @@ Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")
 
 @cal_app.callback()
 def cal() -> None:
-    """Keep calibrations, look at them, and choose the active ones."""
+    """Store, show and choose calibrations."""
 
 
 @cal_app.command()
 def add(
-    file: Annotated[Path, typer.Argument(help="TOML with a table [channels.NAME] a channel.")],
-    operator: Annotated[str, typer.Option(help="Who vouches for the numbers.")],
-    kind: Annotated[str, typer.Option(help="Where they come from.")] = "certificate",
+    file: Annotated[Path, typer.Argument(help="TOML with a table [channels.NAME] per channel.")],
+    operator: Annotated[str, typer.Option(help="Person responsible for the numbers.")],
+    kind: Annotated[str, typer.Option(help="Origin of the numbers.")] = "certificate",
     made_at: Annotated[
-        str | None, typer.Option(help="Date, ISO 8601 with offset from UTC; now if none.")
+        str | None, typer.Option(help="Date, ISO 8601 with offset from UTC; by default now.")
     ] = None,
     days: Annotated[float | None, typer.Option(help="Stale after this many days.")] = None,
     serial: Annotated[
-        list[str] | None, typer.Option(help="DEVICE=SERIAL they hold for; may be repeated.")
+        list[str] | None, typer.Option(help="DEVICE=SERIAL of the record; may be repeated.")
     ] = None,
     instrument: Annotated[
-        str, typer.Option(help="Serial of the instrument, if for one only.")
+        str, typer.Option(help="Serial number of the instrument, if valid for one only.")
     ] = "",
     channel: Annotated[list[str] | None, typer.Option(help="Only these channels.")] = None,
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Keep the lines of a certificate's TOML file, one record a channel. Makes none active."""
+    """Store the lines of a certificate's TOML file, one record per channel. Makes none active."""
     from calibration.linear import load_calibration_set
     from calibration.record import RawFile, Validity, record_of_line
     from rig import __version__
@@ -118,7 +118,7 @@ def show(
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Show one record whole."""
+    """Show one record completely."""
     from estimation.files import write_text_atomic
     from rig.errors import UsageError
 
@@ -156,7 +156,7 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
 @cal_app.command()
 def use(
     record: Hash,
-    by: Annotated[str, typer.Option(help="Who chooses it.")],
+    by: Annotated[str, typer.Option(help="Name of the person who chooses it.")],
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:
@@ -178,12 +178,13 @@ def check(
     config: ConfigOption = None,
     sim: SimFlag = False,
     log: Annotated[
-        Path | None, typer.Option(help="Hold this log's counts against the calibrated ranges, too.")
+        Path | None,
+        typer.Option(help="Also check this log's counts against the calibrated ranges."),
     ] = None,
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> int:
-    """Hold the active records against today, the rig's serial numbers and their raw files.
+    """Check the active records against today's date, serial numbers and raw files.
 
     Exit code 1 when one must not be used.
     """
@@ -218,11 +219,11 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     store: StoreOption = None,
     ledger: Annotated[
-        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+        Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Ask the diagnosis what a calibration lacks, on the raw logs it was made from."""
+    """Run the diagnosis on the raw logs of a calibration."""
     from rig.calibrate.diagnose import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.run import remember, run_diagnosis

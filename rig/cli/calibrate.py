@@ -39,7 +39,7 @@ class Keeping:
     """How a session is run and kept: the options that every command has."""
 
     operator: Annotated[
-        str, typer.Option(envvar="USER", help="Who calibrates; kept in the record.")
+        str, typer.Option(envvar="USER", help="Name of the operator, stored in the record.")
     ] = ""
     config: ConfigOption = None
     sim: SimFlag = False
@@ -48,24 +48,27 @@ class Keeping:
         typer.Option(
             "--store",
             help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; a simulated"
-            " rig has a folder of its own beside it, NAME-simulated.",
+            " rig has a separate folder, NAME-simulated.",
         ),
     ] = None
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the raw logs.")] = None
     raw: Annotated[
-        Path | None, typer.Option("--from", help="Measure nothing: conclude from these raw logs.")
+        Path | None, typer.Option("--from", help="Measure nothing: fit again from these raw logs.")
     ] = None
     resume: Annotated[
         Path | None, typer.Option(help="Go on with a session that was stopped: its folder.")
     ] = None
     force_sensor: Annotated[
-        str | None, typer.Option(help="DRIVER=URL of it, as ati-net=udp:192.168.1.1:49152.")
+        str | None, typer.Option(help="DRIVER=URL, such as ati-net=udp:192.168.1.1:49152.")
     ] = None
-    days: Annotated[float, typer.Option(min=1, help="Stale after so many days.")] = 180
-    notes: Annotated[str, typer.Option(help="Notes, kept in the record.")] = ""
-    use: Annotated[bool, typer.Option("--use", help="Make what comes out active.")] = False
+    days: Annotated[float, typer.Option(min=1, help="Stale after this number of days.")] = 180
+    notes: Annotated[str, typer.Option(help="Notes, stored in the record.")] = ""
+    use: Annotated[bool, typer.Option("--use", help="Make the result the active record.")] = False
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="Ask nothing; simulated hands do what is asked.")
+        bool,
+        typer.Option(
+            "--yes", "-y", help="Ask no questions; on the simulated rig, simulated hands act."
+        ),
     ] = False
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None
     json: JsonFlag = False
@@ -95,15 +98,15 @@ def torque(
     sensor: Annotated[str, typer.Option(help="proximal or distal.")] = "proximal",
     arm_mm: Annotated[float, typer.Option(help="From the axis to the weights, mm.")] = 100.0,
     masses_g: Annotated[str, typer.Option(help="Weights, g, rising.")] = "50,100,150,200,250",
-    repeats: Annotated[int, typer.Option(min=1, help="How often to go up and down.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of passes up and down.")] = 1,
     shunt_v_v: Annotated[
         float | None, typer.Option(help="Change by the shunt on the certificate, V/V.")
     ] = None,
     counts_per_v_v: Annotated[
-        float | None, typer.Option(help="Counts a V/V of amplifier and converter.")
+        float | None, typer.Option(help="Counts per V/V of amplifier and converter.")
     ] = None,
     temperature_c: Annotated[
-        float | None, typer.Option(help="Of the sensor, for the note.")
+        float | None, typer.Option(help="Temperature of the sensor, for the notes.")
     ] = None,
 ) -> "Procedure":
     """Torque sensor: zero, shunt, then known weights on an arm, up and down again."""
@@ -124,9 +127,10 @@ def torque(
 def current(
     loads_a: Annotated[str, typer.Option(help="Loads to move against, A.")] = "0.1,0.3,0.5,0.7,0.9",
     speeds_rad_s: Annotated[str, typer.Option(help="Speeds of the spindle.")] = "0.5,1.0",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
     motor_constant: Annotated[
-        float | None, typer.Option(help="Data sheet's torque constant, N m/A; gives an efficiency.")
+        float | None,
+        typer.Option(help="Torque constant of the data sheet, N m/A, for the efficiency."),
     ] = None,
     ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
 ) -> "Procedure":
@@ -145,13 +149,13 @@ def current(
 @session
 def gearbox(
     loads_a: Annotated[str, typer.Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
     ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
     stiffness_only: Annotated[
         bool, typer.Option("--stiffness-only", help="Model no backlash.")
     ] = False,
 ) -> "Procedure":
-    """Gear: stiffness of its twist, and backlash."""
+    """Gear: torsional stiffness and backlash."""
     from calibration.sessions.gearbox import GearboxSession
 
     loads = tuple(_numbers(loads_a, "--loads-a"))
@@ -163,10 +167,12 @@ def gearbox(
 @session
 def encoder(
     which: Annotated[str, typer.Option(help="spindle or jaw.")] = "spindle",
-    repeats: Annotated[int, typer.Option(min=1, help="How often each is moved.")] = 2,
-    line_only: Annotated[bool, typer.Option("--line-only", help="Model no wave.")] = False,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 2,
+    line_only: Annotated[
+        bool, typer.Option("--line-only", help="Model no periodic error.")
+    ] = False,
 ) -> "Procedure":
-    """Encoder: zero at its mark, and against the next one ratio, offset and wave."""
+    """Encoder: zero at its mark, and against the next one ratio, offset and periodic error."""
     from calibration.sessions.encoder import EncoderSession
 
     return EncoderSession(encoder=which, repeats=repeats, line_only=line_only)
@@ -176,11 +182,11 @@ def encoder(
 def ft(
     jaw_mm: Annotated[str, typer.Option(help="The jaw from the sensor's origin, mm.")] = "0,0,0",
     jaw_turn_deg: Annotated[
-        str, typer.Option(help="Turns of the jaw's frame about x, y, z of the sensor.")
+        str, typer.Option(help="Rotations of the jaw's frame about x, y, z of the sensor.")
     ] = "0,0,0",
-    repeats: Annotated[int, typer.Option(min=1, help="How often to go through the poses.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of rounds through the poses.")] = 1,
 ) -> "Procedure":
-    """Force sensor: bias, weight and centre of mass of its tool, and the way to the jaw."""
+    """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
     from math import radians
 
     from calibration.sessions.ft import FtSession
@@ -197,14 +203,15 @@ def ft(
 def fsr(
     top_n: Annotated[float, typer.Option(help="Greatest force of a press, N.")] = 1.6,
     presses: Annotated[int, typer.Option(min=3, help="Number of presses.")] = 8,
-    hold_s: Annotated[float, typer.Option(min=0, help="Hold that shows creep; 0 for none.")] = 30.0,
+    hold_s: Annotated[float, typer.Option(min=0, help="Hold time for creep; 0 for none.")] = 30.0,
     degree: Annotated[
-        int | None, typer.Option(min=1, max=9, help="Of the polynomial; found if none.")
+        int | None,
+        typer.Option(min=1, max=9, help="Degree of the polynomial; by default selected."),
     ] = None,
     force_at_zero: Annotated[
-        float | None, typer.Option(help="Force at 0 V, held; fitted if none.")
+        float | None, typer.Option(help="Fixed force at 0 V; by default fitted.")
     ] = None,
-    axis: Annotated[str, typer.Option(help="Force sensor's channel.")] = "force_z_n",
+    axis: Annotated[str, typer.Option(help="Channel of the force sensor.")] = "force_z_n",
     rail_v: Annotated[float, typer.Option(help="Upper end of the amplifier.")] = 3.3,
     curve_only: Annotated[
         bool, typer.Option("--curve-only", help="Model neither hysteresis nor creep.")

@@ -141,7 +141,7 @@ def _begun(procedure: "Procedure", folder: Path | None) -> list[Any]:
 def _kept_for_later(
     procedure: "Procedure", measured: list[Any], lines: "CalibrationSet", how: "Keeping"
 ) -> str:
-    """Keep what a person set up before a session was stopped; return what to tell of it."""
+    """Keep what a person set up before a session was stopped; return a message about it."""
     from datetime import datetime
 
     from rig.calibrate.raw import whole_folder, write_raw
@@ -168,7 +168,7 @@ class Asking:
 
         if not stdin.isatty():
             raise UsageError(
-                "A guided calibration asks, and this is no terminal.",
+                "A guided calibration asks questions, and stdin is not a terminal.",
                 fix="Run it in a terminal, or on the simulated rig with --yes.",
             )
         self._hands = hands

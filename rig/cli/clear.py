@@ -1,10 +1,10 @@
 """`rig clear`: clear a latched fault or trip, with the rig out of force."""
 
-from rig.cli.doctor import ConfigOption
+from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 
-def clear(config: ConfigOption = None, json: JsonFlag = False) -> int:
+def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
     """Clear the rig's latched fault or trip; the motors stay out of force.
 
     Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
@@ -12,9 +12,8 @@ def clear(config: ConfigOption = None, json: JsonFlag = False) -> int:
     board clears it when it is armed next.
     """
     from rig.bench.clearing import clear_latch
-    from rig.configuration.config import load_config
 
-    settings = load_config(config)
+    settings = chosen_rig(config, sim)
     latch = clear_latch(settings)
     if not latch.code:
         text = "nothing is latched."

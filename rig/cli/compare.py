@@ -1,4 +1,4 @@
-"""The simulated rig beside a measured run of the same trajectory and load.
+"""The simulated rig compared with a measured run of the same trajectory and load.
 
 python -m rig.cli.compare --data Tool_4_Maryland_L_4.tar.xz --run 24
 """
@@ -19,7 +19,7 @@ def main(
     figure: Annotated[Path | None, typer.Option(help="Also write a figure here (PNG).")] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Print the levels of a measured run beside those of its simulation."""
+    """Print the levels of a measured run and of its simulation."""
     from rig.importers.registry import open_campaign
     from rig.simulation.compare import compare, draw_figure
 

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def demo(
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for everything.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of noise and split; by the clock if none.")
+        int | None, typer.Option(help="Seed of noise and split; from the clock by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Record the simulated rig with an effect its model lacks, find that effect, and prove it."""
+    """Record the simulated rig with an unmodelled effect, identify it, and confirm it."""
     from rig.cli.demonstration import PROTOCOL, run_demo
     from rig.protocols.protocol import load_protocol
 
@@ -47,7 +47,7 @@ def demo(
 
 
 def _told(result: "Demo") -> list[str]:
-    """Return what was found, where it lies, and what to type next."""
+    """Return the findings, their files and the next command."""
     from rig.cli.demonstration import MODEL
     from rig.reports.diagnosis_words import sentences
 
@@ -61,12 +61,12 @@ def _told(result: "Demo") -> list[str]:
         *sentences(result.diagnosis),
         "",
         f"Report: {result.report}",
-        "This was the quick form: one balance, held against shuffled residuals only. The final",
-        "verdict also holds it against simulated twins that lack nothing; as a second look at the",
-        "same runs it says that it is exploratory:",
+        "This was the quick form: one equation, tested against permuted residuals only. The full",
+        "form also tests against simulated nulls of the complete model. It uses the same test runs",
+        "again, so its result is marked as exploratory:",
         f"  rig diagnose {logs} --balance {MODEL} --workers 2 --ledger {result.ledger}",
-        "The model that was found, as it runs:",
+        "The model with the identified effect, as it runs:",
         f"  rig replay {logs} --model {result.model}",
-        "What to record next, by itself, until the name is unique:",
+        "To choose and record further experiments automatically, until the effect is unique:",
         "  rig loop --sim",
     ]

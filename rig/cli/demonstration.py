@@ -1,7 +1,7 @@
-"""The demonstration: record, fit, look at what is left, diagnose, report.
+"""The demonstration: record, fit, screen the residual, diagnose, report.
 
-The simulated rig holds one effect that the declared model knows nothing of. The campaign goes the
-whole way: frames from the board, its driver, calibration, one log a run. What the diagnosis is
+The simulated rig contains one effect that the declared model lacks. The campaign uses the whole
+chain: frames from the board, its driver, calibration, one log a run. What the diagnosis is
 given are those logs and nothing else.
 """
 
@@ -34,38 +34,38 @@ from rig.reports.first_look import first_look
 
 PROTOCOL = "diagnosis"
 MODEL = "motor"
-"""One balance: without twins, a search of all four may take an artefact for an effect."""
+"""One equation: without simulated nulls, a search of all four may report an artefact."""
 
 DRAW = 212
-"""Draws a ripple of the motor's torque; drawn, and not named, so that no log tells of it.
+"""Draws a ripple of the motor's torque; drawn, and not named, so that no log contains it.
 
-A fault drives really have, and one these runs tell from its rivals. It swells once a turn, as the
-catalogue's does not: drawn a quarter stronger, a map beats the catalogue's sine and the answer is
-that it depends on the motor's angle, which is right and makes a poorer show. The rig around it is
-the one the declared models describe: the measured one also sticks at reversals and rubs in
-proportion to its load, which hides a small effect.
+A real fault of drives, and one that these runs can identify. Its amplitude varies over a turn,
+unlike the catalogue's: drawn a quarter stronger, a smooth function fits better than the catalogue's
+sine and the answer is that it depends on the motor's angle, which is right and makes a poorer show.
+The rig around it is the one the declared models describe: the measured one also sticks at reversals
+and rubs in proportion to its load, which hides a small effect.
 """
 
 FOLDS = 4
 
 Stage = Callable[[str], None]
-"""Told what begins or what was seen, in words."""
+"""Called with a message at the start and the result of each stage."""
 
 
 @dataclass(frozen=True)
 class Demo:
-    """What a demonstration came to.
+    """The results of a demonstration.
 
     Attributes:
-        folder: Everything lies here, the logs in `logs`.
+        folder: Folder of all files, the logs in `logs`.
         report: The diagnosis, one HTML page.
-        first_look: The page of the first look.
-        model: File of the model with what was found.
-        ledger: The demonstration's own ledger of looks.
-        runs: What was recorded.
+        first_look: The page of the screening.
+        model: File of the model with the added effect.
+        ledger: The demonstration's own log of uses of held-out data.
+        runs: The recorded runs.
         held_out: Error of the declared model on runs it was not fitted on.
-        structures: What its residual goes with, largest first.
-        diagnosis: What the model lacks, held against surrogates only.
+        structures: Variables that its residual depends on, largest first.
+        diagnosis: What the model lacks, tested against permutation nulls only.
         firmware: Whether the compiled firmware core was in the loop.
     """
 
@@ -101,17 +101,17 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     on_stage("recording a campaign through the board's frames and the driver")
     runs, firmware = _record(config, logs, on_progress)
     declared = model_file.read(Path(MODEL))
-    on_stage(f"fitting the declared model {MODEL!r} on the runs that may be looked at")
+    on_stage(f"fitting the declared model {MODEL!r} on the training runs")
     campaign = open_campaign(logs)
     # the others are the diagnosis' proof; whoever looks at them first proves nothing with them
     campaign = campaign.select(split(evidence(campaign), seed).discover)
     fitted = fit(declared, campaign, seed=seed)
     held_out = held_out_error(declared, campaign, FOLDS, seed)
     structures = largest_structure(fitted, campaign, seed=seed)
-    on_stage(f"first look: {structures[0].sentence()}")
+    on_stage(f"screening: {structures[0].sentence()}")
     look = _first_look(fitted, campaign, structures, held_out, firmware, seed)
     looked = write_report(folder / "first_look.html", look)
-    # simulated runs are no evidence of anybody's rig: they stay out of the user's own ledger
+    # simulated runs are not evidence about a real rig: they are not in the user's own log
     ledger = folder / "looks.jsonl"
     looks = Ledger(ledger)
     done = run_diagnosis(
@@ -158,7 +158,7 @@ def _first_look(
 ) -> str:
     board = "the compiled firmware core" if firmware else "the Python fake of the board"
     story = (
-        "The simulated rig, with one effect that no model was told of, was recorded through"
+        "The simulated rig, with one effect that no model declares, was recorded through"
         f" {board} and its driver. The declared model {fitted.name!r} was fitted on"
         f" {len(campaign)} runs; the others are left for the diagnosis to prove itself on. On runs"
         f" it was not fitted on it errs by {held_out.rmse * 1e3:.2f} mN m rms"

@@ -18,37 +18,35 @@ def diagnose(
             "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
         ),
     ] = None,
-    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: JsonFlag = False,
     json_out: Annotated[
         Path | None, typer.Option("--json-out", help="File for the diagnosis as JSON.")
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Folder for the page that a person reads.")
-    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder of the HTML report.")] = None,
     model_out: Annotated[
-        Path | None, typer.Option(help="Where the models with what was found go, one file.")
+        Path | None, typer.Option(help="File of the models with the identified effects.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
-    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
+    workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A first answer in seconds, without simulated twins.")
+        bool, typer.Option("--quick", help="A first answer in seconds, without simulated nulls.")
     ] = False,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask scheduler to work on."),
+        typer.Option(help="Address of a Dask scheduler."),
     ] = None,
     protocol_out: Annotated[
-        Path | None, typer.Option(help="Where the next experiment goes, as a protocol file.")
+        Path | None, typer.Option(help="Protocol file of the next experiment.")
     ] = None,
     ledger: Annotated[
-        Path | None, typer.Option(help="Ledger of looks, if not the user's own.")
+        Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
 ) -> None:
-    """Find the effect that the declared model lacks, and prove it on runs that nobody touched."""
+    """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
     import json
 
     from estimation import model_file

@@ -9,7 +9,7 @@ from rig.output.console import JsonFlag, emit_json, results
 
 
 def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
-    """Look for what is wrong with the rig, and say what to type.
+    """Check the rig for faults and suggest the next command.
 
     Exit code 1 when something must be put right, 0 when there are at most warnings.
     """

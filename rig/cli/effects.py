@@ -81,4 +81,4 @@ def _show(one: "Effect") -> None:
     if one.confused_with:
         screen.print(f"confused with: {', '.join(one.confused_with)}")
     if one.told_apart_by:
-        screen.print(f"told apart by: {one.told_apart_by}")
+        screen.print(f"distinguished by: {one.told_apart_by}")

@@ -21,7 +21,7 @@ def compare(
     second: Annotated[Path, typer.Argument(help="Another one of the same channel.")],
     on: Annotated[Path, typer.Option("--on", help="Recordings: a file, folder or archive.")],
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,

@@ -10,8 +10,8 @@ from rig.output.console import JsonFlag, emit_json, results
 
 def export(
     model: Annotated[Path, typer.Argument(help="Estimator of rig fit or rig adapt, .npz.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The header, such as grip.h.")],
-    rate: Annotated[float, typer.Option(help="Rate at which it will be called, Hz.")] = 1000.0,
+    out: Annotated[Path, typer.Option("--out", "-o", help="File of the header, such as grip.h.")],
+    rate: Annotated[float, typer.Option(help="Call rate, Hz.")] = 1000.0,
     json: JsonFlag = False,
 ) -> None:
     """Write an estimator as a self-contained C header, for firmware."""

@@ -10,7 +10,7 @@ from rig.output.console import JsonFlag, emit_json, results
 
 firmware_app = typer.Typer(
     name="firmware",
-    help="Say which firmware is where, build it, flash it.",
+    help="Show firmware versions, build the firmware, flash it.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,

@@ -125,7 +125,7 @@ def fit(
         ),
     ] = "grip",
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Where the fitted model goes.")
+        Path | None, typer.Option("--out", "-o", help="File of the fitted model.")
     ] = None,
     folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
@@ -133,13 +133,13 @@ def fit(
         str, typer.Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
     surrogate: Annotated[
-        str, typer.Option(help="Channel that stands for the load; with --model states or network.")
+        str, typer.Option(help="Channel that represents the load; with --model states or network.")
     ] = "motor_current_a",
     live: Annotated[
         bool, typer.Option("--live", help="Fit for use live; with --model states.")
     ] = False,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; guessed if none.")
+        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
     json_: JsonFlag = False,
 ) -> None:
@@ -195,13 +195,13 @@ def _dated(model: "Model") -> "Model":
     from dataclasses import replace
     from datetime import UTC, datetime
 
-    assert model.evidence is not None  # noqa: S101  a fit leaves its evidence
+    assert model.evidence is not None  # noqa: S101  a fit sets its evidence
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return replace(model, evidence=replace(model.evidence, made_at=now))
 
 
 def _told(model: "Model", error: "HeldOutError", out: Path | None) -> dict[str, Any]:
-    """Return what a machine is told of a fit."""
+    """Return the JSON result of a fit."""
     parameters = [
         {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}
         | {"estimate": term.values[p.name]}

@@ -55,7 +55,7 @@ def record(
     seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
     json: JsonFlag = False,
 ) -> None:
-    """Record the simulated wrist, its joints coupled as it was built, one log a run.
+    """Record the simulated wrist with the coupling of its pulleys, one log per run.
 
     All joints move at once. For the kinematics only; `rig record -c grasper` records the forces of
     the simulated grasper, with its board in the loop.
@@ -81,19 +81,19 @@ def follow(
     sim: SimFlag = False,
     master: Annotated[
         str | None,
-        typer.Option(help="Where it is, as usb:16c0:0483; as configured if none."),
+        typer.Option(help="URL, such as usb:16c0:0483; by default the configured one."),
     ] = None,
-    duration: Annotated[float, typer.Option(min=0.5, help="How long, s.")] = 10.0,
+    duration: Annotated[float, typer.Option(min=0.5, help="Duration, s.")] = 10.0,
     scale: Annotated[
-        float, typer.Option(min=0.01, max=2, help="Angle of a joint for an angle of the master.")
+        float, typer.Option(min=0.01, max=2, help="Joint angle per angle of the master.")
     ] = 0.3,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
     json: JsonFlag = False,
 ) -> None:
-    """Send the three motors where the master goes, within the limits of the configuration.
+    """Make the three motors follow the master, within the limits of the configuration.
 
-    The grasper moves. It starts where it stands, however the master is held. Ctrl-C leaves, with
-    the motors out of force.
+    The grasper moves. It starts at its present position, for any position of the master. Ctrl-C
+    quits and disarms the motors.
     """
     from rig.configuration.check import refuse_problems
     from rig.grasper.following import follow_master

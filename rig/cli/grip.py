@@ -14,15 +14,15 @@ REACHED_RATIO = 0.1
 
 def grip(
     torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
-    duration: Annotated[float, typer.Option(min=8, help="How long, s.")] = 40.0,
+    duration: Annotated[float, typer.Option(min=8, help="Duration, s.")] = 40.0,
     config: ConfigOption = None,
     sim: SimFlag = False,
     model: Annotated[
-        Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
+        Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
     ] = None,
     json: JsonFlag = False,
 ) -> int:
-    """Hold a grip torque by the estimate from motor current alone; the sensor looks on.
+    """Control a grip torque by the estimate from motor current alone; the sensor is for comparison.
 
     The rig moves: the jaw goes to and fro a little against its load motor. Exit code 1 when the
     sensor, which nothing is controlled by, is further from the torque than the estimate's interval,

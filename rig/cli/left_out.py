@@ -1,4 +1,4 @@
-"""What a command that reads recordings leaves out of them, named for the person who typed it."""
+"""Report of the recordings that a command excludes."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def say_left_out(path: Path, campaign: "Campaign") -> None:
-    """Name on stderr the files and runs at a path that a campaign leaves out, and why."""
+    """Print on stderr the files and runs at a path that a campaign excludes, with the reason."""
     from rig.importers.left_out import left_out
 
     screen = remarks()

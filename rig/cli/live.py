@@ -13,37 +13,40 @@ def live(
     config: ConfigOption = None,
     sim: SimFlag = False,
     model: Annotated[
-        Path | None, typer.Option(help="Model file that estimates; the configured one if none.")
+        Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
     ] = None,
     protocol: Annotated[
         str | None,
-        typer.Option("--protocol", "-p", help="Play this protocol; else the rig is only watched."),
+        typer.Option(
+            "--protocol", "-p", help="Play this protocol; without it the rig does not move."
+        ),
     ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Leave after this much device time, s.")
-    ] = None,
+    duration: Annotated[float | None, typer.Option(help="Quit after this device time, s.")] = None,
     pace: Annotated[
-        float, typer.Option(help="Simulated seconds a second; 0 is as fast as possible.")
+        float, typer.Option(help="Simulated seconds per second; 0 is as fast as possible.")
     ] = 1.0,
     lever_mm: Annotated[
         float | None, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")] = False,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder of recordings that a key starts.")
+        Path, typer.Option("--out", "-o", help="Folder of recordings started by a key.")
     ] = Path("logs"),
     foxglove: Annotated[
-        bool, typer.Option("--foxglove", help="Also serve it to Foxglove, on this computer only.")
+        bool,
+        typer.Option("--foxglove", help="Also serve the data to Foxglove, on this computer only."),
     ] = False,
-    foxglove_port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 8765,
+    foxglove_port: Annotated[
+        int, typer.Option(min=1, max=65535, help="Port of the Foxglove server.")
+    ] = 8765,
     json_: JsonFlag = False,
 ) -> int:
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
-    A simulated rig plays a first look unless told otherwise; a real rig is never moved
-    without --protocol. Ctrl-C leaves, with the rig safe and exit code 130. With --json, one object
-    a line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m marks it,
-    q leaves.
+    A simulated rig plays a default protocol; a real rig is never moved without
+    --protocol. Ctrl-C quits, with the rig in its safe state and exit code 130. With --json, one
+    object per line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m
+    marks it, q quits.
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
@@ -94,7 +97,7 @@ def live(
             plain=plain,
             json=json_,
             half_widths=half_widths_of(estimators),
-            footer=HELP if keys else "Ctrl-C leaves",
+            footer=HELP if keys else "Ctrl-C quits",
         )
         summary = show(until(blocks, duration), options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 log_app = typer.Typer(
     name="log",
-    help="Look into, check, repair and export logs.",
+    help="Inspect, check, repair and export logs.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -28,7 +28,7 @@ OneLog = Annotated[Path, typer.Argument(help="A log.")]
 
 @log_app.command()
 def info(path: LogOrFolder, json: JsonFlag = False) -> None:
-    """Say what is in a log: run, conditions, streams, rates, marks, attachments."""
+    """Show the content of a log: run, conditions, streams, rates, marks, attachments."""
     from rig.log.reader import read_log
 
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
@@ -74,7 +74,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 
 def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
-    """Return the runs of a campaign's protocol that have no log; none where it is no campaign."""
+    """Return the runs of a campaign's protocol that have no log; empty if it is not a campaign."""
     from rig.recording.campaign import MANIFEST, read_manifest
 
     if not (path / MANIFEST).is_file():
@@ -104,7 +104,7 @@ def repair(
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Write what is readable of a damaged log to a new file; the original stays as it is."""
+    """Write the readable part of a damaged log to a new file; the original is not changed."""
     from rig.log.repair import repair_log
 
     report = repair_log(path, out)
@@ -120,7 +120,7 @@ def export(
     format_name: Annotated[str, typer.Option("--format", help="csv, parquet or npz.")] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File with --topic, else folder; beside the log by default.")
+        Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[
@@ -160,7 +160,7 @@ def _other_calibrations(
 ) -> "CalibrationSet | None":
     """Return the set an export is to be made with; None for the one it was recorded with.
 
-    A record whose range the log leaves is held to the rules: a remark, or an error.
+    If the log exceeds the range of a record, the rules apply: a remark, or an error.
     """
     if calibration is None and not records:
         return None
@@ -201,7 +201,7 @@ def _logs(path: Path) -> list[Path]:
 
 
 def _described(log: "LogFile") -> dict[str, Any]:
-    """Return what `info` tells about a log."""
+    """Return the result of `info` for a log."""
     from rig.log.check import stream_time_s
     from rig.log.convert import exclusion
 

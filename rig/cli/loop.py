@@ -11,30 +11,32 @@ from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 def loop(
     sim: Annotated[
-        bool, typer.Option("--sim", help="On the simulated rig; no other is moved.")
+        bool, typer.Option("--sim", help="Use the simulated rig; no other rig is moved.")
     ] = False,
     hide: Annotated[
         list[str] | None,
-        typer.Option(help="Hidden effect, or effect=strength; by seed if none; `none` for none."),
+        typer.Option(
+            help="Hidden effect, or effect=strength; by default drawn by the seed; `none` for none."
+        ),
     ] = None,
-    balance: Annotated[str | None, typer.Option(help="Only this balance, such as motor.")] = None,
+    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     protocol: Annotated[
-        str | None, typer.Option("--protocol", "-p", help="First protocol; diagnosis if none.")
+        str | None, typer.Option("--protocol", "-p", help="First protocol; by default `diagnosis`.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for everything.")] = None,
-    rounds: Annotated[int, typer.Option(help="Campaigns at most.")] = 3,
-    minutes: Annotated[float, typer.Option(help="No round begins later than this.")] = 20.0,
-    seed: Annotated[int | None, typer.Option(help="Seed; by the clock if none.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Without simulated twins.")] = False,
-    workers: Annotated[int, typer.Option(help="Processes to work in; 1 is this one.")] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler to work on.")
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")] = None,
+    rounds: Annotated[int, typer.Option(help="Maximum number of campaigns.")] = 3,
+    minutes: Annotated[float, typer.Option(help="No round starts after this time, min.")] = 20.0,
+    seed: Annotated[
+        int | None, typer.Option(help="Random seed; taken from the clock by default.")
     ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Without simulated nulls.")] = False,
+    workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Record, diagnose and choose the next experiment, until the name is unique.
+    """Record, diagnose and choose the next experiment, until the effect is unique.
 
-    Ends when every name is unique, when nothing is missing, or when the budget is spent.
+    Ends when every effect is unique, when the model is complete, or at the limit of rounds or time.
     """
     from rig.configuration.config import load_config
     from rig.diagnosis.engine import engine
@@ -89,7 +91,7 @@ def loop(
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
             bar.start()
     told = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
-    screen.print(f"What was hidden: {told or 'nothing'}.", markup=False)
+    screen.print(f"Hidden effects: {told or 'none'}.", markup=False)
     if json:
         last = made[-1]
         emit_json(

@@ -103,7 +103,7 @@ def main(arguments: list[str] | None = None) -> int:
         result = app(args=words, standalone_mode=False, prog_name="rig")
     except typer.Exit as stop:
         return stop.exit_code
-    except SystemExit:  # how typer and rich leave when the reader of stdout has left
+    except SystemExit:  # how typer and rich exit when the reader of stdout is closed
         return 141
     except KeyboardInterrupt:
         sys.stderr.write("Interrupted.\n")
@@ -153,7 +153,7 @@ def _report(error: Exception, words: list[str]) -> int:
 
 
 def run() -> None:
-    """Run the command line as the console script does: leave with its exit code."""
-    if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a letter it lacks is no error
+    """Run the command line as the console script does: exit with its exit code."""
+    if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a missing letter is not an error
         sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())

@@ -1,4 +1,4 @@
-"""`rig record`: run a protocol and leave one log a run."""
+"""`rig record`: run a protocol and write one log per run."""
 
 from datetime import datetime
 from pathlib import Path
@@ -30,16 +30,17 @@ def record(
     sim: SimFlag = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the campaign in this folder.")
+        Path | None, typer.Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", "-m", help="Fitted model to watch: does it still fit?")
+        Path | None,
+        typer.Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
     ] = None,
-    notes: Annotated[str, typer.Option(help="Operator's notes, kept in every log.")] = "",
+    notes: Annotated[str, typer.Option(help="Operator's notes, stored in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
-    """Run a protocol on the rig and leave one log a run in logs/.
+    """Run a protocol on the rig and write one log per run to logs/.
 
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """

@@ -17,26 +17,28 @@ if TYPE_CHECKING:
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording: a file, folder or archive.")],
     run: Annotated[
-        str | None, typer.Option(help="Name of the run; the first that counts if not given.")
+        str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="Model file that estimates live.")] = None,
-    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as possible.")] = 1.0,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines in place of the display.")] = False,
+    model: Annotated[Path | None, typer.Option(help="Model file of the live estimate.")] = None,
+    speed: Annotated[
+        float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
+    ] = 1.0,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")] = False,
     json_: JsonFlag = False,
     lever_mm: Annotated[
         float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = 12.0,
     any_instrument: Annotated[
-        bool, typer.Option("--any-instrument", help="Let a model estimate another instrument too.")
+        bool, typer.Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
     format_: Annotated[
-        str | None, typer.Option("--format", help="Format of LOG; guessed if not given.")
+        str | None, typer.Option("--format", help="Format of LOG; detected by default.")
     ] = None,
 ) -> int:
-    """Show a recording as it looked live, with the estimate of any model.
+    """Play back a recording in the live display, with the estimate of any model.
 
-    Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object a line: a
-    frame every 0.1 s, a summary last. Ctrl-C leaves with exit code 130.
+    Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
+    a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.
     """
     from rig.errors import ExitCode, UsageError
     from rig.importers.registry import open_campaign
@@ -75,7 +77,7 @@ def replay(
 
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
-    """Return the named run, or the first that counts, and tell the person which one it is."""
+    """Return the named run, or the first valid one, and print its name."""
     from rig.errors import DataError, UsageError
 
     if not len(campaign):
@@ -94,7 +96,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 
 def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
-    """Say which run is shown, if there are more, and what speaks against it."""
+    """Print which run is shown, if there are more, and the objections to it."""
     people = remarks()
     if len(campaign) > 1 and not chosen:
         place = campaign.names.index(recording.name) + 1

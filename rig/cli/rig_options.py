@@ -1,4 +1,4 @@
-"""The options that say which rig a command is about, and the line that says it is simulated."""
+"""The options that select the rig of a command, and the line for a simulated rig."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

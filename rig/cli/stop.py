@@ -1,4 +1,4 @@
-"""`rig stop`: take the motors out of force, and say so only once the board has confirmed it."""
+"""`rig stop`: disarm the motors, and report it only after the board has confirmed it."""
 
 from pathlib import Path
 from typing import Any

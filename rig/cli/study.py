@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 study_app = typer.Typer(
     name="study",
-    help="Make a paper's results again, on measured or simulated data.",
+    help="Reproduce a paper's results, on measured or simulated data.",
     cls=GroupedHelp,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -31,7 +31,7 @@ study_app.add_typer(arm_studies)
 
 @study_app.callback()
 def studies() -> None:
-    """Make a paper's results again, on measured or simulated data."""
+    """Reproduce a paper's results, on measured or simulated data."""
 
 
 @study_app.command()
@@ -57,19 +57,20 @@ def oneill(
         Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(help="Start no network after so long; tables say what lacks.")
+        float | None,
+        typer.Option(help="Start no network after this time, min; tables list the rest."),
     ] = None,
     every: Annotated[int, typer.Option(min=1, help="Train on every n-th closing sample.")] = 8,
-    workers: Annotated[int, typer.Option(min=1, help="Networks trained at once.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="Networks trained in parallel.")] = 1,
     state: Annotated[
         Path | None, typer.Option(help="Folder of trained networks; a cache folder by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Make Tables I to V of O'Neill et al. 2018 again, and estimates that are better.
+    """Reproduce Tables I to V of O'Neill et al. 2018, and fit better estimators.
 
-    Alone it fits Table I's straight lines, in seconds. --networks trains the paper's networks, and
-    is long: it can be interrupted, and goes on where it was. --states and --kinds take minutes.
+    By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
+    which takes long; after an interruption it resumes. --states and --kinds take minutes.
     """
     from rig.output.render import write_report
     from rig.studies.oneill import page as shown
@@ -196,13 +197,13 @@ def zhao(
     spread: Annotated[
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
-    workers: Annotated[int, typer.Option(min=1, help="Processes at once.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="Number of parallel processes.")] = 1,
     state: StateFolder = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Make Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016 again, simulated."""
+    """Reproduce Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016, simulated."""
     from rig.errors import UsageError
     from rig.grasper.plant import PROTOTYPES
     from rig.studies.zhao import page as shown
@@ -235,14 +236,14 @@ def zhao(
 @study_app.command()
 def loop(
     data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
-    seed: Annotated[int, typer.Option(help="Seed of the split and of the surrogates.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the split and of the permutations.")] = 0,
     task: Annotated[
         list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Add effects to the paper's linear models until nothing is left, proved on runs kept back."""
+    """Add effects to the paper's linear models, confirmed on held-out test runs."""
     from rig.errors import UsageError
     from rig.studies.loop import page as shown
     from rig.studies.loop.study import TASKS, run_study

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 arm_studies = typer.Typer(rich_markup_mode=None)
 
 StateFolder = Annotated[
-    Path | None, typer.Option("--state", help="Folder of what is done; a cache folder by default.")
+    Path | None,
+    typer.Option("--state", help="Folder of finished parts; a cache folder by default."),
 ]
 
 Arms = Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")]
@@ -46,7 +47,7 @@ def _show(
 
     Args:
         study: The study.
-        lines: What is said before its tables.
+        lines: Lines printed before its tables.
         tables: Its tables.
         page: Makes its page, with figures at the places given.
         drawn: Figures that were drawn.
@@ -62,7 +63,7 @@ def _show(
 def resumable(
     state: Path | None, study: str, total: int, what: str = "arms"
 ) -> Iterator[tuple[Path, Callable[[], None]]]:
-    """Show how much of a study is done; where it is interrupted, say how to go on.
+    """Show how much of a study is done; after an interruption, print how to resume.
 
     Yields:
         Where the study keeps what is done, and what to call after each step.
@@ -73,7 +74,7 @@ def resumable(
             task = bar.add_task(what, total=total)
             yield kept, lambda: bar.advance(task)
     except KeyboardInterrupt:
-        sys.stderr.write(f"What is done is kept in {kept}: the same command goes on from there.\n")
+        sys.stderr.write(f"Finished parts are kept in {kept}: the same command resumes.\n")
         raise
 
 
@@ -122,7 +123,7 @@ def excitation(
     out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Design an arm's excitation within its limits at every instant, beside the thesis' search."""
+    """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
     from rig.arm.excitation import run_excitation, table, write_trajectory
     from rig.output.table import to_markdown
 

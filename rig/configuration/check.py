@@ -1,4 +1,4 @@
-"""What a configuration that is well written may still get wrong: drivers, options, CAN buses."""
+"""Checks of a valid configuration: drivers, options, CAN buses."""
 
 import inspect
 from collections.abc import Mapping
@@ -29,8 +29,8 @@ class Problem:
 
     Attributes:
         key: The part of the configuration it stands in.
-        what: What is wrong.
-        fix: What to write in its place.
+        what: The fault.
+        fix: Replacement.
     """
 
     key: str
@@ -39,7 +39,7 @@ class Problem:
 
 
 def problems(config: Config) -> list[Problem]:
-    """Return what is wrong with a configuration beyond its keys and ranges; empty when sound."""
+    """Return the problems of a configuration beyond its keys and ranges; empty when sound."""
     known = drivers()
     sections: dict[str, LoggerSection | DeviceSection] = {LOGGER: config.logger, **config.devices}
     found = [
@@ -73,7 +73,7 @@ def refuse_problems(config: Config) -> None:
 
 
 def _name_problems(config: Config) -> list[Problem]:
-    """Return what names a model or a set of calibrations that is not there."""
+    """Return the keys that name a missing model or set of calibrations."""
     found = []
     if config.model_path is not None and not config.model_path.is_file():
         known = [p.name.removesuffix(".model.toml") for p in SHIPPED.glob("*.model.toml")]
@@ -183,7 +183,7 @@ def _place(
 
 
 def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
-    """Return what keeps two devices from sharing a bus."""
+    """Return the conflicts of two devices on one bus."""
     found = []
     shared = sorted(one.identifiers & other.identifiers)
     if shared:

@@ -55,7 +55,7 @@ class Config(Section):
         machine: What else the machine is configured by; which keys there are depends on
             `[logger] profile`, as those of limits and drift do.
         devices: Further devices by the name their recorded channels go under.
-        serials: Serial numbers of the devices on the rig, held against those of the records.
+        serials: Serial numbers of the devices on the rig, compared with those of the records.
     """
 
     name: str
@@ -134,7 +134,7 @@ class Config(Section):
     def default_store(self) -> CalibrationStore:
         """The store where neither the configuration nor a command names one.
 
-        What comes from a simulated rig is kept beside the real calibrations, not among them.
+        Calibrations of a simulated rig are stored separately from the real ones.
         """
         folder = default_folder()
         if self.is_simulated:
@@ -161,7 +161,7 @@ class Config(Section):
         return {name: limit for name, limit in self.drift if limit is not None}
 
     def calibration_verdicts(self) -> list[Verdict]:
-        """Return what speaks against the store's active lines now; empty without a store."""
+        """Return the objections to the store's active lines now; empty without a store."""
         if self.store is None:
             return []
         lines = active_lines(self.store, self.instrument.serial).values()
@@ -176,7 +176,7 @@ class Config(Section):
         return Config.model_validate(whole)
 
     def logged(self) -> dict[str, Any]:
-        """Return what a log holds of it: all but what is hidden, which a diagnosis is to find."""
+        """Return the part for a log: all but the hidden effects, which a diagnosis must find."""
         whole = self.model_dump()
         for secret in ("hidden", "draw_hidden"):
             del whole["simulation"][secret]
@@ -184,7 +184,7 @@ class Config(Section):
 
 
 def is_simulated(url: str) -> bool:
-    """Say whether a URL names a fake."""
+    """Whether a URL names a fake."""
     return url.startswith("sim:")
 
 

@@ -41,7 +41,7 @@ class Section(BaseModel):
 
 
 class LoggerSection(Section):
-    """What moves the rig and samples it, and where it is found.
+    """The board or drive that moves and samples the rig, and its URL.
 
     Attributes:
         driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
@@ -63,11 +63,11 @@ class LoggerSection(Section):
 
 
 class DeviceSection(Section):
-    """A further device whose channels are recorded beside the logger's.
+    """A further device whose channels are recorded with the logger's.
 
     Attributes:
         driver: Name of its driver; `rig devices` lists them.
-        url: Where it is; `sim://` for its fake.
+        url: URL; `sim://` for its fake.
         options: The driver's own options.
         bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
             from the factory if none.
@@ -94,12 +94,12 @@ class ControllerSection(Section):
 
 
 class SafetySection(Section):
-    """What is watched besides the limits, by the board first and by this computer again; on always.
+    """Monitors in addition to the limits, on the board and again on this computer; always on.
 
     A time or a heat of 0 switches its watch off.
 
     Attributes:
-        safe_state: What the drive motor does once something tripped: `release`, no current; or
+        safe_state: State of the drive motor after a trip: `release`, no current; or
             `hold`, stay where it stands with a low command, where encoder and current are sound.
         hold_command_ratio: Largest command while holding, of full scale.
         continuous_current_a: Motor current that warms the motor no further.
@@ -151,8 +151,8 @@ class SimulationSection(Section):
     Attributes:
         seed: Seed of noise, offsets and drift.
         spread: Relative spread of the plant's parameters drawn by the seed.
-        hidden: Hidden effect to strength; effects that no declared model is told of.
-        draw_hidden: Seed that draws one more hidden effect, so that nobody need know which.
+        hidden: Hidden effect to strength; effects that no declared model contains.
+        draw_hidden: Seed that draws one more hidden effect without showing its name.
         firmware: Put the compiled firmware core in the loop where it is built.
         plant: `measured`, with losses that no declared model holds, or `declared`, without them.
         grasper: Prototype of the simulated grasper, where the profile is the grasper's.

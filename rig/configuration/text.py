@@ -1,4 +1,4 @@
-"""A resolved configuration as TOML text, every default written out and every unit said."""
+"""A resolved configuration as TOML text, with every default and every unit."""
 
 import json
 from collections.abc import Iterator, Mapping

@@ -19,7 +19,7 @@ def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -
     """Return one line a problem: where it stands, the message, the nearest known key.
 
     Args:
-        error: What pydantic found.
+        error: Error of pydantic.
         known: Keys to suggest for one that does not exist.
         text: The TOML that was read; with it each problem names its line.
     """

@@ -1,1 +1,1 @@
-"""What is there, what is wrong with it, and what to type: `rig devices`, `doctor`, `selftest`."""
+"""Devices, their faults and the next command: `rig devices`, `doctor`, `selftest`."""

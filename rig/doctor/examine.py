@@ -15,8 +15,8 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
     """Yield findings as they are made.
 
     Args:
-        config: What should be there.
-        root: Root of the file system, for what the operating system tells.
+        config: The expected configuration.
+        root: Root of the file system, for the files of the operating system.
     """
     wrong = problems(config)
     for problem in wrong:

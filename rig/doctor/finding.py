@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How a finding is to be taken."""
+    """Severity of a finding."""
 
     OK = "ok"
     WARNING = "warning"
@@ -18,11 +18,11 @@ class Finding:
     """One finding.
 
     Attributes:
-        subject: What was looked at: a device, a port, the computer.
-        check: What was looked for.
+        subject: Subject of the check: a device, a port, the computer.
+        check: The check.
         level: Whether it is in order.
-        what: What was found, with numbers.
-        fix: What to do or to type; empty where nothing is to be done.
+        what: Finding, with numbers.
+        fix: Action or next command; empty if none is needed.
     """
 
     subject: str

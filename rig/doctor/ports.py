@@ -21,7 +21,7 @@ class Port:
     Attributes:
         path: Device path.
         usb: `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB.
-        name: What it says of itself.
+        name: Name reported by the device.
     """
 
     path: str
@@ -52,7 +52,7 @@ def can_interfaces(root: Path = ROOT) -> list[str]:
 
 
 def port_findings(ports: Sequence[Port], root: Path = ROOT) -> list[Finding]:
-    """Return what is to be said of the ports that are the rig's by their USB identity."""
+    """Return the findings on the ports that are the rig's by their USB identity."""
     ours = [port for port in ports if port.usb[:9] in USB]
     findings = [one for port in ours for one in _port_findings(port, root)]
     if ours and _runs("ModemManager", root) and not all(has_rule(p.usb, root) for p in ours):
@@ -99,7 +99,7 @@ def _port_findings(port: Port, root: Path) -> list[Finding]:
 
 
 def _latency_findings(port: Port, root: Path) -> list[Finding]:
-    """An FTDI adapter waits 16 ms for more bytes unless told otherwise."""
+    """An FTDI adapter waits 16 ms for more bytes by default."""
     timer = root / "sys/bus/usb-serial/devices" / Path(port.path).name / "latency_timer"
     try:
         milliseconds = int(timer.read_text())
@@ -107,7 +107,7 @@ def _latency_findings(port: Port, root: Path) -> list[Finding]:
         return []
     if milliseconds <= 1:
         return []
-    what = f"Its latency timer is {milliseconds} ms; answers come late."
+    what = f"Its latency timer is {milliseconds} ms; answers are delayed."
     return [Finding(port.path, "latency", Level.WARNING, what, f"echo 1 | sudo tee {timer}")]
 
 

@@ -30,10 +30,10 @@ LATEST_TRIP_S = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What came of one check.
+    """Result of one check.
 
     Attributes:
-        name: What was checked.
+        name: Name of the check.
         passed: Whether it holds.
         detail: Numbers, or what went wrong.
     """
@@ -122,8 +122,8 @@ BOARD_CHECKS: dict[str, Callable[[TeensyLogger, Config], tuple[bool, str]]] = {
     "zeros stay where they are": _zero_drift,
     "the board trips at a travel limit": _travel_limit,
     "the board refuses a setpoint beyond the travel": _setpoint_limit,
-    "the board makes itself safe when the host falls silent": _watchdog,
-    "the board disarms and says so": _stop,
+    "the board goes to its safe state when the host is silent": _watchdog,
+    "the board disarms and confirms it": _stop,
 }
 """Checks on the logger alone, each on a fresh link."""
 

@@ -1,4 +1,4 @@
-"""A device's stream held against what it promises: rate, loss, saturation, stuck channels."""
+"""Checks of a device's stream: rate, loss, saturation, stuck channels."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ STANDING_STILL_UNITS = ("rad", "1")
 
 
 def device_findings(name: str, open_it: Callable[[], Device]) -> list[Finding]:
-    """Open a device, watch its stream for a second, and say what is wrong with it.
+    """Open a device, read its stream for a second, and report its faults.
 
     Args:
         name: Name of the device in the configuration.
@@ -96,7 +96,7 @@ def _channel_findings(name: str, device: Device, batches: list[Batch]) -> list[F
     findings = []
     if saturated:
         what = f"Saturated in {saturated} of {flags.size} samples."
-        fix = "Check wiring and amplifier; unload the sensor; see that its range fits."
+        fix = "Check wiring and amplifier; unload the sensor; check its range."
         findings.append(Finding(name, "saturation", Level.ERROR, what, fix))
     for channel in device.channels:
         if channel.unit in STANDING_STILL_UNITS or channel.name.startswith(STANDING_STILL):

@@ -38,7 +38,7 @@ def udev_rules() -> str:
 
 
 def has_rule(identity: str, root: Path = Path("/")) -> bool:
-    """Say whether any installed rule names a USB identity `VID:PID` and keeps ModemManager off.
+    """Whether any installed rule names a USB identity `VID:PID` and keeps ModemManager off.
 
     Args:
         identity: Vendor and product, hexadecimal.

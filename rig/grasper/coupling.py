@@ -59,7 +59,7 @@ class Coupling:
     All methods take and give arrays of shape (..., n), the last axis in the order of the names.
 
     Attributes:
-        name: What it is.
+        name: Name.
         joints: Names of the joints, n of them.
         actuators: Names of the actuators, n of them.
         jacobian: A, joint velocity over actuator velocity, shape (n, n).

@@ -11,7 +11,7 @@ FILTER = LowPass(cutoff_hz=3.0, order=2)
 
 @dataclass(frozen=True, slots=True)
 class CurrentForce:
-    """The paper's equations 12 to 14 with the inertia left out, as the paper leaves it out.
+    """The paper's equations 12 to 14 without inertia, as in the paper.
 
     F = c N K i / l, i low-passed at 3 Hz. The coefficient c is one over the slope of estimate over
     force in long steady grasps (Table 2).

@@ -14,7 +14,7 @@ from rig.grasper.three_dof import JOINTS
 
 READ_S = 0.02
 LEAD_S = 0.05
-"""Setpoints are this far ahead of the motors, s: what a hand feels as delay."""
+"""Setpoints are this far ahead of the motors, s: the delay for the user's hand."""
 SILENT_READS = 50
 
 
@@ -35,8 +35,8 @@ def setpoints(
         master: The master's potentiometers, started.
         chief: What their counts mean.
         here: Where yaw, jaw 1 and jaw 2 stand, closing positive, rad.
-        duration_s: How long to follow, s.
-        scale: Angle of a joint for an angle of the master.
+        duration_s: Time to follow, s.
+        scale: Joint angle per angle of the master.
 
     Yields:
         Angles of yaw, jaw 1 and jaw 2, rad, each of shape (n,).

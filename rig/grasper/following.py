@@ -27,7 +27,7 @@ ZEROS_S = 0.5
 
 @dataclass(slots=True)
 class Followed:
-    """What one motor did.
+    """Motion of one motor.
 
     Attributes:
         axis: `yaw`, `jaw_1` or `jaw_2`.
@@ -68,17 +68,17 @@ def follow_master(
 
     Args:
         config: Of a grasper.
-        url: Where the master is; where the configuration says if none.
-        duration_s: How long.
-        scale: Angle of a joint for an angle of the master.
-        folder: Where the log goes.
+        url: URL of the master; from the configuration if None.
+        duration_s: Duration.
+        scale: Joint angle per angle of the master.
+        folder: Folder of the logs.
         on_time: Told how long it has followed, s.
 
     Returns:
         What yaw, jaw 1 and jaw 2 did, and the log.
 
     Raises:
-        UsageError: The configuration is of another kind of rig, or nobody said where the master is.
+        UsageError: The configuration is of another kind of rig, or the master's URL is missing.
         GrasperError: A potentiometer is at its rail.
         SafetyTripError: A limit was crossed.
         DriverError: A link is lost.

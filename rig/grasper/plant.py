@@ -75,7 +75,7 @@ HIDDEN = (
     "relaxed_ratio",
     "relaxation_s",
 )
-"""Parameters that differ from grasper to grasper and that no estimator is told."""
+"""Parameters that differ from grasper to grasper and are unknown to every estimator."""
 
 
 def vary(axis: AxisParameters, seed: int, spread: float) -> AxisParameters:
@@ -154,7 +154,7 @@ def _run(p: Any, target: Any, kp: float, ki: float, kd: float, limit_a: float) -
 
 
 def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[str, FloatArray]:
-    """Return what one axis measures while its motor follows the master.
+    """Return the measurements of one axis while its motor follows the master.
 
     Args:
         axis: Parameters.
@@ -226,7 +226,7 @@ BALL = _prototype(
     _axis(4.0e-3, 0.05, 0.8, 5e-3, 3.0),
     _axis(1.0e-3, 0.05, 0.8, 15e-3, 3.0),
 )
-"""The first prototype: hardly any friction that grows with the load. Assumed."""
+"""The first prototype: very little load-dependent friction. Assumed."""
 
 JOURNAL = _prototype(
     "journal bearings",

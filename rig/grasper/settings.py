@@ -53,10 +53,10 @@ class MasterSection(Section):
     """The master a grasper follows: potentiometers of yaw, pitch and grasp.
 
     Attributes:
-        url: Where it is, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
+        url: URL, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
         zero_counts: Counts of the converter at each joint's zero.
         rad_per_count: Turn of each joint for a count, negative where it is mounted the other way
-            round; a potentiometer of 300 degrees over 12 bits if not said.
+            round; by default a potentiometer of 300 degrees over 12 bits.
     """
 
     url: str | None = None

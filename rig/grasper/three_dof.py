@@ -64,7 +64,8 @@ def planetary_grasper(
         limits: Limits of yaw, pitch and grasp.
 
     Raises:
-        GrasperError: Pulleys overlap, or a cable leaves its pulley within the limits of the yaw.
+        GrasperError: Pulleys overlap, or a cable loses contact with its pulley within the limits of
+            the yaw.
     """
     path.tangent_angles_rad()
     if limits is not None:

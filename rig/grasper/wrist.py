@@ -1,4 +1,4 @@
-"""The planetary wrist of Zhao & Nelson 2016: when the jaws' cables do not feel the yaw.
+"""The planetary wrist of Zhao & Nelson 2016: the condition for jaw cables decoupled from the yaw.
 
 "Estimating Tool-Tissue Forces Using a 3-Degree-of-Freedom Robotic Surgical Tool", J. Mechanisms
 Robotics 8(5), doi 10.1115/1.4032591. The jaw's cable passes idler pulley 1 (on the sun's axis),
@@ -61,7 +61,7 @@ class CablePath:
         """Return theta1 and theta2 of equations 2 and 3.
 
         Raises:
-            GrasperError: Pulleys overlap, so that there is no such angle.
+            GrasperError: Pulleys overlap, so the angle does not exist.
         """
         if overlaps := self.interference():
             raise GrasperError(
@@ -82,14 +82,14 @@ class CablePath:
             beta_rad: Angle of the line from pulley 2 to 3 relative to that line.
 
         Raises:
-            GrasperError: Pulleys overlap, or the cable would leave a pulley.
+            GrasperError: Pulleys overlap, or the cable would lose contact with a pulley.
         """
         theta1, theta2 = self.tangent_angles_rad()
         wrap1 = math.pi / 2 - theta1 + alpha_rad
         wrap2 = math.pi - theta1 - theta2 - beta_rad
         if wrap1 < 0 or wrap2 < 0:
             raise GrasperError(
-                f"The cable leaves pulley {1 if wrap1 < 0 else 2} at alpha {alpha_rad:.4g}, "
+                f"The cable lifts off pulley {1 if wrap1 < 0 else 2} at alpha {alpha_rad:.4g}, "
                 f"beta {beta_rad:.4g} rad.",
                 "Its angle of wrap is negative there.",
             )
@@ -141,7 +141,7 @@ class Planetary:
 
     @property
     def decoupling_pulley_ratio(self) -> float:
-        """The d2/d1 with which the jaws do not feel the yaw; equation 6."""
+        """The d2/d1 that decouples the jaws from the yaw; equation 6."""
         return self.alpha_over_beta
 
 
@@ -169,7 +169,7 @@ class Design:
 def designs(gear_ratios: tuple[float, ...] = GEAR_RATIOS) -> list[Design]:
     """Return all combinations of Table 1's three steps, 27 for three gear ratios.
 
-    The paper does not say how it measures compactness. Here the smallest gear and the smallest
+    The paper does not define compactness. Here the smallest gear and the smallest
     pulley have diameter 1, gears mesh, pulleys do not touch, and the area is that of the rectangle
     around them. A sun that is not fixed needs a stage that ties it to the carrier; driving the
     planet needs one that reaches its moving axis.

@@ -7,12 +7,12 @@ wrist as it was built:
     contact = k (q - q0) where q is beyond q0, of each joint
     tip = q - contact / cable stiffness
 
-It stands beside `grasper_plant`, which it cannot replace: there the axes are apart, their friction
+It complements `grasper_plant`, which it cannot replace: there the axes are apart, their friction
 has the memory that the paper's force estimates show, and a board is in the loop; here the axes act
-on one another and stiff friction suffices, as kinematics are what is asked. One plant of both would
-need the hidden friction chosen anew (decision 41), and every table with it.
+on one another and stiff friction suffices, since only kinematics are studied. One plant of both
+would need another choice of the hidden friction (decision 41), and every table with it.
 
-The controller knows the wrist as it was designed. Where the two differ, as with a wrong pulley
+The controller uses the designed geometry of the wrist. Where the two differ, as with a wrong pulley
 ratio (equation 5 of Zhao and Nelson 2016), turning one joint moves another.
 """
 
@@ -52,7 +52,7 @@ class Wrist:
 
     @property
     def designed(self) -> Coupling:
-        """What the controller and the declared model know."""
+        """The geometry of the controller and the declared model."""
         return planetary_grasper(DESIGN)
 
     @property

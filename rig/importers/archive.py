@@ -19,7 +19,7 @@ _DAMAGE = (tarfile.TarError, EOFError, LZMAError, zlib.error, OSError)
 
 
 def is_archive(path: Path) -> bool:
-    """Say whether a file's name is that of a tar archive."""
+    """Whether a file's name is that of a tar archive."""
     return path.is_file() and path.name.lower().endswith(SUFFIXES)
 
 
@@ -93,7 +93,7 @@ def _extract(path: Path, archive: tarfile.TarFile, folder: Path) -> None:
             continue
         if member.size > shutil.disk_usage(folder).free:
             raise DataError(
-                f"There is no room to unpack {path} in {folder.parent}.",
+                f"Not enough disk space to unpack {path} in {folder.parent}.",
                 fix="Free some space or set TMPDIR to a larger disk.",
             )
         content = archive.extractfile(member)

@@ -1,6 +1,6 @@
 """Compare a channel with the channel of the same recording that is its derivative.
 
-A wrong sample rate, a scale, a sign or a column that was shifted leaves every number of a file
+With a wrong sample rate, scale, sign or a shifted column every number of a file is
 plausible. Where a file holds both an angle and its velocity, the two expose it: over a span 2h the
 displacement over time must be the mean of the velocity,
 
@@ -36,7 +36,7 @@ LARGEST_LAG_SAMPLES = 4
 LARGEST_LEAD_SAMPLES = 2
 """Bounds of the lag; on the measured arm it is one sample of 5 ms."""
 SHIFT_GAIN = 2.0
-"""A shift must halve the unexplained variance: a slow motion hardly shows where it begins."""
+"""A shift must halve the unexplained variance: the start of a slow motion is poorly visible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ def pairs(recording: Recording) -> Iterator[tuple[str, str]]:
 
 
 def _stem(name: str) -> tuple[str, str]:
-    """Return what a channel belongs to, and its unit: `joint_1`, `rad` of `joint_1_angle_rad`."""
+    """Return the part and the unit of a channel: `joint_1`, `rad` of `joint_1_angle_rad`."""
     try:
         unit = unit_of(name)
     except UnknownUnitError:

@@ -50,7 +50,7 @@ class PsmImporter:
     description = "dVRK arm motion: 21 columns without a header, .csv or .csv.xz"
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path is, or holds, text of 21 numeric columns without a header."""
+        """Whether the path is, or holds, text of 21 numeric columns without a header."""
         return any(_first_line_fits(file) for file in _files(path)[:1])
 
     def open(self, path: Path) -> Campaign:

@@ -2,7 +2,7 @@
 
 A cable that slips on its pulley, or a re-index, moves the zero of the jaw's encoder; every later
 run is off by the step. A single run does not show it. Runs under the same conditions do, since they
-should leave the jaw at the same mean angle:
+should have the same mean angle of the jaw:
 
     mean angle of run k = level of its conditions + zero of its segment.
 

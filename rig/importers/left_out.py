@@ -14,7 +14,7 @@ MAX_NAMES = 8
 
 
 def left_out(path: Path, campaign: Campaign) -> list[str]:
-    """Return what an open campaign leaves out, a line a reason; empty if all is in it.
+    """Return the exclusions of an open campaign, one line per reason; empty if there are none.
 
     Files that no importer recognises as recordings (notes, pictures) are not listed.
 

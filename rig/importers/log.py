@@ -32,14 +32,14 @@ class LogImporter:
     description: str = "logs of this rig (MCAP): a file or a folder of them"
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path is a log or a folder with at least one."""
+        """Whether the path is a log or a folder with at least one."""
         return any(looks_like_log(item) for item in _logs(path))
 
     def open(self, path: Path) -> Campaign:
         """Open logs as a campaign; samples are read when a run is.
 
         Raises:
-            DataError: There is no log, or one of them is damaged beyond its unfinished end.
+            DataError: No log was found, or one of them is damaged beyond its unfinished end.
         """
         paths = _logs(path)
         if not paths:
@@ -67,7 +67,7 @@ def _sound(log: LogFile) -> LogFile:
     """Return the head of a log, or refuse one that is damaged beyond its unfinished end."""
     if log.run is None:
         raise DataError(
-            f"{log.path} does not say which run it holds.",
+            f"{log.path} does not name its run.",
             "The record of the run is missing: the file is damaged, or not written by rig.",
             f"Run `rig log check {log.path}`.",
         )

@@ -9,8 +9,8 @@ hold one or the other. In a run,
 - text is a condition, except `notes`, which becomes the notes.
 
 Anything else is refused, with the list of what was found. Closing motion and torque are positive,
-and units are SI: the file's author sees to that, or a sidecar `<file>.mat.toml` does, which maps
-other names and then alone decides what is imported (`variable` may be `struct.field`):
+and units are SI: the file follows these rules, or a sidecar `<file>.mat.toml` maps other names
+and then alone decides what is imported (`variable` may be `struct.field`):
 
     sample_rate_hz = 1000               # where there is no time variable
     [channels.spindle_angle_rad]
@@ -61,9 +61,9 @@ class MatlabImporter:
     )
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path is a `.mat` file, or a folder of nothing but these and sidecars.
+        """Whether the path is a `.mat` file, or a folder of nothing but these and sidecars.
 
-        A folder that holds other files beside is not claimed: name the format to import it.
+        A folder with other files is not recognised: name the format to import it.
         """
         if path.is_dir():
             names = [entry.name.lower() for entry in path.iterdir()]
@@ -77,8 +77,8 @@ class MatlabImporter:
         Each file is read and checked once here to find its runs, and again when a run is loaded.
 
         Raises:
-            DataError: A file is damaged, of version 7.3, or holds names that are no channels; lists
-                what was found and what was expected.
+            DataError: A file is damaged, of version 7.3, or contains names that are not channels.
+                The message lists the found and the expected names.
         """
         files = _files(path)
         if not files:
@@ -129,7 +129,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def _contents(path: Path) -> dict[str, Content]:
-    """Return what each run of a file holds, by the name of its struct; "" is the file itself."""
+    """Return the variables of each run of a file, by the name of its struct; "" is the file."""
     variables = _variables(path)
     sidecar = read_sidecar(path)
     if sidecar is not None:
@@ -197,7 +197,7 @@ def _mapped(path: Path, variables: Values, sidecar: Sidecar) -> Content:
             value = value.get(key) if isinstance(value, dict) else None
         if not isinstance(value, np.ndarray) or value.ndim != 1:
             raise DataError(
-                f"{path}: {channel.variable!r}, which the sidecar maps to {name}, is no numeric "
+                f"{path}: {channel.variable!r}, which the sidecar maps to {name}, is not a numeric "
                 "vector of this file.",
                 f"Found: {_listing(variables)}.",
                 f"Correct `variable` in {sidecar_path(path).name}.",

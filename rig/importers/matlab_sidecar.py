@@ -22,7 +22,7 @@ TIME = "time_s"
 
 
 def carries_unit(name: str) -> bool:
-    """Say whether a name ends in a unit, as a channel's must."""
+    """Whether a name ends in a unit, as a channel's must."""
     try:
         unit_of(name)
     except UnknownUnitError:
@@ -71,7 +71,7 @@ def read_sidecar(path: Path) -> Sidecar | None:
     """Read the sidecar of a MATLAB file, None where there is none.
 
     Raises:
-        DataError: It is no TOML or its keys are wrong; names key and problem.
+        DataError: It is not valid TOML or its keys are wrong; names key and problem.
     """
     file = sidecar_path(path)
     if not file.is_file():
@@ -79,7 +79,7 @@ def read_sidecar(path: Path) -> Sidecar | None:
     try:
         return Sidecar.model_validate(tomllib.loads(file.read_text("utf-8")))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"{file} is no TOML: {error}.") from error
+        raise DataError(f"{file} is not valid TOML: {error}.") from error
     except ValidationError as error:
         known = [*Sidecar.model_fields, *Mapped.model_fields]
         raise DataError(

@@ -26,7 +26,7 @@ class MrdlabImporter:
     description = "MRDLab grasper rig, 1 kHz text: a .TXT log, a folder of them, or a tar archive"
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path is or holds an MRDLab log, from names and first lines only."""
+        """Whether the path is or holds an MRDLab log, from names and first lines only."""
         if path.is_dir():
             return any(looks_like_log(_first_bytes(file)) for file in _texts(path))
         if is_archive(path):
@@ -37,10 +37,10 @@ class MrdlabImporter:
         """Open a log, a folder or an archive as a campaign, in file order.
 
         Runs are named by file stem, `folder/stem` where the logs lie in more than one folder.
-        A read-me beside the logs becomes part of the notes.
+        A read-me in the folder of the logs becomes part of the notes.
 
         Raises:
-            DataError: There is no log, or the archive is damaged. Reading a run raises DataError
+            DataError: No log was found, or the archive is damaged. Reading a run raises DataError
                 where its file is damaged, naming file, line and what was expected.
         """
         if path.is_dir():
@@ -67,7 +67,7 @@ def _campaign(path: Path, root: Path, logs: list[Path]) -> Campaign:
     runs = []
     for log in logs:
         name = f"{log.parent.name}/{log.stem}" if several else log.stem
-        # inside an archive, the archive is the file a person knows
+        # inside an archive, name the archive, which is the user's file
         source = f"{path}:{log.relative_to(root).as_posix()}" if inside else str(log)
         runs.append(
             Run(
@@ -83,7 +83,8 @@ def _logs(root: Path) -> list[Path]:
     """Return the logs under a folder in file order.
 
     A log starts with `%`. A file named by digits alone is meant to be one, so it is listed even
-    when it does not, and reading it says what is wrong; other text (read-me, serial log) is no run.
+    when it does not, and reading it reports the fault; other text (read-me, serial log) is not a
+    run.
     """
     return [file for file in _texts(root) if file.stem.isdigit() or _first_bytes(file)[:1] == b"%"]
 

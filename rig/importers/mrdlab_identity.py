@@ -1,4 +1,4 @@
-"""What names and header lines of the MRDLab format say about a run: instrument, wrist, jaw stop.
+"""Properties of a run from names and header lines of MRDLab logs: instrument, wrist, jaw stop.
 
 Header text about the tool can be left over from an earlier session, so the folder's name wins: a
 lot is believed only where the header's tool number agrees with the folder's.
@@ -33,8 +33,8 @@ class Identity:
 
     Attributes:
         instrument: Identity of the instrument.
-        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where they are stated.
-        remarks: What a reader should know about how the identity was found, one sentence each.
+        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where available.
+        remarks: How the identity was found, one sentence each.
     """
 
     instrument: Instrument

@@ -128,7 +128,7 @@ def _target(columns: FloatArray, remarks: list[str]) -> FloatArray | None:
     """Return the target in rad, or None; its unit is found by fitting it to the spindle.
 
     Newer logs hold counts, older ones rad, some only zeros. Target and spindle share their zero, so
-    the slope of a fit through the origin tells counts (1) from rad (2 pi / 8192).
+    the slope of a fit through the origin distinguishes counts (1) from rad (2 pi / 8192).
     """
     target = columns[raw.TARGET]
     if not target.any():

@@ -22,7 +22,7 @@ COLUMNS = (
     ("Back-end Maxon", "maxon", 1e9),
     ("Trajectory Target", "target", 1e9),
 )
-"""Name of each column, the word that tells it apart in a header, and its largest credible value."""
+"""Name of each column, the word that identifies it in a header, its largest credible value."""
 TIME, SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, LOAD, COMMAND, MOTOR, TARGET = range(10)
 MIRRORED = [SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, COMMAND, MOTOR, TARGET]
 """Columns whose sign on a right jaw is opposite to that on a left one."""
@@ -48,7 +48,7 @@ class Text:
 
 
 def looks_like_log(first_bytes: bytes) -> bool:
-    """Say whether the first bytes of a file are those of an MRDLab log."""
+    """Whether the first bytes of a file are those of an MRDLab log."""
     return first_bytes[:1] == b"%" and b"Back-end" in first_bytes
 
 
@@ -170,7 +170,7 @@ def _check_range(path: Path, columns: FloatArray, header_lines: int) -> None:
 
 
 def _seconds(path: Path, time: FloatArray, header_lines: int) -> FloatArray:
-    """Return time in seconds: the header says ms, the values step by 0.001; believe the step."""
+    """Return time in seconds: the header has ms, the values step by 0.001; use the step."""
     steps: NDArray[np.float64] = np.diff(time)
     if steps.min() <= 0:
         row = int(np.argmax(steps <= 0)) + 1

@@ -1,7 +1,7 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
-An importer is an object in the entry point group `rig.importers`. It says whether a path looks like
-its format without reading the samples, and opens it as a campaign of run handles. Whatever the
+An importer is an object in the entry point group `rig.importers`. It recognises the format of a
+path without reading the samples, and opens it as a campaign of run handles. Whatever the
 format, a run that is read is checked for channels that contradict their derivatives.
 """
 
@@ -21,7 +21,7 @@ from rig.importers.one_rig import of_one_rig
 
 @runtime_checkable
 class Importer(Protocol):
-    """What a format's importer offers."""
+    """Interface of a format's importer."""
 
     name: str
     """Short name of the format, as typed on the command line."""
@@ -30,7 +30,7 @@ class Importer(Protocol):
     """One line on the format."""
 
     def recognises(self, path: Path) -> bool:
-        """Say whether the path looks like this format, from names and first lines only."""
+        """Whether the path looks like this format, from names and first lines only."""
 
     def open(self, path: Path) -> Campaign:
         """Open a file, folder or archive as a campaign whose runs load when asked.
@@ -45,7 +45,7 @@ def importers() -> dict[str, Importer]:
     """Return every installed importer by name; a third party adds one by entry point.
 
     Raises:
-        UsageError: An entry point does not load, or is no importer; none is skipped silently.
+        UsageError: An entry point does not load, or is not an importer; none is skipped silently.
     """
     return {entry.name: _loaded(entry) for entry in sorted(entry_points(group="rig.importers"))}
 
@@ -62,7 +62,7 @@ def _loaded(entry: EntryPoint) -> Importer:
         ) from error
     if not isinstance(importer, Importer):
         raise UsageError(
-            f"{entry.value} of {package} is no importer.",
+            f"{entry.value} of {package} is not an importer.",
             "Expected an object with name, description, recognises() and open().",
             f"Install {package} again, or remove it.",
         )

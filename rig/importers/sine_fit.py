@@ -58,7 +58,7 @@ def fit_sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
     padded = 8 * t.size
     spectrum = np.abs(np.fft.rfft(y - y.mean(), padded))
     frequency = float(np.argmax(spectrum[1:]) + 1) / (padded * period_s * step)
-    # a step beyond half a spectral line would leave the peak it started from
+    # a step beyond half a spectral line would move to another peak
     limit = 0.5 / float(t[-1] - t[0])
     a, b, c = 0.0, 0.0, float(y.mean())
     residual = y

@@ -1,4 +1,4 @@
-"""What the display consumes: a block of samples and what was known when it arrived."""
+"""Input of the display: a block of samples and the state at its arrival."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ class DeviceStatus:
     Attributes:
         name: Name of the device.
         state: One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ...
-        detail: What a person needs to know beside it; may be empty.
+        detail: Further information for the user; may be empty.
     """
 
     name: str
@@ -36,7 +36,7 @@ class LimitStatus:
     """One watched quantity and how far it may go.
 
     Attributes:
-        name: What is limited.
+        name: Limited quantity.
         value: Its value now; the limit holds in both directions.
         limit: The magnitude that trips the rig, positive.
         unit: Unit of both.
@@ -52,7 +52,7 @@ class LimitStatus:
 class SampleBlock:
     """Consecutive samples, usually 50 ms of them.
 
-    A block without samples says that a whole block's time went by and nothing arrived.
+    A block without samples means that nothing arrived during its time.
 
     Attributes:
         time_s: Device clock, shape (n,), increasing.
@@ -62,8 +62,8 @@ class SampleBlock:
         lost: Samples lost since the start.
         devices: State of each device.
         limits: Watched limits; may be empty.
-        inside: Channel name to whether its estimate is within what its estimator was fitted on,
-            shape (n,) each; a channel whose estimator says nothing of that is not in it.
+        inside: Channel name to whether its estimate is within the fitted range of its
+            estimator, shape (n,) each; channels of estimators without a range are missing.
     """
 
     time_s: FloatArray

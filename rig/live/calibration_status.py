@@ -1,4 +1,4 @@
-"""What the live display says of the calibrations: their age, and values beyond their range."""
+"""Status of the calibrations in the live display: their age, and values beyond their range."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta

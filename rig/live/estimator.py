@@ -26,15 +26,15 @@ class ModelEstimator:
         Args:
             path: Model file, or a state estimator or a network (`.npz`).
             sample_rate_hz: Nominal rate of the device's clock, Hz.
-            balance: Which model of a file of several; the first if not said.
+            balance: Which model of a file of several; by default the first.
 
         Raises:
-            EstimationError: The file is no estimator, the model is not fitted, or it cannot run at
-                this rate.
+            EstimationError: The file is not an estimator, the model is not fitted, or it cannot run
+                at this rate.
         """
         self.model: Model | None = None  # only a physical model has effects to watch
         self.half_width: float | None = None
-        self.instrument = ""  # of a physical model, which says nothing of it
+        self.instrument = ""  # a physical model has none
         self._stream: Stepper
         if path.suffix == ".npz":
             estimator = load(path)
@@ -57,7 +57,7 @@ class ModelEstimator:
     def inside(self) -> NDArray[np.bool_] | None:
         """Which of the last samples lay in the range that the estimator was fitted on, shape (n,).
 
-        None for a physical model, which says nothing of it sample by sample.
+        None for a physical model, which has no validity per sample.
         """
         if isinstance(self._stream, BankStepper | NetworkStepper):
             return self._stream.inside
@@ -86,7 +86,7 @@ class ModelEstimator:
 
 
 def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
-    """Return what a file estimates with, each before its first sample.
+    """Return the estimators of a file, each before its first sample.
 
     Raises:
         EstimationError: As for `ModelEstimator`.
@@ -97,7 +97,7 @@ def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
 
 
 def models_in_use(path: Path) -> list[Model]:
-    """Return what is used of a model file: the models of a grasper's axes, else the first.
+    """Return the models in use of a model file: those of a grasper's axes, else the first.
 
     Raises:
         ModelFileError: The file cannot be read.
@@ -113,6 +113,6 @@ def half_widths_of(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
 
 
 def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:
-    """Return what to show: a grasper's joints, else what is estimated, else what is usual."""
+    """Return the signals to show: a grasper's joints, else the estimates, else the default."""
     targets = tuple(estimator.target_channel for estimator in estimators)
     return JOINTS if set(targets) & set(AXES) else targets or usual

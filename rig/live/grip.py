@@ -1,8 +1,8 @@
-"""Holding a grip torque by the estimate from motor current alone; the sensor only looks on.
+"""Control of a grip torque by the estimate from motor current alone; the sensor is a check.
 
-The load motor plays what is gripped. The jaw moves to and fro a little: at rest friction hides as
-much torque as a grip may have, and in motion the estimate knows it. Once a period the load is moved
-by a share of what the estimate lacks.
+The load motor represents the gripped object. The jaw moves to and fro a little: at standstill
+friction hides as much torque as a grip may have, and in motion the estimate includes it. Once per
+period the load is corrected by a fraction of the control error.
 """
 
 from collections.abc import Iterator
@@ -47,13 +47,13 @@ class Held:
 
 
 class Grip:
-    """The controller: says what to play next, and hears what was read.
+    """The controller: returns the next setpoints and takes the readings.
 
     Args:
-        torque_n_m: What to hold.
+        torque_n_m: Set point.
         centre_rad: Where the spindle moves to and fro.
         most_a: Greatest load it may ask for.
-        duration_s: How long to hold.
+        duration_s: Time to hold.
     """
 
     def __init__(
@@ -103,8 +103,8 @@ def hold_grip(
     Args:
         session: An open session; the rig moves.
         estimator: Estimates the jaw's torque from motor channels; has seen nothing yet.
-        torque_n_m: What to hold, closing positive.
-        duration_s: How long.
+        torque_n_m: Set point, closing positive.
+        duration_s: Duration.
 
     Raises:
         UsageError: The torque is not within the limits, or not what is estimated.

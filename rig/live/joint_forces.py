@@ -35,7 +35,7 @@ def interval_of_joints(half_widths: Mapping[str, float]) -> dict[str, float]:
 
 
 def with_joint_forces(blocks: Iterator[SampleBlock]) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with grasp and pitch force beside the jaws' own.
+    """Yield blocks as they come, each with grasp and pitch force in addition to the jaws'.
 
     Args:
         blocks: The stream. It is closed when this one is.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 TARE, MARK, RECORD, LEAVE = "t", "m", "r", "q"
-HELP = "t tare  m mark  r record  q leaves"
+HELP = "t tare  m mark  r record  q quits"
 
 Keys = Callable[[], str]
 """Gives the keys pressed since it was last asked; empty when there are none."""
@@ -21,8 +21,8 @@ def no_keys() -> str:
 def pressed_keys() -> Iterator[Keys | None]:
     """Yield the keys of the terminal, and give the terminal back on the way out.
 
-    Yields None where stdin is no terminal, or the system has none of this kind: then nothing is
-    read, and Ctrl-C leaves.
+    Yields None where stdin is not a terminal, or the system has none of this kind: then nothing is
+    read, and Ctrl-C quits.
     """
     try:
         import select

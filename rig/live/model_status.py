@@ -1,4 +1,4 @@
-"""What the display says of the models that estimate: their age, and the range of their fit."""
+"""Status of the models in the display: their age, and the range of their fit."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -43,7 +43,7 @@ class ModelStatus:
 
         Args:
             estimates: Estimates of the newest samples by channel.
-            outside: Channels whose estimator says that these lie outside what it was fitted on.
+            outside: Channels whose estimates lie outside the fitted range, by their estimator.
         """
         if outside:
             names = ", ".join(words.name_of(name) for name in outside)
@@ -64,11 +64,11 @@ class ModelStatus:
 def with_model_status(
     blocks: Iterator[SampleBlock], estimators: Sequence[ModelEstimator]
 ) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with what can be said of what estimates.
+    """Yield blocks as they come, each with the status of its estimators.
 
     Args:
         blocks: The stream. It is closed when this one is.
-        estimators: What made its estimates.
+        estimators: The estimators of its estimates.
     """
     status = ModelStatus([e.model for e in estimators if e.model is not None])
     try:
@@ -84,14 +84,14 @@ def with_model_status(
 
 
 def _beyond(channel: str, low: float, high: float) -> str:
-    """Return in words that an estimate leaves the range of its fit."""
+    """Return a message for an estimate outside the range of its fit."""
     unit = unit_of(channel)
     ends = words.digits(Value(low), unit), words.with_unit(Value(high), unit)
     return f"{words.name_of(channel)} beyond its fit, {ends[0]} to {ends[1]}"
 
 
 def _leaves(values: FloatArray, low: float, high: float) -> bool:
-    """Say whether the mean of a block is beyond a range."""
+    """Whether the mean of a block is beyond a range."""
     known = values[np.isfinite(values)]
     return known.size > 0 and not low <= float(known.mean()) <= high
 

@@ -1,4 +1,4 @@
-"""How a person wants a stream shown."""
+"""Options of the display of a stream."""
 
 import math
 from collections.abc import Mapping
@@ -9,16 +9,16 @@ from rig.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class ShowOptions:
-    """How to show a stream.
+    """Options of a display.
 
     Attributes:
-        title: What is shown.
+        title: Title of the display.
         channels: Quantities to watch, the main one first.
         lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
         half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
-        footer: What a person can do.
+        footer: Available keys.
     """
 
     title: str
@@ -27,7 +27,7 @@ class ShowOptions:
     plain: bool = False
     json: bool = False
     half_widths: Mapping[str, float] = field(default_factory=dict)
-    footer: str = "Ctrl-C leaves"
+    footer: str = "Ctrl-C quits"
 
     def __post_init__(self) -> None:
         """Check the lever arm.

@@ -40,8 +40,8 @@ def json_frame(
 ) -> dict[str, Any]:
     """Return a snapshot as plain types, SI units.
 
-    `channels` maps each watched channel to its values; a value that is null has its reason beside
-    it. Traces are left out: the reader has every frame.
+    `channels` maps each watched channel to its values; a value that is null has its reason next
+    to it. Traces are left out: the reader has every frame.
     """
     return {
         "kind": "frame",

@@ -1,4 +1,4 @@
-"""A recording as the stream of blocks it once was, with any estimate beside it."""
+"""A recording as a stream of blocks, with any estimate."""
 
 import itertools
 import time
@@ -23,7 +23,7 @@ class EstimateStream(Protocol):
         """The channel it estimates."""
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
-        """Return the estimate of the next samples, shape (n,), and keep the state they leave."""
+        """Return the estimate of the next samples, shape (n,), and keep the final state."""
 
 
 def replay_blocks(

@@ -1,4 +1,4 @@
-"""Show a stream of blocks until it ends or a person leaves."""
+"""Show a stream of blocks until it ends or the user quits."""
 
 import math
 import time
@@ -28,7 +28,7 @@ def show(
     Args:
         blocks: The stream. A generator is closed on the way out, before anything else is done.
         options: How to show it.
-        console: Where people read.
+        console: Console of the user.
         clock: Monotonic time, s; only for silence and for frames that cost too much.
     """
     state = LiveState(options.channels)

@@ -38,9 +38,9 @@ def session_blocks(
         config: The rig's configuration.
         open_transport: Opens the way to the logger.
         plans: Runs to play one after the other; without any, the rig is only watched.
-        estimators: Streams that have seen nothing yet; none for none.
+        estimators: Streams before their first sample; empty for none.
         keys: Keys pressed; see `rig.live.keys`.
-        folder: Where recordings go that a key starts.
+        folder: Folder of the recordings started by a key.
     """
     with Session(config, open_transport()) as session:
         session.take_zeros(ZERO_S)
@@ -59,7 +59,7 @@ def session_blocks(
 
 
 class _Hand:
-    """What keys do to a session: tare, mark, record, leave."""
+    """Actions of the keys in a session: tare, mark, record, quit."""
 
     def __init__(self, session: Session, keys: Keys, folder: Path) -> None:
         self._session = session
@@ -84,7 +84,7 @@ class _Hand:
         self._recorder.write(reading)
 
     def status(self) -> tuple[DeviceStatus, ...]:
-        """Return what a person should see of it."""
+        """Return the message for the user."""
         said = ", ".join(part for part in (self._recorder.said, self._said) if part)
         if not said:
             return ()

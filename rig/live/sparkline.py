@@ -16,7 +16,7 @@ def sparkline(
     """Draw the range of a signal in each stretch of time.
 
     Args:
-        low: Least value in each stretch, shape (n,), oldest first; NaN leaves a gap.
+        low: Least value in each segment, shape (n,), oldest first; NaN makes a gap.
         high: Greatest value, shape (n,).
         width: Characters across.
         height: Lines down.

@@ -1,4 +1,4 @@
-"""What the display knows: accumulates blocks, and gives one picture of them when asked.
+"""State of the display: accumulates blocks, and returns one picture of them on request.
 
 No input or output and no clock but the device's, so every number here is tested without a terminal.
 """
@@ -22,7 +22,7 @@ RATE_S = 2.0
 ERROR_S = 5.0
 TRACE_S = 10.0
 SILENT_BLOCKS = 2
-"""From so many blocks without samples in a row on, the last value is no longer that of now."""
+"""After this many consecutive blocks without samples, the last value is out of date."""
 
 FLAGS = tuple(flag for flag in Flag if flag)
 RECEIVED, ROWS, FIRST_FLAG = 0, 1, 2
@@ -45,7 +45,7 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One quantity: what the estimator says and what the sensor says.
+    """One quantity: estimate and sensor reading.
 
     Attributes:
         channel: Name of the channel.
@@ -96,7 +96,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a whole stream came to.
+    """Summary of a whole stream.
 
     Attributes:
         ended: `finished` when the stream ended, `interrupted` when a person left.
@@ -107,7 +107,7 @@ class Summary:
         channel: The main quantity.
         error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
         error_samples: Samples in that number: those not flagged and with both values.
-        inside_rms: The same where the estimator says it is within what it was fitted on, or None.
+        inside_rms: The same within the fitted range of the estimator, or None.
         inside_samples: Samples in that number.
     """
 
@@ -178,7 +178,7 @@ class LiveState:
             self._inside_samples += int(np.isfinite(squared[inside]).sum())
 
     def _signals(self, block: SampleBlock) -> FloatArray:
-        """Return what the window keeps of a block, shape (signals, n), NaN where nothing is."""
+        """Return the values of a block for the window, shape (signals, n), NaN where missing."""
         nan = np.full(len(block), np.nan)
         valid = block.flags == 0
         received = (block.flags & Flag.MISSING) == 0
@@ -205,7 +205,7 @@ class LiveState:
         )
 
     def summary(self, ended: str) -> Summary:
-        """Return what everything since the start came to; `ended` says how it ended."""
+        """Return the summary since the start; `ended` is the reason of the end."""
         n, known = self._error_samples, self._inside_samples
         return Summary(
             ended=ended,

@@ -36,21 +36,21 @@ STATES = {
     "suspect": ("▲", "warning"),
     "fault": ("✖", "bad"),
 }
-"""State of a device to its symbol and style, so that no state is told by colour alone."""
+"""State of a device to its symbol and style, so that no state is shown by colour alone."""
 
 
 def in_shown_unit(unit: str) -> tuple[float, str, int]:
-    """Return the factor from SI, the unit's name and the decimals people see."""
+    """Return the factor from SI, the unit's name and the decimals of the display."""
     return SHOWN.get(unit, (1.0, unit, 3))
 
 
 def name_of(channel: str) -> str:
-    """Return what people call a channel."""
+    """Return the common name of a channel."""
     return NAMES.get(channel) or describe(channel).description.capitalize()
 
 
 def digits(value: Value, unit: str) -> str | None:
-    """Return the number alone in the unit people see, or None when there is none."""
+    """Return the number alone in the display's unit, or None when there is none."""
     if value.number is None:
         return None
     factor, _, decimals = in_shown_unit(unit)
@@ -67,7 +67,7 @@ def with_unit(value: Value, unit: str) -> str:
 
 
 def main_value(reading: Reading) -> tuple[str, Value]:
-    """Return what the display shows first: the estimate, or the sensor when nothing estimates."""
+    """Return the main value of the display: the estimate, or the sensor without an estimate."""
     if reading.has_estimator:
         return "estimate", reading.estimate
     return "sensor", reading.sensor
@@ -133,7 +133,7 @@ def limit_words(limit: LimitStatus) -> str:
 
 
 def summary_lines(summary: Summary, unit: str) -> list[str]:
-    """Return what a whole stream came to, in lines."""
+    """Return the summary of a whole stream, in lines."""
     how = {"finished": "Finished", "interrupted": "Stopped"}.get(summary.ended, "Ended")
     lines = [
         f"{how} after {summary.duration_s:.1f} s: {summary.samples} samples, "

@@ -1,4 +1,4 @@
-"""The display as a person sees it: lines of text made from one snapshot, for any terminal size."""
+"""The text of the display: lines made from one snapshot, for any terminal size."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ from rig.live.digits import big
 from rig.live.sparkline import round_scale, sparkline
 from rig.live.state import TRACE_S, Reading, Snapshot, Value
 
-# The palette of Okabe and Ito (2008), told apart by every kind of colour vision; each style is
-# also told apart by a word or a symbol.
+# The palette of Okabe and Ito (2008), distinguishable by every kind of colour vision; each
+# style also has a word or a symbol.
 STYLES = {
     "title": "bold",
     "quiet": "dim",
@@ -26,10 +26,10 @@ STYLES = {
 }
 
 WIDE = 64
-"""From this many columns on, the numbers stand beside the digits and not under them."""
+"""From this many columns on, the numbers are next to the digits and not below them."""
 
 LEAST_TRACES = 5
-"""Lines that limits leave to the traces."""
+"""Lines reserved for the traces."""
 
 MARGIN = 18
 """Columns left of a trace, for its name and the edges of its scale."""
@@ -40,17 +40,17 @@ class View:
     """A snapshot as rich renders it. Fits the width; the traces take what height is left.
 
     Attributes:
-        snapshot: What to show.
-        title: What is being shown: a session's or a recording's name.
+        snapshot: Content of the display.
+        title: Title: a session's or a recording's name.
         lever_m: Lever arm from the jaw's axis to its tip, m.
-        footer: What a person can do.
+        footer: Available keys.
         half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
     """
 
     snapshot: Snapshot
     title: str
     lever_m: float
-    footer: str = "Ctrl-C leaves"
+    footer: str = "Ctrl-C quits"
     half_widths: Mapping[str, float] = field(default_factory=dict)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -199,7 +199,7 @@ def _limits(limits: Sequence[LimitStatus], width: int, room: int) -> Iterator[Te
 
 
 def _urgency(share: float | None) -> float:
-    """Return a rank: a limit whose share nobody knows comes first."""
+    """Return a rank: a limit with an unknown share comes first."""
     return np.inf if share is None else share
 
 

@@ -19,7 +19,7 @@ PIECE_SPREAD = 0.25
 
 
 def watched(blocks: Iterator[SampleBlock], model: Model) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with what the residual watch says of the model.
+    """Yield blocks as they come, each with the result of the residual monitor.
 
     Args:
         blocks: The stream. It is closed when this one is.
@@ -31,7 +31,7 @@ def watched(blocks: Iterator[SampleBlock], model: Model) -> Iterator[SampleBlock
     try:
         for block in blocks:
             if held and len(block) and block.time_s[0] <= held[-1].time_s[-1]:
-                held = []  # the device's clock began anew
+                held = []  # the device's clock restarted
             if len(block):
                 held.append(block)
             if held and held[-1].time_s[-1] - held[0].time_s[0] >= PIECE_S:
@@ -64,7 +64,7 @@ def _state(sight: Sight) -> str:
 
 
 def told(model: Model, sight: Sight) -> str:
-    """Return what a sight says, in words."""
+    """Return the text of a result of the monitor."""
     if sight.usual is None:
         return f"{model.name}: learning its usual error"
     ratio = f"error {sight.rmse / sight.usual:.2f} times that of its fit"

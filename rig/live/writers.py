@@ -118,7 +118,7 @@ class DisplayWriter:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Hold the lower part of the terminal; leave the newest frame on it."""
+        """Hold the lower part of the terminal; keep the newest frame on it at the end."""
         with self._live:
             yield
             if self._skipped is not None:

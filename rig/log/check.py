@@ -23,7 +23,7 @@ PLAN_TOLERANCE = 1e-3
 
 
 class Verdict(Enum):
-    """What a check found."""
+    """Result of a check."""
 
     COMPLETE = "complete"
     INCOMPLETE = "incomplete"  # what is there is sound, but samples are missing or out of order
@@ -43,7 +43,7 @@ class Gap:
     Attributes:
         first_sequence: Sequence number of the first missing sample.
         last_sequence: Sequence number of the last missing sample.
-        samples: How many are missing.
+        samples: Number of missing samples.
         start_s: Time of the last sample before the gap, s, in the stream's own time.
         length_s: Time from that sample to the first one after the gap, s.
     """
@@ -57,7 +57,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class TopicReport:
-    """What a check found in one stream.
+    """Result of a check of one stream.
 
     Attributes:
         topic: Its topic.
@@ -65,7 +65,7 @@ class TopicReport:
         expected: Samples that should be there: the largest of the three below and of `received`.
         expected_by_sequence: From the first sequence number to the last; None without them.
         expected_by_plan: From the planned duration and rate; None without a plan.
-        expected_by_recorder: What the recorder had counted at the end; None if it did not say.
+        expected_by_recorder: What the recorder had counted at the end; None if not recorded.
         gaps: Missing stretches.
         repeats: Samples whose sequence number does not come after the one before.
         time_steps_back: Samples whose time does not come after the one before.
@@ -98,14 +98,14 @@ class TopicReport:
 
 @dataclass(frozen=True)
 class LogReport:
-    """What a check found.
+    """Result of a check.
 
     Attributes:
         path: The log.
         run: Name of the run; None when that is lost.
         verdict: Whether the log is complete, incomplete or damaged.
         closed: Whether the recorder closed the log.
-        problems: What is wrong, in words; empty when the log is complete.
+        problems: Faults in words; empty when the log is complete.
         topics: Findings by stream.
         damage: Damaged places of the file.
         unchecked_chunks: Chunks that carry no checksum.
@@ -221,7 +221,7 @@ def stream_time_s(topic: Topic) -> NDArray[np.float64]:
 
 
 def not_finite(topic: Topic) -> NDArray[np.bool_]:
-    """Say which messages hold a value that is not finite, shape (n,)."""
+    """Return which messages hold a value that is not finite, shape (n,)."""
     bad = np.zeros(len(topic), bool)
     for field in topic.stream.fields:
         if field.dtype.startswith("float"):

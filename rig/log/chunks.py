@@ -1,8 +1,8 @@
 """Unpacking chunks into arrays.
 
 A chunk of one stream of fixed-size messages is, unpacked, an array of records, and is read as one.
-The message index behind a chunk says which chunks are such; that is checked against every record. A
-chunk in which other records stand between (another writer's), or a damaged one, is walked record by
+The message index behind a chunk identifies such chunks; that is checked against every record. A
+chunk in which other records stand between (another writer's), or a damaged one, is read record by
 record. Chunks are independent, so they are unpacked on several threads.
 """
 
@@ -33,7 +33,7 @@ _MESSAGE = struct.Struct("<BQH")
 
 @dataclass(frozen=True)
 class Layout:
-    """What a message record of one channel looks like."""
+    """Layout of a message record of one channel."""
 
     topic: str
     stream: Stream
@@ -93,7 +93,7 @@ class _Batch:
 
 @dataclass
 class _Read:
-    """What came of a batch."""
+    """Result of a batch."""
 
     pieces: list[tuple[int, _Target]] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)
@@ -180,7 +180,7 @@ def _plan(
 
 
 def _owner(chunk: ChunkRef, layouts: dict[int, Layout]) -> int | None:
-    """Return the one channel a chunk's index says it holds, if the sizes bear that out."""
+    """Return the one channel in a chunk's index, if the sizes confirm it."""
     if chunk.torn or len(chunk.indexed) != 1:
         return None
     ((channel, count),) = chunk.indexed.items()
@@ -208,7 +208,7 @@ def _read_batch(
         try:
             _read_array(buffer, batch.chunks, batch.channel, layouts[batch.channel], batch.target)
         except (DataError, zstandard.ZstdError):
-            pass  # one of the chunks is not what its index says: take them one at a time
+            pass  # one of the chunks does not match its index: take them one at a time
         else:
             return _Read([(batch.channel, batch.target)])
     return _read_singly(buffer, batch.chunks, layouts, wanted)
@@ -290,7 +290,7 @@ def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDec
 def _walk(
     data: bytes, layouts: dict[int, Layout], wanted: set[int]
 ) -> tuple[list[tuple[int, _Target]], str | None]:
-    """Read a chunk record by record; stop, and say why, where that is not possible."""
+    """Read a chunk record by record; stop with the reason where that is not possible."""
     places: dict[int, list[int]] = defaultdict(list)
     position, problem = 0, None
     while position < len(data):

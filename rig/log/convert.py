@@ -42,7 +42,7 @@ def log_times_ns(time_s: FloatArray, started_at_ns: int | None) -> NDArray[np.ui
 
 
 def run_info(recording: Recording) -> RunInfo:
-    """Return what a recording knows about its run."""
+    """Return the metadata of a recording about its run."""
     return RunInfo(
         name=recording.name,
         rig=recording.rig,
@@ -90,7 +90,7 @@ def write_recording(path: Path, recording: Recording) -> Path:
 def recording_from_log(log: LogFile) -> Recording:
     """Return the samples of a log as a recording.
 
-    A run that did not end as planned says so in its notes. One whose log was not closed, or is
+    A run that did not end as planned has a remark in its notes. One whose log was not closed, or is
     damaged, is excluded from evidence, with the reason.
 
     Args:
@@ -111,7 +111,7 @@ def recording_from_log(log: LogFile) -> Recording:
     topic = log.topics[SAMPLE]
     if (topic.rows["flags"] > np.iinfo(np.uint8).max).any():
         raise DataError(
-            f"{log.path} holds flags this version does not know.",
+            f"{log.path} has flags that are unknown to this version.",
             "They must not be dropped: a flagged sample would pass for a valid one.",
             "Read the log with the version of rig that wrote it.",
         )

@@ -104,7 +104,7 @@ def _targets(
 
 
 def _write_atomically(write: Callable[[Path, Topic], None], target: Path, topic: Topic) -> None:
-    """Write a file beside its target and rename it when it is whole."""
+    """Write a file in its target's folder and rename it when it is complete."""
     partial = target.with_name(f".{target.name}.{os.getpid()}{PART_SUFFIX}")
     try:
         write(partial, topic)

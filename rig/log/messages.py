@@ -13,7 +13,7 @@ Rows = NDArray[np.void] | Mapping[str, ArrayLike]
 
 
 class UnflaggedSampleError(DataError):
-    """A sample is not finite and no flag says why."""
+    """A sample is not finite and has no flag."""
 
 
 def packed_rows(stream: Stream, rows: Rows) -> NDArray[np.void]:
@@ -64,7 +64,7 @@ def _refuse_out_of_range(stream: Stream, name: str, column: NDArray[np.generic])
 
 
 def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
-    """Refuse a message with a value that is not finite and no flag that says why."""
+    """Refuse a message with a value that is not finite and has no flag."""
     names = [field.name for field in stream.fields]
     bad = np.zeros(payload.size, bool)
     for field in stream.fields:
@@ -77,7 +77,7 @@ def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
         wrong = [name for name in names if not np.isfinite(payload[name][row])]
         raise UnflaggedSampleError(
             f"{', '.join(wrong)} of {stream.topic} is not finite in row {row} of {payload.size},"
-            " and no flag says why.",
+            " and has no flag.",
             "A value that is not a number must never pass for a measurement.",
             "Set the row's flags (saturated, stale, missing or suspect).",
         )

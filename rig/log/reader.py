@@ -28,7 +28,7 @@ from rig.log.schema import CHECKSUM_KEY, LayoutError, Stream
 
 
 class DamagedLogError(DataError):
-    """The log is damaged; what is left of it can be repaired."""
+    """The log is damaged; the readable part can be recovered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Topic:
     """The messages of one stream.
 
     Attributes:
-        stream: What they look like.
+        stream: Their layout.
         rows: Their fields, structured array of the stream's dtype, shape (n,), in file order.
         log_time_ns: When each was taken, ns, uint64, shape (n,).
     """
@@ -59,17 +59,17 @@ class LogFile:
     """A log that was read.
 
     Attributes:
-        path: Where it was read from.
+        path: File it was read from.
         library: Program that wrote it.
-        run: What was known at the start, or None when that record is missing.
-        end: What was known at the end, or None when the log was not closed.
+        run: Metadata of the start, or None when that record is missing.
+        end: Metadata of the end, or None when the log was not closed.
         marks: Operator's marks.
         stretches: Flagged stretches.
         topics: Topic name to messages; streams without messages are there too.
         attachments: Files carried in the log.
         metadata: Metadata records of other names.
         unread: Topics whose messages are not of fixed size, and were not read.
-        damage: What is damaged; empty unless the log was read tolerantly.
+        damage: Damaged parts; empty unless the log was read tolerantly.
         unchecked_chunks: Chunks that carry no checksum.
         salvaged: Topic to the number of messages from the torn end of the file, which no checksum
             vouches for.
@@ -105,7 +105,7 @@ def read_log(
             unpacked.
         tolerant: Read what is readable and list the damage, instead of raising.
         checksums: Check the file's overall checksum as well as each chunk's. That reads the whole
-            file; leave it out to look at metadata only.
+            file; omit it to read metadata only.
 
     Raises:
         DamagedLogError: The log is damaged, and `tolerant` is False.
@@ -151,7 +151,7 @@ def read_log(
 
 
 def damaged(log: LogFile) -> DamagedLogError:
-    """Return the error that says how a log is damaged."""
+    """Return the error that describes the damage of a log."""
     first = log.damage[0]
     more = f" and {len(log.damage) - 1} more" if len(log.damage) > 1 else ""
     return DamagedLogError(

@@ -18,7 +18,7 @@ def carried_calibrations(log: LogFile) -> CalibrationSet:
 
     Raises:
         UsageError: It carries none.
-        CalibrationError: What it carries is no set.
+        CalibrationError: What it carries is not a set.
     """
     for item in log.attachments:
         if item.name == ATTACHMENT:

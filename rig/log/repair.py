@@ -21,7 +21,7 @@ class RepairError(DataError):
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What a repair did.
+    """Result of a repair.
 
     Attributes:
         original: The damaged log, unchanged.
@@ -30,7 +30,7 @@ class RepairReport:
         recovered: Topic to the samples recovered.
         lost: Topic to the samples known to be lost, from sequence numbers, plan and recorder.
         salvaged: Topic to those of the recovered samples that no checksum vouches for.
-        problems: What was wrong with the original, in words.
+        problems: Faults of the original, in words.
     """
 
     original: Path
@@ -42,13 +42,13 @@ class RepairReport:
 
 
 def repaired_path(path: Path) -> Path:
-    """Return where the repair of a log goes: `NAME.repaired.mcap` beside it."""
+    """Return the path of the repaired log: `NAME.repaired.mcap` in the same folder."""
     name = path.name.removesuffix(PART_SUFFIX).removesuffix(".mcap")
     return path.with_name(f"{name}.repaired.mcap")
 
 
 def repaired_from(log: LogFile) -> Path | None:
-    """Return the log that a repaired one was made from, beside it; None if it is no repair."""
+    """Return the original of a repaired log in the same folder; None if it is not a repair."""
     originals = [data["original"] for name, data in log.metadata if name == REPAIR_RECORD]
     return log.path.with_name(originals[-1]) if originals else None
 
@@ -76,8 +76,8 @@ def repair_log(path: Path, out: Path | None = None) -> RepairReport:
         return result
     if not log.topics or (log.unread and not written_by_rig(log)):
         raise RepairError(
-            f"{path} holds nothing that can be repaired.",
-            f"Its topics are: {', '.join(log.unread) or 'none'}; a repair knows messages of fixed"
+            f"{path} contains nothing that can be repaired.",
+            f"Its topics are: {', '.join(log.unread) or 'none'}; repair supports messages of fixed"
             f" size as {LIBRARY} writes them.",
         )
     target = out or repaired_path(path)
@@ -116,7 +116,7 @@ def _write(log: LogFile, report: LogReport, target: Path) -> None:
 
 
 def _verify(log: LogFile, target: Path) -> None:
-    """Read the new log and hold it against what was recovered."""
+    """Read the new log and compare it with the recovered data."""
     again = read_log(target)
     for name, topic in log.topics.items():
         copy = again.topics[name]

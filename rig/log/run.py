@@ -1,4 +1,4 @@
-"""What is known about a run before and after it is recorded, and how it is kept in a log.
+"""Metadata of a run before and after recording, and their form in a log.
 
 Both are MCAP metadata records: one text per field, each of them JSON, and a checksum, since MCAP
 has none there and a flipped bit in a condition would go unnoticed. `rig.run` is written first, so
@@ -25,19 +25,19 @@ STRETCH_RECORD = "rig.stretch"
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What is known when a recording starts.
+    """Metadata at the start of a recording.
 
     Attributes:
         name: Name of the run, unique in its campaign.
         rig: Name of the rig.
         instrument: Identity of the instrument.
-        conditions: What is held constant, SI numbers with the unit in the name, or words.
+        conditions: Constant conditions, SI numbers with the unit in the name, or words.
         notes: Operator's notes.
         started_at_ns: Start of the run, ns since the Unix epoch, or None when not known.
         duration_s: Planned duration, s, or None when open-ended.
         calibrations: Calibration name to content hash.
         zeros_before: Sensor zeros taken before the run, name with unit to value.
-        source: Where the data came from, when it was not recorded here.
+        source: Source of the data, when it was not recorded here.
         excluded: Why the run is left out of evidence, or None.
         details: Anything else that JSON can hold, such as the protocol and software versions.
     """
@@ -58,16 +58,16 @@ class RunInfo:
 
 @dataclass(frozen=True)
 class RunEnd:
-    """What is known when a recording ends.
+    """Metadata at the end of a recording.
 
     Attributes:
         clean: Whether the run went as planned to its end.
         reason: Why it did not, in words; empty when it did.
         expected_samples: Topic to the number of samples the recorder should have received.
-        counters: What the link counted, such as `crc_errors` and `lost_frames`.
+        counters: Counters of the link, such as `crc_errors` and `lost_frames`.
         zeros_after: Sensor zeros taken after the run, name with unit to value.
         drift: Zero after minus zero before, name with unit to value.
-        drift_verdict: What the drift means, in words; empty when not judged.
+        drift_verdict: Verdict on the drift, in words; empty when not judged.
         excluded: Why the run is left out of evidence, when that was found at its end.
         details: Anything else that JSON can hold.
     """
@@ -114,7 +114,7 @@ def _checksum(metadata: Mapping[str, str]) -> str:
 
 
 def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
-    """Return the record that `to_metadata` wrote; fields it does not know are ignored.
+    """Return the record that `to_metadata` wrote; unknown fields are ignored.
 
     Raises:
         DataError: The record does not match its checksum, or a value is of the wrong kind.

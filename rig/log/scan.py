@@ -55,7 +55,7 @@ _READERS: dict[Opcode, Any] = {
 
 
 class NotALogError(DataError):
-    """The file is no MCAP file at all."""
+    """The file is not an MCAP file at all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Damage:
     Attributes:
         offset: Byte it starts at.
         length: Bytes affected; 0 where something is missing.
-        what: What is wrong there.
+        what: The fault there.
     """
 
     offset: int
@@ -132,7 +132,7 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
         checksums: Check the CRC of the data section, which reads the whole file.
 
     Raises:
-        NotALogError: There is no MCAP record in it.
+        NotALogError: It contains no MCAP record.
     """
     skeleton = Skeleton()
     position = 8

@@ -1,4 +1,4 @@
-"""What one stream of a log looks like: fields of fixed size, as ROS 2 text and as a NumPy dtype.
+"""Layout of one stream of a log: fields of fixed size, as ROS 2 text and as a NumPy dtype.
 
 A message whose fields all have a fixed size is, in ROS 2's CDR encoding, a header of four bytes and
 then the fields one after the other. With the fields ordered large to small no padding is needed
@@ -60,7 +60,7 @@ class Field:
         name: Name, ending in its unit where it has one: lower case letters, digits, single `_`.
         dtype: ROS 2 type, a key of `NUMPY_TYPES`.
         unit: SI unit symbol; "1" for a ratio, "" for counts and identifiers.
-        description: What it is, one line.
+        description: Description in one line.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Stream:
     def __post_init__(self) -> None:
         if not _TYPE.fullmatch(self.message_type):
             raise LayoutError(
-                f"{self.message_type!r} is no ROS 2 message type.",
+                f"{self.message_type!r} is not a ROS 2 message type.",
                 fix="Name it like `rig_msgs/msg/Sample`.",
             )
         names = [field.name for field in self.fields]

@@ -1,8 +1,8 @@
 """Writing a log so that a killed recorder loses at most a quarter of a second.
 
 While it is recorded a log is called `NAME.mcap.part`; a clean close renames it to `NAME.mcap`. So a
-file called `.mcap` is always whole, and a recorder that was killed leaves a `.part` that a person
-finds, `rig log check` explains and `rig log repair` makes whole. Recording to a temporary folder
+file called `.mcap` is always whole, and the `.part` file of a killed recorder can be examined by
+`rig log check` and recovered by `rig log repair`. Recording to a temporary folder
 would lose the file from sight, and recording to the final name would let a torn file pass for a
 whole one.
 
@@ -65,8 +65,8 @@ class LogWriter:
     `discard` do it by hand.
 
     Args:
-        path: Where the log shall be, ending in `.mcap`.
-        run: What is known about the run; written at once.
+        path: Path of the log, ending in `.mcap`.
+        run: Metadata of the run; written immediately.
         streams: Streams of the log.
         attachments: Files to carry, such as the configuration and the calibrations.
         clock: Monotonic clock, s.
@@ -143,7 +143,7 @@ class LogWriter:
     def write(self, topic: str, rows: Rows, log_time_ns: ArrayLike) -> None:
         """Take a block of messages; it is in the operating system within `MAX_LOSS_S`.
 
-        A message that holds a value that is not finite must say why in its field `flags`.
+        A message with a value that is not finite must have the reason in its field `flags`.
 
         Args:
             topic: Topic of a stream of this log.
@@ -177,7 +177,7 @@ class LogWriter:
         self.poll()
 
     def poll(self) -> bool:
-        """Flush if the oldest message has waited long enough, and say whether it did.
+        """Flush if the oldest message has waited long enough; return whether it did.
 
         A recorder's loop calls this at least every 50 ms, also while no samples arrive.
         """
@@ -230,7 +230,7 @@ class LogWriter:
         """Write what is known at the end, finish the file, and give it its name.
 
         Args:
-            end: What is known at the end; a clean end when None.
+            end: Metadata of the end; a clean end when None.
 
         Returns:
             Path of the log.
@@ -258,12 +258,12 @@ class LogWriter:
     def _abandon(self) -> None:
         """Close the file as it stands."""
         self._closed = True
-        with suppress(OSError):  # what led here says more than a buffer that cannot be flushed
+        with suppress(OSError):  # the first error is more useful than that of flushing
             self._file.close()
 
     @contextmanager
     def _giving_to_system(self) -> Iterator[None]:
-        """Turn a refusal of the operating system into ours, and leave the file as it stands."""
+        """Convert an error of the operating system to ours; the file is not changed."""
         try:
             yield
         except OSError as error:
@@ -282,7 +282,7 @@ class LogWriter:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Wait until the disk knows the new name."""
+    """Wait until the new name is on the disk."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,1 +1,1 @@
-"""What a session moves, what is read of it, and within which limits."""
+"""The machine of a session, its readings and its limits."""

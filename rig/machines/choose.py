@@ -14,7 +14,7 @@ SIMULATED_BOARDS = "rig.simulated_boards"
 
 
 def machine_of(config: Config) -> Machine:
-    """Return what a session on this configuration moves.
+    """Return the machine of a session with this configuration.
 
     Raises:
         UsageError: No machine is installed for the profile of its logger.
@@ -24,10 +24,10 @@ def machine_of(config: Config) -> Machine:
 
 
 def installed(group: str, profile: str) -> Any:
-    """Return what is installed in an entry point group for a profile.
+    """Return the object in an entry point group for a profile.
 
     Raises:
-        UsageError: Nothing is, or it cannot be loaded.
+        UsageError: None is installed, or it cannot be loaded.
     """
     found = entry_points(group=group, name=profile)
     if not found:

@@ -1,4 +1,4 @@
-"""What a session has to know of what it moves, the same for every kind of rig."""
+"""The interface of a machine to a session, the same for every kind of rig."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -25,7 +25,7 @@ class MachinePlan(Protocol):
 
     @property
     def conditions(self) -> dict[str, float | str]:
-        """What is held constant in the run."""
+        """The constant conditions of the run."""
 
     @property
     def samples(self) -> int:
@@ -56,7 +56,7 @@ class Machine(Protocol):
     """One kind of rig.
 
     Attributes:
-        profile: What its board samples and moves.
+        profile: Samples and motors of its board.
         counts: Stream of its raw counts in a log.
         setpoint_channels: Channel whose calibration makes counts of each field of a setpoint.
         channels_of_inputs: Channel of each input of the board.
@@ -75,7 +75,7 @@ class Machine(Protocol):
     def shown(self) -> tuple[str, ...]: ...  # noqa: D102
 
     def first_look(self, config: Config) -> str:
-        """Return the shipped protocol of a first look at this rig."""
+        """Return the shipped protocol for a quick check of this rig."""
         ...
 
     def gains(self, config: Config) -> Sequence[Any]:

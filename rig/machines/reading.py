@@ -1,4 +1,4 @@
-"""What a session reads: a stretch of samples, as counts and in SI units."""
+"""Readings of a session: a segment of samples, as counts and in SI units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -101,7 +101,7 @@ def with_setpoints(reading: Reading, played: int, planned: int, before: int | No
     """Number the setpoints played, and flag samples that should have had one and had none.
 
     The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
-    are taken to have played theirs: the sequence numbers say how many there were.
+    are taken to have played theirs: the sequence numbers give their count.
 
     Args:
         reading: Samples read while playing.

@@ -1,4 +1,4 @@
-"""The limits of the rig: what is refused, what trips, and what the board is told to hold itself."""
+"""The limits of the rig: refused setpoints, trips, and limits checked by the board itself."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class InCounts:
         return (-TOP - 1 if at[0] is None else at[0], TOP if at[1] is None else at[1])
 
     def heat(self, channel: str, heat_a2_s: float) -> int:
-        """Return a heat in counts^2 s; 0 is no limit."""
+        """Return a heat in counts^2 s; 0 is not a limit."""
         line = self.calibrations.channels[channel]
         return min(TOP, round(heat_a2_s / line.slope**2)) if heat_a2_s else TOP
 

@@ -62,7 +62,7 @@ def open_source(estimator: Estimator) -> Adaptable:
         return estimator
     raise UsageError(
         "This model cannot be adapted.",
-        "State estimators and networks can; a physical model is as soon fitted anew.",
+        "State estimators and networks can; a physical model is fitted again instead.",
         "Fit one: rig fit PATH --model states --out FILE.npz.",
     )
 
@@ -104,7 +104,7 @@ def run_adaptation(
     unused = [run for run in found if run not in chosen]
     if not unused or any(run not in found for run in chosen):
         raise UsageError(
-            "There is no run left to report on, or a chosen one has no closing sample.",
+            "No run remains to report on, or a chosen one has no closing samples.",
             f"Usable are: {', '.join(found) or 'none'}.",
         )
     new = adapted(source, [found[run] for run in chosen])

@@ -1,6 +1,6 @@
-"""What the command line writes: results on stdout, progress, remarks and errors on stderr.
+"""Output of the command line: results on stdout, progress, remarks and errors on stderr.
 
-With `--json` stdout carries JSON alone, and what a result says to people goes to stderr.
+With `--json` stdout carries JSON alone, and results for people go to stderr.
 """
 
 import json
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig.output.table import TextTable
 
 PIPE_WIDTH = 240
-"""Columns of a table where nobody's window limits it."""
+"""Columns of a table without a window to limit it."""
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
@@ -51,9 +51,9 @@ def _console(stderr: bool) -> "Console":
 
 
 def progress() -> "Progress":
-    """Return a progress bar on stderr, silent where that is no terminal.
+    """Return a progress bar on stderr, silent where that is not a terminal.
 
-    What is said while it runs goes through its `console`, which prints above it.
+    Messages during its run go through its `console`, which prints above it.
     """
     from rich.progress import (
         BarColumn,
@@ -84,7 +84,7 @@ def show_result(
     """Show a result to people, and write it where they asked for a file.
 
     Args:
-        lines: What is said first, a line each.
+        lines: Lines printed first.
         tables: Shown below.
         out: File for the Markdown, or None for none.
         markdown: Returns the file's text.

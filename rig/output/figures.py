@@ -90,9 +90,9 @@ def over_time(
 
     Args:
         time_s: Shape (n,), s.
-        series: Name to values, each of shape (n,); NaN leaves a gap.
+        series: Name to values, each of shape (n,); NaN makes a gap.
         unit: Unit of the values.
-        caption: What is seen, also for readers who do not see it.
+        caption: Description of the figure, also for readers who cannot see it.
         shaded: Samples to shade, shape (n,), or None.
     """
     figure, (ax,) = _axes(7.2, 2.6)
@@ -140,7 +140,7 @@ def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24)
     Args:
         panels: The panels, side by side, on one scale.
         y_label: Name and unit of the values.
-        caption: What is seen.
+        caption: Description of the figure.
         bins: Bins over the middle 98 % of each variable; bins with under ten samples are left out.
     """
     figure, axes = _axes(7.2, 2.5, len(panels))
@@ -189,7 +189,7 @@ def bars(
     Args:
         values: Name to value.
         unit: Name and unit of the values.
-        caption: What is seen.
+        caption: Description of the figure.
         line: Name and height of a level to compare with, or None.
     """
     figure, (ax,) = _axes(7.2, 2.2)
@@ -216,7 +216,7 @@ def paired_bars(
         values: Name to the two values.
         sides: What the first and the second of them are.
         unit: Name and unit of the values.
-        caption: What is seen.
+        caption: Description of the figure.
     """
     figure, (ax,) = _axes(7.2, 2.2)
     with mpl.rc_context(_STYLE):
@@ -241,7 +241,7 @@ def scattered(
         series: Name to x and y, each of shape (n,).
         x_label: Name and unit of x.
         y_label: Name and unit of y.
-        caption: What is seen.
+        caption: Description of the figure.
     """
     figure, (ax,) = _axes(7.2, 2.6)
     with mpl.rc_context(_STYLE):
@@ -261,7 +261,7 @@ def write_svgs(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
     """Write figures as files of their own, in a colour that reads on light and dark pages.
 
     Args:
-        folder: Where to.
+        folder: Folder of the output.
         drawn: Name of the file to figure.
 
     Raises:

@@ -12,7 +12,7 @@ import rig
 
 @dataclass(frozen=True)
 class Provenance:
-    """What is needed to make a result again.
+    """Data needed to reproduce a result.
 
     Attributes:
         date: Day and time, UTC, ISO 8601 to the minute.

@@ -16,7 +16,7 @@ class TextTable:
         title: Heading.
         columns: Column headings; the first column is text, the others are numbers.
         rows: Cells, one sequence a row.
-        note: What to know about it; may be empty.
+        note: Remark below the table; may be empty.
     """
 
     title: str

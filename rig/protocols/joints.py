@@ -31,7 +31,7 @@ class JointPlan:
     Attributes:
         name: Name of the run, unique in its protocol.
         joint_rad: Yaw, pitch and grasp at 2 kHz, shape (n, 3).
-        conditions: What is held constant in the run.
+        conditions: Constant conditions of the run.
     """
 
     name: str

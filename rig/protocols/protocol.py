@@ -36,7 +36,7 @@ class RunPlan:
         name: Name of the run, unique in its protocol.
         target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
         load_command_a: Load motor current at 1 kHz, shape (n,).
-        conditions: What is held constant in the run.
+        conditions: Constant conditions of the run.
     """
 
     name: str
@@ -233,7 +233,7 @@ class Protocol(BaseModel):
 
     Attributes:
         name: Name of the protocol.
-        description: What it is for.
+        description: Purpose.
         runs: Tables that expand into runs.
     """
 
@@ -309,7 +309,7 @@ def load_protocol(name_or_path: str) -> Protocol:
     """Read a protocol file, or a shipped protocol by its name.
 
     Raises:
-        UsageError: There is no such file, or it is not a protocol; names the key that is wrong.
+        UsageError: The file is missing or not a protocol; the message names the wrong key.
     """
     path = Path(name_or_path)
     if not path.exists() and path.suffix == "":

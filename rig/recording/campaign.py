@@ -48,7 +48,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What became of one run.
+    """Outcome of one run.
 
     Attributes:
         name: Name of the run.
@@ -73,7 +73,7 @@ class RunResult:
 
     @property
     def remark(self) -> str:
-        """What a person should know about the run; empty when it is as planned."""
+        """Message about the run; empty when it went as planned."""
         remarks = []
         if not self.complete:
             remarks.append(f"{self.samples} of {self.expected} samples, {self.lost} lost")
@@ -180,8 +180,8 @@ def record_campaign(
     Args:
         session: An open session.
         plans: The runs.
-        folder: Where the logs go.
-        notes: Operator's notes, kept in every log.
+        folder: Folder of the logs.
+        notes: Operator's notes, stored in every log.
         on_progress: Told of the samples as they come.
     """
     for _ in session.rest(REST_S):
@@ -334,7 +334,7 @@ def _log_path(folder: Path, plan: MachinePlan) -> Path:
 
 
 def _is_recorded(path: Path) -> bool:
-    """Say whether a run went to its end; one that was aborted is made again."""
+    """Whether a run was completed; an aborted run is repeated."""
     if not path.exists():
         return False
     end = read_log(path, topics=(), tolerant=True, checksums=False).end
@@ -363,7 +363,7 @@ def _epoch_ns(session: Session, folder: Path) -> int:
 
 
 def _end_ns(path: Path) -> int:
-    """Return when a recorded run ended, ns since the Unix epoch; 0 when its log does not say."""
+    """Return when a recorded run ended, ns since the Unix epoch; 0 when it is not in the log."""
     run = read_log(path, topics=(), checksums=False).run
     if run is None or run.started_at_ns is None or run.duration_s is None:
         return 0

@@ -20,7 +20,7 @@ class LiveRecorder:
 
     Args:
         session: The session.
-        folder: Where logs go.
+        folder: Folder of the logs.
         kind: What is recorded; a log is named after it.
     """
 
@@ -49,7 +49,7 @@ class LiveRecorder:
 
     @property
     def said(self) -> str:
-        """What a person should know of it; empty before the first recording."""
+        """Message for the user; empty before the first recording."""
         if self._path is None:
             return ""
         words = f"{self._path.name}, {self._samples} samples, {self._marks} marks"

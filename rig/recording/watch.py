@@ -1,4 +1,4 @@
-"""The residual watch of a recording session: every finished run is held against fitted models."""
+"""The residual monitor of a session: every finished run is compared with fitted models."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class RunWatch:
     """Watches the runs of a campaign as they are finished.
 
     Attributes:
-        watches: Each model's watch, and what each run said of it, in order.
+        watches: Each model's monitor, and the result of each run, in order.
     """
 
     watches: list[tuple[ResidualWatch, list[Sight]]]

@@ -12,7 +12,7 @@ WHERE = ("frequency_hz", "load_command_a", "wrist_roll_rad", "wrist_pitch_rad", 
 
 
 def lines(found: Comparison) -> list[str]:
-    """Return what a person should know first."""
+    """Return the result in a sentence."""
     a, b = found.sides
     wins = sum(run.rmse[0] < run.rmse[1] for run in found.runs)
     said = [f"{a.file} has the smaller error in {wins} of {len(found.runs)} runs."]

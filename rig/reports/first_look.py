@@ -1,4 +1,4 @@
-"""A first look at a campaign: a declared model's fit, and the largest structure it leaves."""
+"""Screening of a campaign: a declared model's fit, and the largest structure of its residual."""
 
 from collections.abc import Sequence
 
@@ -14,10 +14,10 @@ from rig.output.render import render
 from rig.output.table import TextTable
 
 LIMITS = (
-    "Screening only: maps of one variable at a time, fitted on the other runs, each run's mean"
-    " or the mean of all removed. Variables that move together share what they explain. A share"
-    " says that something depends on the variable, or on one that moves with it; it names no effect"
-    " and proves none."
+    "Screening only: smooth functions of one variable at a time, fitted on the other runs, each"
+    " run's mean or the mean of all removed. Variables that move together share what they explain."
+    " A share means that something depends on the variable, or on one that moves with it; it"
+    " identifies no effect."
 )
 
 
@@ -34,14 +34,14 @@ def first_look(
         model: A fitted model.
         campaign: The runs it was fitted on.
         structures: From `estimation.residual.largest_structure`, largest first.
-        story: What was run, in a sentence or two.
+        story: Description of the run, in a sentence or two.
         provenance: When and from what this was made.
     """
     parts = residuals(model, campaign)
     return render(
         "first_look.html",
         {
-            "title": f"First look: {model.name} model",
+            "title": f"Screening: {model.name} model",
             "lead": structures[0].sentence(),
             "story": story,
             "figures": _figures(model, campaign, structures, parts),

@@ -17,7 +17,8 @@ What the simulation does not model:
 - the load unit's own dynamics: its torque follows its current with a lag, and the torque sensor at
   the jaw does not ring (59 Hz after a load step on the reference rig);
 - tissue and objects between the jaws other than stiff stops;
-- dynamics of the sensors: each channel is what its sensor sees at the sampling instant, plus noise,
-  offset, drift, quantum and limit. The force-sensing resistor is linear: no creep, no hysteresis;
+- dynamics of the sensors: each channel is the quantity at its sensor at the sampling instant, plus
+  noise, offset, drift, quantum and limit. The force-sensing resistor is linear: no creep, no
+  hysteresis;
 - jitter of the 1 kHz interrupt: ticks are exactly 1 ms apart.
 """

@@ -42,7 +42,7 @@ class BenchInputError(UsageError):
 def _fingerprint() -> str:
     """Return a hash of every source the compiled loops are made of.
 
-    Numba's cache looks only at the file a function is written in. The loops hold this hash as a
+    Numba's cache checks only the file of a function. The loops hold this hash as a
     closure variable, which is part of the cache's key, so a change in any of the files recompiles.
     It is the only closure variable: a function held that way would change the key in each process.
     """

@@ -25,7 +25,7 @@ def simulate_reference_campaign(seed: int = 0, protocol: str = "reference") -> C
         protocol: Protocol file or the name of a shipped one.
 
     Raises:
-        UsageError: There is no such protocol.
+        UsageError: The protocol does not exist.
     """
     plans = load_protocol(protocol).plans()
     return Campaign(tuple(Run(p.name, partial(_simulate, p, seed, i)) for i, p in enumerate(plans)))

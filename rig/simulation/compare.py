@@ -100,7 +100,7 @@ def simulate_like(
 
 
 def compare(recording: Recording) -> list[Row]:
-    """Return the levels of a measured run beside those of its simulation.
+    """Return the levels of a measured run and of its simulation.
 
     Raises:
         DataError: The run has no trajectory to follow.

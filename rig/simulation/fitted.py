@@ -1,4 +1,4 @@
-"""Parameters of the simulated rig that fitted models and a recording tell: plant, load, sensors."""
+"""Parameters of the simulated rig from fitted models and a recording: plant, load, sensors."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -19,27 +19,27 @@ DECLARED_PLANT = PlantParameters(
     motor_creep_speed_rad_s=2.0,
     spindle_creep_speed_rad_s=0.15,
 )
-"""A rig of which the declared balances say everything.
+"""A rig that the declared equations describe completely.
 
-The default plant, as measured, holds three things they do not: cable friction in proportion to the
-load; losses of the jaw in front of the sensor, which the cable's stretch feels and the torque
-sensor at the jaw does not; and friction that sticks, which at a reversal holds any torque until the
+The default plant, as measured, has three effects that they lack: cable friction in proportion to
+the load; losses of the jaw in front of the sensor, which load the cable's stretch and not the
+torque sensor at the jaw; and friction that sticks, which at a reversal holds any torque until the
 gear is wound up. Here all of it is plain friction of the spindle that changes sign smoothly.
 """
 
 NOISE_ABOVE_HZ = 150.0
-"""White noise is read off above this frequency, where the rig itself hardly moves."""
+"""White noise is measured above this frequency, where the rig barely moves."""
 
 
 def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -> PlantParameters:
-    """Return the plant of which the fitted models are the balances.
+    """Return the plant that corresponds to the fitted models.
 
-    What no model tells keeps its value. Losses of the cable's balance all go to the spindle.
+    Other parameters keep their values. All losses of the cable's equation are at the spindle.
 
     Args:
-        models: Fitted models of balances `motor`, `gearbox`, `cable` and `stretch`; any of them
-            may be missing, others are left aside.
-        start: Plant whose values are kept where no model tells them.
+        models: Fitted models of the equations `motor`, `gearbox`, `cable` and `stretch`; any of
+            them may be missing, others are ignored.
+        start: Plant with the values of all other parameters.
 
     Raises:
         NotFittedError: A parameter has no value.
@@ -61,7 +61,7 @@ def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -
 def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:
     """Read proximal torque = K i - J a - b w - F sgn w, per motor speed, torque at the spindle.
 
-    The sensor carries the drive unit, so of the rotor's inertia it sees ratio - 1 times.
+    The sensor carries the drive unit, so the rotor's inertia acts on it ratio - 1 times.
     """
     ratio = plant.gear_ratio
     return replace(
@@ -103,8 +103,8 @@ def _with_stretch(model: Model, plant: PlantParameters) -> PlantParameters:
 def _with_cable(model: Model, plant: PlantParameters) -> PlantParameters:
     """Read proximal torque = ratio x distal torque + viscous + Coulomb + inertia.
 
-    Its ratio of torques is left aside: a plant has one ratio, that of the angles, and a loss that
-    makes the torques' differ is no part of the declared model.
+    Its ratio of torques is ignored: a plant has one ratio, that of the angles, and a loss that
+    makes the torques' differ is not part of the declared model.
     """
     ratio, changed = plant.cable_ratio, plant
     viscous = _term(model, "friction.viscous")
@@ -141,7 +141,7 @@ def _positive(model: Model, effect: str, name: str) -> float:
     if not value > 0.0:
         raise DataError(
             f"The {model.balance} model {model.name!r} makes no plant: {effect} {name} is {value}.",
-            "The simulated twin needs it, and needs it positive.",
+            "The simulated null needs a positive value.",
             "Fit the declared model on these runs first.",
         )
     return value
@@ -150,7 +150,7 @@ def _positive(model: Model, effect: str, name: str) -> float:
 def _slope(model: Model, words: Sequence[str], side: int = 1) -> float | None:
     """Return the amplitude of the term with one input, one whose name holds one of the words.
 
-    It is positive on its side of the balance.
+    It is positive on its side of the equation.
     """
     for term in model.terms:
         names = list(term.channels.values())
@@ -220,7 +220,7 @@ def _direction(run: Recording) -> FloatArray:
 
 
 def quantum(values: FloatArray) -> float | None:
-    """Return the step a converter's values come in, or None when there are no two values."""
+    """Return the resolution of a converter, or None with fewer than two different values."""
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps > 1e-9]
     return float(gaps.min()) if gaps.size else None
@@ -242,8 +242,8 @@ def sensors_of(
 
     Args:
         runs: Measured runs.
-        silent: Channel to the noise a twin without sensor noise shows, which is its quantum's and
-            the controller's; it is taken out of the recordings' before it is given to the sensor.
+        silent: Channel to the noise of a simulation without sensor noise, from quantisation and
+            the controller; it is subtracted from the recordings' noise to get that of the sensor.
         start: Sensors whose other values are kept.
     """
 

@@ -2,10 +2,10 @@
 
 Each effect is a compiled function (`hidden_drive`, `hidden_cable`, `hidden_sensors`) of the plant's
 own quantities and one row of a table, kept here: a strength and up to two numbers that shape it.
-Strength 0 leaves the plant exactly as it is, bit for bit: the effect is not evaluated. Strength 1
-is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are a
-quarter to three quarters of the variance that a linear balance leaves in motor current; effects of
-cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
+Strength 0 does not change the plant at all: the effect is not evaluated. Strength 1
+is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are
+a quarter to three quarters of the residual variance of a linear equation of motor current; effects
+of cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
 
 The forms are these modules' own and are deliberately not those an estimator would try first
 (rational functions in place of exponentials, side bands, contact damping), so that finding an
@@ -27,6 +27,55 @@ STRENGTH, FIRST, SECOND = range(3)
 
 Row = Sequence[float]
 """One row of the table; the compiled code passes a row of the array."""
+
+(
+    MOTOR_RIPPLE,
+    GEAR_LOAD_FRICTION,
+    GEAR_STRIBECK,
+    GEAR_BACKLASH,
+    GEAR_ECCENTRICITY,
+    TORQUE_CONSTANT_SAG,
+    CURRENT_SENSOR_BEND,
+    CABLE_POSITION_FRICTION,
+    CABLE_PRESLIDING,
+    CABLE_CREEP,
+    JAW_SPRING,
+    END_STOP_SPRING,
+    MOTOR_ASYMMETRY,
+    MOTOR_DRAG,
+    CURRENT_RIPPLE,
+    WINDING_HEAT,
+    TORQUE_LAG,
+    GEAR_STIFFENING,
+    GEAR_TWO_STATE,
+    GEAR_ANGLE_VISCOUS,
+    CABLE_GROWING_FRICTION,
+    CABLE_LOAD_NOTCH,
+    FRICTION_STEP,
+    CABLE_HYSTERESIS,
+    SPINDLE_RIPPLE,
+    ECCENTRIC_PULLEY,
+    JAW_MASS,
+    JAW_DETENT,
+    PROXIMAL_BEND,
+    PROXIMAL_CREEP,
+    PROXIMAL_LAG,
+    DISTAL_DRIFT,
+    DISTAL_CROSSTALK,
+    JAW_DELAY,
+    JAW_ENCODER_WAVE,
+    MOTOR_VISCOUS_ASYMMETRY,
+    GEAR_LOAD_VISCOUS,
+    GREASE_WARMUP,
+    GEAR_WEAR,
+    CABLE_STIFF,
+    CABLE_DWELL,
+    CABLE_CAPSTAN,
+    WRIST_CAPSTAN,
+    WRIST_PULL,
+    WRIST_PINCH,
+    JAW_WEIGHT,
+) = range(len(KINDS))
 
 NAMES: tuple[str, ...] = tuple(kind.name for kind in KINDS)
 
@@ -74,7 +123,7 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
     for effect in effects:
         if effect.name not in NAMES:
             raise UnknownHiddenEffectError(
-                f"There is no hidden effect {effect.name!r}.", f"Known: {', '.join(NAMES)}."
+                f"Unknown hidden effect {effect.name!r}.", f"Known: {', '.join(NAMES)}."
             )
         place = NAMES.index(effect.name)
         shapes = KINDS[place].shapes
@@ -96,7 +145,7 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
 
 
 def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
-    """Return what a person asked to hide: effect to strength.
+    """Return the hidden effects requested by the user: effect to strength.
 
     Args:
         words: `effect` or `effect=strength`; `none` alone for nothing; one drawn by seed when there
@@ -104,7 +153,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
         seed: Seed of the draw.
 
     Raises:
-        UnknownHiddenEffectError: A name is unknown or a strength is no number.
+        UnknownHiddenEffectError: A name is unknown or a strength is not a number.
     """
     if not words:
         drawn = draw(seed)
@@ -118,7 +167,7 @@ def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
             found[name] = float(strength or 1.0)
         except ValueError as error:
             raise UnknownHiddenEffectError(
-                f"{strength!r} is no strength.", "Write for example motor_ripple=0.5."
+                f"{strength!r} is not a strength.", "Write for example motor_ripple=0.5."
             ) from error
     table(HiddenEffect(name, strength) for name, strength in found.items())
     return found

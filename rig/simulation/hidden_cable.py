@@ -55,7 +55,7 @@ def spindle_friction_n_m(
     age_s: float,
     wrist_angle: float,
 ) -> float:
-    """Return what the hidden effects add to the Coulomb level at the spindle.
+    """Return the contribution of the hidden effects to the Coulomb level at the spindle.
 
     Args:
         effects: From `hidden.table`.
@@ -123,7 +123,7 @@ def cable_presliding_rate(row: Row, bristle: float, spindle_speed: float) -> flo
 
 @numba.njit()
 def cable_presliding_n_m(row: Row, bristle: float) -> float:
-    """Torque of the bent bristle on the spindle: F u, F = 12 mN m at strength 1."""
+    """Torque of the deflected bristle on the spindle: F u, F = 12 mN m at strength 1."""
     return row[STRENGTH] * 12e-3 * bristle
 
 
@@ -217,7 +217,7 @@ def eccentric_pulley_slope(row: Row, spindle_angle_rad: float) -> float:
 
 @numba.njit()
 def jaw_mass_kg_m2(row: Row) -> float:
-    """Inertia that moves with the jaw beside its own: 0.12 g m^2 at strength 1."""
+    """Additional inertia of the jaw: 0.12 g m^2 at strength 1."""
     return row[STRENGTH] * 1.2e-4
 
 

@@ -50,7 +50,7 @@ def motor_friction_n_m(
     state: float,
     clock_s: float,
 ) -> float:
-    """Return what the hidden effects add to the Coulomb level at the motor shaft.
+    """Return the contribution of the hidden effects to the Coulomb level at the motor shaft.
 
     Args:
         effects: From `hidden.table`.

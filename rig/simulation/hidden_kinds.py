@@ -33,7 +33,7 @@ class Kind:
 
     Attributes:
         name: Name in the configuration.
-        description: What it is and what shapes it.
+        description: Description and shape parameters.
         shapes: Up to two numbers of its row.
         weakest: Smallest strength `draw` gives.
         strongest: Largest strength `draw` gives.
@@ -54,7 +54,7 @@ _PHASE = Shape("phase_rad", 0.0, 2.0 * math.pi)
 KINDS: tuple[Kind, ...] = (
     Kind(
         "motor_ripple",
-        "torque ripple of the motor, k periods a turn, amplitude modulated once a turn",
+        "torque ripple of the motor, k periods per turn, amplitude modulated once per turn",
         (Shape("periods_per_turn", 2.0, 6.0, whole=True), _PHASE),
     ),
     Kind(
@@ -74,7 +74,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "gear_eccentricity",
-        "wave in the gear's position along the spindle angle, with a second harmonic",
+        "periodic error of the gear's position along the spindle angle, with a second harmonic",
         (Shape("periods_per_turn", 12.0, 20.0, whole=True), _PHASE),
     ),
     Kind(
@@ -175,7 +175,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "spindle_ripple",
-        "torque ripple along the spindle angle, k periods a turn, with a second harmonic",
+        "torque ripple along the spindle angle, k periods per turn, with a second harmonic",
         (Shape("periods_per_turn", 12.0, 30.0), _PHASE),
     ),
     Kind(
@@ -267,7 +267,7 @@ KINDS: tuple[Kind, ...] = (
     ),
     Kind(
         "wrist_capstan",
-        "cable that the bent wrist wraps on its guide",
+        "cable wrapped over its guide by the wrist's angle",
         (Shape("friction", 0.7, 1.0),),
         alone=False,
     ),
@@ -290,52 +290,3 @@ KINDS: tuple[Kind, ...] = (
     ),
 )
 """Every kind of hidden effect; the place in this tuple is the row of the table."""
-
-(
-    MOTOR_RIPPLE,
-    GEAR_LOAD_FRICTION,
-    GEAR_STRIBECK,
-    GEAR_BACKLASH,
-    GEAR_ECCENTRICITY,
-    TORQUE_CONSTANT_SAG,
-    CURRENT_SENSOR_BEND,
-    CABLE_POSITION_FRICTION,
-    CABLE_PRESLIDING,
-    CABLE_CREEP,
-    JAW_SPRING,
-    END_STOP_SPRING,
-    MOTOR_ASYMMETRY,
-    MOTOR_DRAG,
-    CURRENT_RIPPLE,
-    WINDING_HEAT,
-    TORQUE_LAG,
-    GEAR_STIFFENING,
-    GEAR_TWO_STATE,
-    GEAR_ANGLE_VISCOUS,
-    CABLE_GROWING_FRICTION,
-    CABLE_LOAD_NOTCH,
-    FRICTION_STEP,
-    CABLE_HYSTERESIS,
-    SPINDLE_RIPPLE,
-    ECCENTRIC_PULLEY,
-    JAW_MASS,
-    JAW_DETENT,
-    PROXIMAL_BEND,
-    PROXIMAL_CREEP,
-    PROXIMAL_LAG,
-    DISTAL_DRIFT,
-    DISTAL_CROSSTALK,
-    JAW_DELAY,
-    JAW_ENCODER_WAVE,
-    MOTOR_VISCOUS_ASYMMETRY,
-    GEAR_LOAD_VISCOUS,
-    GREASE_WARMUP,
-    GEAR_WEAR,
-    CABLE_STIFF,
-    CABLE_DWELL,
-    CABLE_CAPSTAN,
-    WRIST_CAPSTAN,
-    WRIST_PULL,
-    WRIST_PINCH,
-    JAW_WEIGHT,
-) = range(len(KINDS))

@@ -37,7 +37,7 @@ def open_simulated_logger(
         UsageError: No simulated board is installed for the profile.
     """
     board, tick_s = installed(SIMULATED_BOARDS, profile)(simulation)
-    # nobody watches a rig that is faster than real time, so it may move in larger steps
+    # a rig faster than real time is not displayed, so it may advance in larger steps
     usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
     step_s = min(step_s or usual_s, 0.8 * watchdog_s)
     return SimulatedTransport(board, url, step_s=step_s, pace=pace, tick_s=tick_s)
@@ -72,5 +72,5 @@ def plant_and_sensors(
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:
-    """Say whether the compiled firmware core is in the loop, rather than the Python fake."""
+    """Whether the compiled firmware core is in the loop, rather than the Python fake."""
     return simulation.firmware and firmware_library() is not None

@@ -18,7 +18,7 @@ import numpy as np
 
 
 def _fixed(value: float) -> Any:
-    """Return a field that `vary` leaves alone: geometry, scales, limits known by construction."""
+    """Return a field that `vary` does not change: geometry, scales, known limits."""
     return field(default=value, metadata={"varies": False})
 
 
@@ -49,9 +49,9 @@ class PlantParameters:
         spindle_inertia_kg_m2: Spindle, coupling and sensor. Assumed.
         spindle_friction_n_m: Coulomb friction of cable and instrument at the spindle's end, no
             load. Measured: proximal torque = r distal + F0 sgn(v) + mu distal sgn(v) + c at
-            mid-stroke has F0 = 0.0407, less the jaw end's share.
-        spindle_viscous_n_m_s_rad: Assumed; measured too small to tell from zero.
-        cable_load_friction_ratio: Friction at the spindle a unit of torque the cable carries
+            mid-stroke has F0 = 0.0407, minus the jaw end's part.
+        spindle_viscous_n_m_s_rad: Assumed; too small to be distinguished from zero.
+        cable_load_friction_ratio: Friction at the spindle per unit of cable torque
             (wrap of the cable). Measured: mu of the regression above.
         cable_ratio: Jaw angle a spindle angle. Measured: jaw angle = r spindle - distal / k + c
             while moving.
@@ -152,8 +152,8 @@ class SensorParameters:
         fsr_noise_count: White noise. Assumed.
         fsr_limit_count: Largest count, 12 bit; the smallest is 0. Datasheet.
         lever_arm_m: From the jaw's axis to the force-sensing resistor. Stated in the paper, 12 mm.
-        torque_colour_n_m: Coloured noise of both torque channels beside the white one, standard
-            deviation. None was measured.
+        torque_colour_n_m: Coloured noise of both torque channels in addition to white noise,
+            standard deviation. None was measured.
         current_colour_a: The same of the current. None was measured.
         colour_time_s: Time within which coloured noise forgets. Assumed.
     """

@@ -63,7 +63,7 @@ TICK_S = 1e-3
     RING,
 ) = range(29)
 STATE_SIZE = RING + hidden_sensors.RING
-"""Places in the state, SI units: motion, currents, what the torque sensors see, the drift of the
+"""Places in the state, SI units: motion, currents, torques at the torque sensors, the drift of the
 two torque zeros, the time since the start, and the states of hidden effects; the last ones are the
 jaw angles that a delayed encoder remembers."""
 
@@ -150,9 +150,9 @@ def step_tick(
 ) -> None:
     """Move the plant by one tick under constant commands.
 
-    The proximal sensor carries the drive unit: it sees the gear's output torque and the reaction to
-    the rotor's acceleration. The distal sensor carries the load motor: it sees that motor's torque
-    and its friction. Both are left in the state as of the last substep.
+    The proximal sensor carries the drive unit: it measures the gear's output torque and the
+    reaction to the rotor's acceleration. The distal sensor carries the load motor: it measures that
+    motor's torque and its friction. Both are left in the state as of the last substep.
 
     Args:
         state: Shape (`STATE_SIZE`,), changed in place.

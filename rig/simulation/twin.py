@@ -1,9 +1,9 @@
-"""The simulated twin: campaigns of a declared model with the references and sensors of a recording.
+"""The simulated null: campaigns of a declared model with a recording's references and sensors.
 
-A twin holds what the declared balances say and nothing else, played through the same controller,
-loads, quanta and noise, and logged at the same instants. What a search finds on it is an artefact
-of the method: the null of a parametric bootstrap (Efron and Tibshirani, "An Introduction to the
-Bootstrap", 1993, chapter 6).
+A simulated null contains the effects of the declared equations only, run through the same
+controller, loads, quantisation and noise, and logged at the same instants. A finding on it is an
+artefact of the method: the null of a parametric bootstrap (Efron and Tibshirani, "An Introduction
+to the Bootstrap", 1993, chapter 6).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,12 +35,12 @@ NEEDED = (
     "distal_torque_n_m",
     "motor_current_a",
 )
-"""Channels a recording must have to be given a twin."""
+"""Channels that a recording needs for a simulated null."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What of a recorded run its twins share.
+    """The properties of a recorded run that its simulated nulls share.
 
     Attributes:
         plan: Trajectory and load at 1 kHz, from the run's first sample to its last.
@@ -50,7 +50,8 @@ class Reference:
         start_rad: Where the spindle stood at the first sample.
         started_at_ns: Start of the run, or None.
         instrument: Identity of the instrument.
-        others: Recorded channels that no plant simulates, such as a temperature; twins share them.
+        others: Recorded channels that no plant simulates, such as a temperature; the nulls share
+            them.
     """
 
     plan: RunPlan
@@ -107,13 +108,13 @@ def twins(
     """Yield synthetic campaigns of the declared model.
 
     Args:
-        models: Fitted models of the balances; see `rig.simulation.fitted.plant_of`.
-        campaign: Recorded runs; those that are excluded have no twin.
+        models: Fitted models of the equations; see `rig.simulation.fitted.plant_of`.
+        campaign: Recorded runs; excluded runs have no simulated null.
         count: Number of campaigns.
         seed: Seed of the first one's noise; each has its own.
 
     Raises:
-        DataError: A run lacks what a twin needs, or a model makes no plant.
+        DataError: A run lacks something that a simulated null needs, or a model makes no plant.
         NotFittedError: A model has no values.
     """
     twin = build_twin(models, campaign)
@@ -122,15 +123,15 @@ def twins(
 
 
 def build_twin(models: Iterable[Model], campaign: Campaign) -> Twin:
-    """Return what makes twins of a campaign.
+    """Return a maker of simulated nulls of a campaign.
 
     Raises:
-        DataError: There is no run, a run lacks what a twin needs, or a model makes no plant.
+        DataError: The campaign is empty, a run lacks something needed, or a model makes no plant.
         NotFittedError: A model has no values.
     """
     runs = list(campaign.evidence)
     if not runs:
-        raise DataError("There is no run to make a twin of.", fix="Name a folder with recordings.")
+        raise DataError("No runs for a simulated null.", fix="Name a folder with recordings.")
     references = tuple(reference_of(run) for run in runs)
     plant = with_load_unit(plant_of(models), runs)
     plant = replace(plant, jaw_zero_rad=_jaw_zero(plant, runs))
@@ -144,7 +145,7 @@ def build_twin(models: Iterable[Model], campaign: Campaign) -> Twin:
 
 
 def reference_of(run: Recording) -> Reference:
-    """Return what of a recorded run its twins share.
+    """Return the properties of a recorded run that its simulated nulls share.
 
     Raises:
         DataError: The run lacks a channel, or was recorded without a trajectory.
@@ -152,13 +153,13 @@ def reference_of(run: Recording) -> Reference:
     missing = [name for name in NEEDED if name not in run]
     if missing:
         raise DataError(
-            f"Run {run.name!r} can have no simulated twin: it lacks {', '.join(missing)}.",
-            "A twin plays the same trajectory and load, and must show the same channels.",
+            f"Run {run.name!r} can have no simulated null: it lacks {', '.join(missing)}.",
+            "It needs the same trajectory and load, and must have the same channels.",
         )
     if np.ptp(run["target_angle_rad"]) == 0.0 and np.ptp(run["spindle_angle_rad"]) > 0.05:
         raise DataError(
-            f"Run {run.name!r} can have no simulated twin: its trajectory was not recorded.",
-            "The spindle moves, and its target stays where it is.",
+            f"Run {run.name!r} can have no simulated null: its trajectory was not recorded.",
+            "The spindle moves, and its target is constant.",
         )
     elapsed = run.time_s - run.time_s[0]
     tick = np.rint(elapsed * SAMPLE_RATE_HZ).astype(np.int64)
@@ -202,10 +203,10 @@ def simulate(
         {**reference.others, **{name: values[logged] for name, values in played.items()}},
         flags=reference.flags,
         conditions=reference.plan.conditions,
-        rig="simulated twin",
+        rig="simulated null",
         instrument=reference.instrument,
         started_at_ns=reference.started_at_ns,
-        source=f"simulated twin, seed {seed}",
+        source=f"simulated null, seed {seed}",
     )
 
 

@@ -34,7 +34,7 @@ def kept_outcomes(
     Args:
         one_seed: Does one seed; returns a dataclass of what JSON can hold.
         read: Makes that outcome of its JSON again; raises where it is damaged.
-        seeds: How many.
+        seeds: Number of seeds.
         state: Folder where outcomes are kept.
         schema: Name of the study's layout.
         workers: Processes; each does one seed at a time.

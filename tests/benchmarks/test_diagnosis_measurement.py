@@ -4,6 +4,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from scipy.io import savemat
 
 from benchmarks.diagnosis import __main__ as command
-from benchmarks.diagnosis import otherlab
+from benchmarks.diagnosis import otherlab, varied
 from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case, Judgement, write_recordings
 from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record, write_next
@@ -22,13 +23,15 @@ from benchmarks.diagnosis.own import truth_of
 from benchmarks.diagnosis.page import Measured, append, judged_seeds
 from benchmarks.diagnosis.ratio import errors_without
 from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
-from benchmarks.diagnosis.seeds import next_to_judge, use_of
+from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.candidate import FAMILIES
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
+from rig.simulation.varied import DEVELOP, JUDGE, HiddenTruth
+from rig.simulation.varied import Truth as VariedTruth
 
 pytestmark = pytest.mark.integration
 
@@ -346,14 +349,37 @@ def test_a_line_stands_beside_those_of_other_versions(tmp_path: Path) -> None:
     assert judged_seeds(page) == {2_000_000}
 
 
-def test_a_judging_seed_is_used_once() -> None:
-    seeds = (181, 1_000_000, 2_000_000)
-    assert [use_of(seed) for seed in seeds] == ["calibrate", "develop", "judge"]
-    with pytest.raises(ValueError, match="for nothing"):
-        use_of(3_000_000)
-    spent = {2_000_000, 2_001_500, 5}
-    assert use_of(next_to_judge(spent)) == "judge"
-    assert next_to_judge(spent) // 1000 not in {2000, 2001}
+def test_a_judging_block_is_taken_once() -> None:
+    spent = {JUDGE[0], JUDGE[1500], 5}
+    assert next_to_judge(spent) in JUDGE
+    assert next_to_judge(spent) // 1000 not in {seed // 1000 for seed in spent}
+
+
+def test_a_varied_case_is_drawn_once_and_judged_by_its_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    effect = HiddenTruth(
+        "gear", "unknown", ("spindle_angle", "velocity"), (0,), 3.0, "cable", "recipe", 1.0
+    )
+    columns = {"motor": (np.zeros((4, 1)),), "cable": (np.ones((4, 1)),)}
+    truth = VariedTruth((effect,), {}, {}, {}, columns)
+    stage = SimpleNamespace(plans=[SimpleNamespace(name="000-sine")])
+    drawn = []
+
+    def draw_(seed: int, kind: str, *, gear_ratio: float | None) -> SimpleNamespace:
+        drawn.append((seed, kind, gear_ratio))
+        return SimpleNamespace(truth=truth, stage=stage)
+
+    monkeypatch.setattr(varied, "draw", draw_)
+    for variables, equation, right in (
+        (["jaw_angle", "velocity"], "cable", True),
+        (["jaw_angle", "velocity"], "motor", False),
+        (["jaw_angle", "load"], "cable", False),
+    ):
+        (case,) = varied.cases(DEVELOP[7], {"outside": 1}, tmp_path, 35.0)
+        found = finding("depends_on", "unknown", equation, depends_on=variables)
+        assert case.judge(said(found)).right == right
+    assert drawn == [(DEVELOP[7], "outside", 35.0)]
 
 
 OTHER = {

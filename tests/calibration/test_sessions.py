@@ -151,7 +151,7 @@ def test_poses_give_bias_mass_and_centre_of_mass():
         (lambda down, read: (down, read + np.eye(len(down), 6)), "not_linear"),
     ],
 )
-def test_poses_that_cannot_tell_are_refused(spoil, rule):
+def test_insufficient_poses_are_refused(spoil, rule):
     with pytest.raises(BadDataError) as refused:
         fit_tool(*spoil(*poses()))
     assert refused.value.rule == rule
@@ -193,7 +193,7 @@ def test_the_gap_of_loading_and_unloading_is_found_where_there_is_one(gap):
     assert memory.gap_n == pytest.approx(gap, abs=0.002)
 
 
-def test_creep_is_taken_off_only_where_it_was_told_apart():
+def test_creep_is_removed_only_where_it_is_significant():
     curve, _ = pressed(0)
     sure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 1e-4, 2))
     unsure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 0.02, 2))

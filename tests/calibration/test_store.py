@@ -150,7 +150,7 @@ def test_age(days, expected):
     assert [(v.rule, v.is_error) for v in verdicts] == expected
 
 
-def test_a_foreign_serial_is_refused_and_an_unknown_one_is_told():
+def test_a_foreign_serial_is_refused_and_an_unknown_one_is_reported():
     record = line_record(serials={"proximal_sensor": "F7"})
     assert judge(record, MADE, {"proximal_sensor": "F7"}) == []
     (unknown,) = judge(record, MADE, {})

@@ -1,6 +1,6 @@
 """What each driver can say of each fault: the counters that rise, these and no others.
 
-Where two faults have the same names the device's protocol does not tell them apart: bytes without
+Where two faults have the same names the device's protocol does not distinguish them: bytes without
 a number that are missing, changed or there twice are all a checksum that does not fit, and behind a
 late byte of a stream every other byte waits, as in a stall. Each driver's README says so, too.
 """

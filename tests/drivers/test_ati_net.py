@@ -175,7 +175,7 @@ def followed(numbers: list[int]) -> tuple[list[bool], list[int], DeviceCounters]
     return kept.tolist(), given_numbers.tolist(), counters
 
 
-def test_lost_late_repeated_and_restarted_records_are_told_apart() -> None:
+def test_lost_late_repeated_and_restarted_records_are_distinguished() -> None:
     kept, numbers, counters = followed([5, 6, 9, 8, 9, 10])
     assert kept == [True, True, True, False, False, True]
     assert numbers == [0, 1, 4, 5]

@@ -93,7 +93,7 @@ def test_an_interface_that_echoes_is_freed_of_it(other: can.BusABC) -> None:
 
 
 class BrokenBus(can.BusABC):
-    """An interface that raises what it is told to."""
+    """An interface that raises a given error."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(channel=None)
@@ -143,7 +143,7 @@ def test_a_url_that_opens_nothing_says_why(url: str, error: type[LinkError], wor
     ("raised", "error", "words"),
     [
         (OSError(errno.ENODEV, "No such device"), PortNotFoundError, "up type can"),
-        (OSError(errno.EAFNOSUPPORT, "Address family"), LinkError, "knows no CAN"),
+        (OSError(errno.EAFNOSUPPORT, "Address family"), LinkError, "has no CAN support"),
         (OSError(errno.EPERM, "Not permitted"), PortPermissionError, "udev"),
         (can.CanInitializationError("held", errno.EBUSY), PortBusyError, "in use"),
         (can.CanInterfaceNotImplementedError("no module"), MissingExtraError, "extra 'can'"),

@@ -187,7 +187,7 @@ def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand() -> None:
     device.close()
 
 
-def test_a_drive_that_leaves_operation_by_itself_is_said() -> None:
+def test_a_drive_that_stops_operation_by_itself_is_reported() -> None:
     node = Epos4Fake()
     device, _ = armed(node)
     node.state = State.QUICK_STOP
@@ -510,7 +510,7 @@ def test_every_error_says_what_and_what_to_do() -> None:
         assert what.endswith(".")
         assert fix or code == 0
     assert faults.explain(0x5482)[0] == "The drive's hardware failed."
-    assert "does not know" in faults.fault(0x1234).what
+    assert "unknown error" in faults.fault(0x1234).what
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_points_that_make_no_line_are_refused() -> None:
 
 
 @BOTH
-def test_the_module_gives_what_was_asked_and_tells_it(wiring: EsconWiring) -> None:
+def test_the_module_gives_the_set_current_and_reports_it(wiring: EsconWiring) -> None:
     module = EsconFake(wiring)
     code = wiring.output_code(0.5)
     readings = [module.tick(code, enable=True) for _ in range(60)]

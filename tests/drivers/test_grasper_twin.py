@@ -119,7 +119,7 @@ def assert_twins(
     return frames.payloads.view(GRASPER.sample).reshape(-1)
 
 
-def test_its_contract_is_its_own_and_its_sample_tells_from_every_other_frame() -> None:
+def test_its_contract_and_its_sample_differ_from_every_other_frame() -> None:
     assert GRASPER.protocol_hash != REFERENCE.protocol_hash
     sizes = {layout.itemsize for kind, layout in GRASPER.layouts.items() if kind is not Kind.SAMPLE}
     assert GRASPER.sample.itemsize == 56

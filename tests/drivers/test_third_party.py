@@ -51,7 +51,7 @@ def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(
     assert "colour" in problem.what
 
 
-def test_one_without_a_fake_is_told_where_one_is_asked_for(
+def test_a_missing_fake_is_reported_where_one_is_required(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install(tmp_path, monkeypatch, "acme_scale:DRIVER")

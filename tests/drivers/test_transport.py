@@ -191,7 +191,7 @@ def test_a_registered_scheme_opens() -> None:
 
 
 class CountingBoard:
-    """Sends one byte every 40 ticks and repeats what it is told."""
+    """Sends one byte every 40 ticks and returns the bytes it receives."""
 
     def __init__(self) -> None:
         self.ticks = 0

@@ -58,7 +58,7 @@ def test_hidden_friction_is_named_on_its_joint_and_on_no_other() -> None:
     assert set(finding.depends_on) == {"joint_2", "history"}
 
 
-def test_an_arm_that_lacks_nothing_is_told_so() -> None:
+def test_an_arm_with_a_complete_model_gets_no_finding() -> None:
     assert diagnosed(campaign(presliding_on=None), 2, 3).verdict == "nothing_missing"
 
 

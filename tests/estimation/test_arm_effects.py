@@ -88,7 +88,7 @@ def test_dissipative_parameters_are_never_negative_and_others_are_least_squares(
     np.testing.assert_allclose(products.rms(np.arange(4), bounded), expected, rtol=1e-9)
 
 
-def test_what_is_hardly_visited_stays_small():
+def test_rarely_visited_columns_stay_small():
     rng = np.random.default_rng(4)
     columns = rng.normal(size=(500, 1, 2)) * [1.0, 1e-3]
     torque = columns @ np.array([1.0, 100.0])

@@ -1,4 +1,4 @@
-"""Excitation within limits at every instant, and better told parameters than at the start."""
+"""Excitation within limits at every instant, and a better condition than at the start."""
 
 import json
 from dataclasses import replace
@@ -26,7 +26,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0, 1))
-def test_limits_hold_at_instants_nobody_looked_at(seed, phase):
+def test_limits_hold_between_the_sampled_instants(seed, phase):
     time = (np.arange(7919) + phase) / (7919 * FUNDAMENTAL_HZ)
     motion = fitted(PSM, start(PSM, seed)).motion(time)
     for k, joint in enumerate(PSM.joints):
@@ -45,13 +45,13 @@ def test_velocity_and_acceleration_are_the_positions_derivatives():
     np.testing.assert_allclose(bend[inner], motion.acceleration[inner], atol=1e-3)
 
 
-def test_the_design_tells_parameters_better_than_its_starts():
+def test_the_design_has_a_better_condition_than_its_starts():
     starts = [condition(PSM, fitted(PSM, start(PSM, seed))) for seed in range(2)]
     found = condition(PSM, designed(PSM, seeds=2, evaluations=150))
     assert found < 0.7 * min(starts)
 
 
-def test_the_bound_of_every_instant_tells_what_sampled_limits_let_pass():
+def test_the_bound_of_every_instant_detects_violations_between_samples():
     first = fitted(PSM, start(PSM, 3))
     assert reached(PSM, first) == pytest.approx(1.0)  # scaled up to the first limit it meets
     found = by_active_set(PSM, first, 150)

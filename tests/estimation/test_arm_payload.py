@@ -39,7 +39,7 @@ def test_a_point_mass_weighs_and_resists_as_pinocchio_says():
         np.testing.assert_allclose(found[k], pin.rnea(model, data, *state), atol=1e-9)
 
 
-def test_a_mass_beside_the_axis_is_found_within_its_interval():
+def test_a_mass_off_the_axis_is_found_within_its_interval():
     columns = (
         unit(0, HEIGHT_M, 0),
         unit(0.01, HEIGHT_M, 0) - unit(0, HEIGHT_M, 0),

@@ -157,7 +157,7 @@ def test_the_means_of_runs_are_fitted_once_more_by_few_weights():
     assert both[2] == alone[2]
 
 
-def test_a_column_that_hardly_varies_gets_no_weight():
+def test_a_nearly_constant_column_gets_no_weight():
     rng = np.random.default_rng(0)
     slope = rng.normal(size=400)
     design = np.column_stack([np.ones(400), slope, 0.5 + 1e-6 * rng.normal(size=400)])
@@ -226,7 +226,7 @@ def test_live_fits_have_a_target_without_lag(runs):
     assert np.sqrt(np.mean((both["estimate_n_m"] - both[TARGET]) ** 2)) < 0.01
 
 
-def test_another_instrument_is_refused_unless_told(runs):
+def test_another_instrument_is_refused_unless_allowed(runs):
     own, other = Instrument(model="Maryland", serial="1"), Instrument(model="Maryland", serial="2")
     mine = [replace(run, instrument=own) for run in runs[1:5]]
     fitted = BankRecipe(TARGET, BANK).fit(Campaign.of(mine))
@@ -243,7 +243,7 @@ def test_another_instrument_is_refused_unless_told(runs):
     )
 
 
-def test_a_file_of_an_older_version_is_told_to_be_fitted_again(fitted, tmp_path, monkeypatch):
+def test_a_file_of_an_older_version_must_be_fitted_again(fitted, tmp_path, monkeypatch):
     monkeypatch.setattr(BankEstimator, "SCHEMA", "rig.bank/1")
     fitted.save(tmp_path / "old.npz")
     monkeypatch.undo()
@@ -266,7 +266,7 @@ def test_a_network_refuses_another_instrument_too_also_after_loading(runs, tmp_p
     assert np.isfinite(kept.for_any_instrument().predict(replace(runs[0], instrument=other))).all()
 
 
-def test_a_node_that_hardly_moves_in_the_runs_adapted_with_keeps_its_weight(runs):
+def test_a_node_that_barely_varies_in_the_adaptation_keeps_its_weight(runs):
     draw = np.random.default_rng(0)
     inputs, bounds = ("spindle_angle_rad", "motor_current_a"), np.array([[-0.7, -0.2], [0.7, 0.5]])
     hidden = draw.normal(size=(4, 3))
@@ -321,7 +321,7 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
     assert new.interval.least >= fitted.interval.least  # a run does not make it surer of itself
     assert one.covered(new).mean() > 0.99
     assert closing_error(new, other(runs[6]))[1].min() > 0
-    with pytest.raises(NetworkError, match="no closing sample"):
+    with pytest.raises(NetworkError, match="No closing samples"):
         adapted(fitted, [])
 
 
@@ -335,5 +335,5 @@ def test_a_damaged_file_is_refused(fitted, tmp_path):
         BankEstimator.load(path)
     with pytest.raises(NetworkError, match="weights"):
         replace(fitted, weights=fitted.weights[:-1])
-    with pytest.raises(NetworkError, match="no closing sample"):
+    with pytest.raises(NetworkError, match="No closing samples"):
         BankRecipe(TARGET, BANK).fit(Campaign(()))

@@ -95,7 +95,7 @@ def test_leave_one_condition_out_needs_the_condition_and_two_levels():
     campaign = Campaign.of([run("a"), run("b")])
     with pytest.raises(CampaignError, match="does not state"):
         campaign.leave_one_condition_out("frequency_hz")
-    with pytest.raises(CampaignError, match="leaves nothing to fit"):
+    with pytest.raises(CampaignError, match="no runs to fit"):
         campaign.leave_one_condition_out("load_command_a")
 
 

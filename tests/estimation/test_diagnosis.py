@@ -328,7 +328,7 @@ def test_the_data_hash_follows_the_samples():
                 x.with_columns(motor_angle_rad=np.zeros(len(x)), motor_current_a=np.ones(len(x)))
                 for x in r
             ],
-            "do not tell",
+            "No valid samples",
         ),
     ],
     ids=["too few", "two rigs", "two instruments", "no current", "nan", "no excitation"],

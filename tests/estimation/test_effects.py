@@ -192,9 +192,9 @@ BETWEEN_RUNS_S = 180.0
 
 
 def typical(kind) -> list[float]:
-    """Return a shape that these runs tell: away from the grid's points, but for an encoder's wave.
+    """Return a shape identifiable from these runs: off the grid, except for an encoder's order.
 
-    That comes a whole number of times a turn. A width below the slowest speed tells nothing.
+    That comes a whole number of times a turn. A width below the slowest speed is not identifiable.
     """
     if kind.id == "change.step.campaign":
         return [BETWEEN_RUNS_S, 3.0]

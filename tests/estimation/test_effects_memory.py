@@ -261,7 +261,7 @@ def test_a_change_between_runs_is_found_by_the_diagnosis():
 
 
 @pytest.mark.parametrize("name", ["transmission.relaxation", "sensor.creep"])
-def test_a_run_begins_as_settled_under_its_first_load_as_it_is_told(name):
+def test_a_run_begins_as_settled_under_its_first_load_as_declared(name):
     kind = effect(name)
     time_s = np.linspace(0.0, 3.0, 301)
     load = next(role for role in kind.roles if role != "clock")

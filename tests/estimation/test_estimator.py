@@ -136,7 +136,7 @@ def test_what_does_not_fit_together_is_refused(fitted, runs, tmp_path):
 
 
 @torch_only
-def test_samples_beyond_the_training_are_told(fitted, runs):
+def test_samples_outside_the_training_range_are_flagged(fitted, runs):
     network = fitted("network")
     assert isinstance(network, NetworkEstimator)
     closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3

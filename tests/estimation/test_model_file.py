@@ -62,7 +62,7 @@ def test_several_balances_are_read_back_from_one_file(several):
     assert parse(text) == several[0]
 
 
-def test_a_file_of_no_model_is_told():
+def test_a_file_without_a_model_is_refused():
     with pytest.raises(ModelFileError, match="holds no model"):
         parse_all('schema = "rig.models/1"\nmodels = []\n')
 

@@ -54,7 +54,7 @@ def test_training_recovers_a_known_function_and_its_noise():
     assert 0.5 * true_count < found.effective_parameters < 2 * true_count
 
 
-def test_pure_noise_determines_hardly_any_weight():
+def test_pure_noise_determines_almost_no_weight():
     y = np.random.default_rng(3).normal(size=(800, 1))
     found = train(rows(800), y, (IN, OUT[:1]), Settings(nodes=8))
     assert found.effective_parameters < found.parameters / 3

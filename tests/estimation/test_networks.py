@@ -34,7 +34,7 @@ def test_each_output_is_the_written_equation(nodes, seed):
     np.testing.assert_allclose(network(x)[0], y, rtol=1e-12)
 
 
-def test_inputs_outside_the_range_are_told_and_nan_stays_nan():
+def test_inputs_outside_the_range_are_flagged_and_nan_stays_nan():
     network = make()
     rows = np.array([[0.0, 0.2], [3.0, 0.2], [np.nan, 0.2]])
     assert network.inside(rows).tolist() == [True, False, False]

@@ -37,7 +37,7 @@ def test_a_ripple_is_seen_at_its_order():
     assert "7 times a motor turn" in first.detail
     assert first.stands_out
     assert 1e-3 < first.amplitude < 2e-3  # the 50 Hz filter takes its share at speed
-    assert "names no effect" in first.sentence()
+    assert "identifies no effect" in first.sentence()
 
 
 def test_a_spring_is_seen_over_the_spindle_angle():

@@ -39,7 +39,7 @@ def fitted() -> Model:
     return fit(model_file.read(Path("motor")), Campaign.of(runs(100, 8)), bootstrap=0)
 
 
-def test_the_fit_tells_how_much_runs_differ_and_the_file_keeps_it(fitted: Model) -> None:
+def test_the_fit_estimates_the_spread_of_runs_and_the_file_keeps_it(fitted: Model) -> None:
     assert fitted.evidence is not None
     assert 0 < fitted.evidence.run_spread < 0.5
     again = model_file.parse(model_file.to_toml(fitted))

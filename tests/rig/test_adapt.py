@@ -43,13 +43,13 @@ def states(folders, tmp_path_factory):
     return path
 
 
-def test_a_fit_of_states_is_a_file_that_knows_its_instrument(states):
+def test_a_fit_of_states_is_a_file_with_its_instrument(states):
     estimator = load(states)
     assert isinstance(estimator, BankEstimator)
     assert estimator.instrument == "Maryland 1"
 
 
-def test_replay_refuses_another_instrument_unless_told(folders, states, capsys):
+def test_replay_refuses_another_instrument_unless_allowed(folders, states, capsys):
     words = ["replay", str(folders[1] / "00.mcap"), "--model", str(states), "--speed", "0"]
     assert main([*words, "--plain"]) != 0
     assert "fitted on Maryland 1" in capsys.readouterr().err
@@ -91,7 +91,7 @@ def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path,
     np.testing.assert_array_equal(moved.network.hidden, network.hidden)
 
 
-def test_what_adapt_cannot_do_is_told(folders, states, tmp_path, capsys):
+def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, capsys):
     assert main(["adapt", str(states), str(folders[1]), "--runs", "77"]) == 2
     assert "names 0 runs" in capsys.readouterr().err
     line = tmp_path / "line.toml"

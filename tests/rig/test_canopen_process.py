@@ -44,7 +44,7 @@ def test_a_session_runs_on_it_and_nothing_is_lost_while_the_host_pauses() -> Non
     assert moved[-1] - moved[0] > 0.05
 
 
-def test_a_process_that_is_killed_is_a_lost_link_and_the_drive_is_told_to_be_live() -> None:
+def test_a_killed_process_is_a_lost_link_and_the_drive_is_reported_as_live() -> None:
     settings = config()
     link = open_logger(settings)
     assert isinstance(link, CanopenProcess)

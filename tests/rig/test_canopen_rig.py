@@ -87,7 +87,7 @@ def test_a_fault_of_the_drive_ends_the_session_in_its_own_words() -> None:
     [
         ({"limits": {"motor_current_a": 0.05}}, "current|motor_current_a"),
         ({"safety": {"motor_speed_rad_s": 2.0}}, "turned too fast"),
-        ({"safety": {"watchdog_s": 0.005}}, "heard nothing"),
+        ({"safety": {"watchdog_s": 0.005}}, "received nothing"),
     ],
 )
 def test_the_guards_of_the_board_hold_here_too(change: dict, message: str) -> None:

@@ -84,7 +84,7 @@ def test_diff_names_what_changed(rig, tmp_path):
     assert set(told["changes"]) == {"hash", "fit.parameters.slope", "raw"}
 
 
-def test_a_log_beyond_the_calibrated_range_is_told(rig, tmp_path):
+def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
     from dataclasses import replace
 
     from calibration.record import Validity

@@ -75,13 +75,13 @@ def test_gearbox_finds_stiffness_and_the_gap_that_is_there(calibrate, tmp_path, 
     fit = by_channel(said)["gear_twist_rad"]
     assert fit["stiffness_n_m_rad"] == pytest.approx(5.4, rel=0.01)
     assert fit["backlash_rad"] == pytest.approx(0.015 * strength, abs=2e-4)
-    assert said["found"]["backlash"].startswith("told" if strength else "not told")
+    assert said["found"]["backlash"].startswith("significant" if strength else "not significant")
 
 
 def test_encoder_finds_the_wave_that_is_there(calibrate, tmp_path):
     config = hidden(tmp_path, "{ jaw_encoder_wave = 1.0 }")
     _, said = calibrate("encoder", "--which", "jaw", "--config", config)
-    assert said["found"]["wave"] == "17 periods a turn"
+    assert said["found"]["wave"] == "17 periods per turn"
     assert said["found"]["wave_amplitude_rad"] == pytest.approx(5e-3, rel=0.05)
 
 
@@ -114,7 +114,7 @@ def test_a_refused_or_unattended_session_leaves_nothing(calibrate, tmp_path):
     assert "changes by" in said["error"]["what"]
     code, said = calibrate("torque", yes=False)
     assert code == 2
-    assert "no terminal" in said["error"]["what"]
+    assert "not a terminal" in said["error"]["what"]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -199,7 +199,7 @@ def test_raw_logs_of_another_kind_are_refused(calibrate):
 
 
 @pytest.mark.parametrize("hysteresis", [0.3, 0.0])
-def test_a_curve_on_data_with_hysteresis_is_told_so(
+def test_hysteresis_is_identified_in_the_residual_of_a_curve(
     calibrate, monkeypatch, capsys, tmp_path, hysteresis
 ):
     from rig.simulation import press

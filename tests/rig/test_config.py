@@ -49,7 +49,7 @@ def test_a_file_that_is_not_there_is_a_usage_error(tmp_path):
         load_config(tmp_path / "absent.toml")
 
 
-def test_a_range_is_told_with_its_unit(tmp_path):
+def test_a_range_is_reported_with_its_unit(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(
         SIMULATED.read_text().replace("motor_current_a = 0.6", "motor_current_a = 600", 1)

@@ -58,9 +58,7 @@ def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
     page = (demo / "diagnosis.html").read_text()
     found = told["diagnosis"]
     assert page.count("<svg") == 2
-    assert (
-        "ripple.motor is missing, torque that repeats with the motor&#39;s turn (amplitude" in page
-    )
+    assert "ripple.motor is missing, torque that is periodic in the motor angle (cogging)" in page
     assert "runs not touched" in page
     assert all(run in page for run in found["runs"]["confirm"])
     for part in ("Parameters of what was found", "Declared parameters: motor", "What was tried"):
@@ -78,12 +76,12 @@ def test_the_first_look_keeps_off_the_runs_that_prove(demo, told):
     assert not [name for name in confirm if name in page]
 
 
-def test_the_demo_remembers_what_it_looked_at(demo, told):
+def test_the_demo_logs_its_use_of_held_out_data(demo, told):
     recordings = evidence(open_campaign(demo / "logs"))
     assert Ledger(Path(told["ledger"])).known(recordings) == {r.name for r in recordings}
 
 
-def test_the_hidden_effect_is_not_told_to_whoever_reads_the_logs(demo, told):
+def test_the_logs_do_not_contain_the_hidden_effect(demo, told):
     from rig.simulation.hidden import NAMES
 
     for path in (demo / "logs").glob("*.mcap"):

@@ -51,7 +51,7 @@ def test_a_bad_cable_is_a_warning_with_numbers() -> None:
     assert "cable" in finding.fix
 
 
-def test_another_firmware_is_told_with_the_command_that_fixes_it() -> None:
+def test_another_firmware_is_reported_with_the_command_that_fixes_it() -> None:
     board = PythonBoard(HandMovedBench(), protocol_hash=0xDEADBEEF)
     (finding,) = device_findings("logger", lambda: TeensyDevice(SimulatedTransport(board)))
     assert (finding.check, finding.level) == ("firmware", Level.ERROR)
@@ -154,7 +154,7 @@ def test_who_holds_a_port_is_named(tmp_path: Path) -> None:
     assert finding.fix.endswith(f"kill -TERM {holder.pid}")
 
 
-def test_a_slow_ftdi_adapter_is_told(tmp_path: Path) -> None:
+def test_a_slow_ftdi_adapter_is_reported(tmp_path: Path) -> None:
     root = computer(tmp_path / "root", True, False)
     timer = root / "sys/bus/usb-serial/devices/ttyUSB7/latency_timer"
     timer.parent.mkdir(parents=True)
@@ -225,10 +225,12 @@ def test_the_hash_of_the_sources_is_that_of_posix_cksum(library: Path) -> None:
     versions = firmware.compare(load_config())
     assert versions.fits
     assert versions.sources.removeprefix("build ") in versions.board
-    assert versions.remarks == ("Program and board speak one protocol.",)
+    assert versions.remarks == ("Program and board have the same protocol.",)
 
 
-def test_a_build_of_other_sources_is_told(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_build_of_other_sources_is_reported(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(firmware, "source_hash", lambda: 1)
     assert any("rig firmware flash" in r for r in firmware.compare(load_config()).remarks)
 

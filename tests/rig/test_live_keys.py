@@ -59,7 +59,7 @@ def test_a_tare_takes_the_zero_of_a_rig_at_rest_only(tmp_path):
     assert "no tare while the rig moves" in status(moving[-1], "recording").detail
 
 
-def test_q_leaves_and_a_mark_without_a_recording_says_so(tmp_path):
+def test_q_quits_and_a_mark_needs_a_recording(tmp_path):
     blocks = watched(simulated(), ["m", "", "q"], tmp_path, duration_s=60.0)
     assert len(blocks) == 2
     assert "r starts one" in status(blocks[0], "recording").detail

@@ -124,7 +124,7 @@ def test_gaps_and_missing_samples_count_as_lost():
     assert list(replay_blocks(holed, (), None))[-1].lost == 205
 
 
-def test_a_flagged_stretch_tells_its_reason():
+def test_a_flagged_segment_has_its_reason():
     source = recording().with_stretch(Stretch(1.0, 1.1, Flag.SUSPECT, "runaway: command 1.06"))
     states = [b.devices[0] for b in replay_blocks(source, (), None)]
     assert states[0].state == "ok"
@@ -199,7 +199,7 @@ def test_command_runs_a_model(logs, capsys, monkeypatch):
     assert 0 < frames[-1]["summary"]["error_rms"] < 0.02
 
 
-def test_command_interrupted_leaves_with_130(logs, capsys, monkeypatch):
+def test_command_interrupted_exits_with_130(logs, capsys, monkeypatch):
     class Interrupting(Smoothed):
         def push(self, columns, time_s):
             if time_s[0] > 0.5:
@@ -221,7 +221,7 @@ def test_command_refuses_what_cannot_be(logs, words):
 
 
 @pytest.mark.parametrize("words", [("--json",), ("--plain",)])
-def test_a_reader_that_leaves_early_is_told_to_nobody(tmp_path, words):
+def test_a_reader_that_closes_early_causes_no_message(tmp_path, words):
     """As in `rig replay LOG --json | head -1`."""
     log = str(write_recording(tmp_path / "log.mcap", recording(seconds=20.0)))
     root = Path(__file__).parents[2]

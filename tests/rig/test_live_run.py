@@ -107,7 +107,7 @@ def test_a_terminal_gets_the_drawing_and_its_cursor_back():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_ctrl_c_leaves_with_a_summary_and_closes_the_stream(terminal):
+def test_ctrl_c_quits_with_a_summary_and_closes_the_stream(terminal):
     closed = []
     stream = blocks(40, KeyboardInterrupt(), on_close=lambda: closed.append(True))
     console = people(terminal=terminal)

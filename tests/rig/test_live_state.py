@@ -62,7 +62,7 @@ def test_error_rms_is_of_the_last_five_seconds_and_in_the_summary_of_all():
     assert summary.duration_s == pytest.approx(9.999)
 
 
-def test_the_error_within_what_was_fitted_is_told_apart():
+def test_the_error_within_the_fitted_range_is_reported_separately():
     inside = {GRIP: np.arange(1000) < 400}
     estimate = {GRIP: np.where(inside[GRIP], 0.103, 0.4)}
     summary = state_of(block(0, 1000, estimates=estimate, inside=inside)).summary("finished")
@@ -117,7 +117,7 @@ def test_one_bad_sample_does_not_hide_the_value():
     assert reading.sensor.number == pytest.approx(0.1)
 
 
-def test_absent_sensor_and_estimator_are_told_apart():
+def test_absent_sensor_and_estimator_are_distinguished():
     reading = state_of(block(0, 100, columns={})).snapshot().readings[0]
     assert reading.estimate.missing == "no estimator"
     assert reading.sensor.missing == "no sensor"

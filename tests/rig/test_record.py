@@ -75,7 +75,7 @@ def test_closing_is_positive_in_every_channel(folder):
     assert run["distal_torque_n_m"].mean() > 0
 
 
-def test_si_samples_and_counts_tell_the_same_story(folder):
+def test_si_samples_and_counts_agree(folder):
     log = read_log(sorted(folder.glob("*.mcap"))[0])
     sample, counts = log.topics[SAMPLE].rows, log.topics[COUNTS].rows
     np.testing.assert_array_equal(sample["sequence"], counts["sequence"])
@@ -89,7 +89,7 @@ def test_si_samples_and_counts_tell_the_same_story(folder):
     assert set(log.end.drift) == {"proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"}
 
 
-def test_what_is_hidden_does_not_stand_beside_what_is_recorded(tmp_path):
+def test_the_hidden_effect_is_not_in_the_recording(tmp_path):
     hiding = simulated(hidden={"motor_ripple": 0.987}, draw_hidden=4321)
     record(tmp_path, hiding, short_protocol(1))
     told = [p.read_text() for p in tmp_path.rglob("*") if p.is_file() and p.suffix != ".mcap"]
@@ -187,7 +187,7 @@ def test_lost_samples_make_a_run_incomplete_and_are_listed(tmp_path):
     assert topic.gaps
 
 
-def test_a_drifting_sensor_is_told(tmp_path):
+def test_a_drifting_sensor_is_reported(tmp_path):
     config = simulated().changed(drift={"proximal_torque_n_m": 1e-9})
     (result,) = record(tmp_path, config, short_protocol(1))
     assert result.drifted == ("proximal_torque_n_m",)

@@ -143,7 +143,7 @@ def test_a_fuzz_run_that_is_not_done_keeps_the_rows_of_the_table(
 
 
 @pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="needs /proc (Linux)")
-def test_what_listens_is_seen_and_told_from_what_does_not() -> None:
+def test_listening_sockets_are_distinguished_from_others() -> None:
     before = listening.listening(os.getpid())
     with socket.create_server(("127.0.0.1", 0)) as server:
         (found,) = listening.listening(os.getpid()) - before

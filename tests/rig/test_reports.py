@@ -102,11 +102,11 @@ def test_text_is_escaped(pages):
     assert "a &lt;b&gt; &amp; c" in pages["study"]
 
 
-def test_the_first_look_says_what_is_left_and_no_more(pages):
+def test_the_screening_page_describes_the_residual_and_no_more(pages):
     text = pages["first_look"]
-    assert "it looks like a function of motor angle" in text
+    assert "The residual depends on motor angle" in text
     assert "7 times a motor turn" in text
-    assert "names no effect" in text
+    assert "identifies no effect" in text
     assert "friction.coulomb, width" in text
 
 

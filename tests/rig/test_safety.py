@@ -1,4 +1,4 @@
-"""Everything the rig is watched for: by the board first, by the host again, told in words."""
+"""All monitors of the rig: on the board first, on the host again, with their messages."""
 
 import dataclasses
 import os

@@ -61,7 +61,7 @@ def test_a_board_whose_watchdog_sleeps_fails(monkeypatch: pytest.MonkeyPatch) ->
         return data
 
     failed = failing(simulated(), monkeypatch, fed)
-    assert "the board makes itself safe when the host falls silent" in failed
+    assert "the board goes to its safe state when the host is silent" in failed
 
 
 def test_a_board_that_says_nothing_fails_everything(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -145,7 +145,7 @@ def test_lost_and_damaged_bytes_are_counted_and_nothing_is_made_up():
     assert missing == readings[-1].lost
 
 
-def test_a_host_that_is_late_leaves_flagged_samples_not_wrong_ones():
+def test_a_late_host_causes_flagged_samples_not_wrong_ones():
     """The queue runs dry when the host is late; the target is held and the samples say so."""
     config = simulated()
     link = SimulatedTransport(transport(config).board, step_s=0.08)

@@ -188,7 +188,9 @@ def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
-def test_every_effect_shows_and_leaves_the_rig_under_control(kind: Kind, plain: Columns) -> None:
+def test_every_effect_is_visible_and_the_rig_stays_under_control(
+    kind: Kind, plain: Columns
+) -> None:
     shape = (1.0,) if kind.name == "friction_step" else ()
     columns = sweep([HiddenEffect(kind.name, kind.strongest, shape)])
     error = columns["target_angle_rad"] - columns["spindle_angle_rad"]

@@ -168,7 +168,7 @@ def test_the_drive_limits_its_current() -> None:
     assert bench.state[plant.CURRENT] == pytest.approx(0.56)
 
 
-def test_vary_is_seeded_and_leaves_scales_alone() -> None:
+def test_vary_is_seeded_and_keeps_scales() -> None:
     base = PlantParameters()
     assert vary(base, 3) == vary(base, 3)
     assert vary(base, 3) != vary(base, 4)

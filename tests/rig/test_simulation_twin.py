@@ -1,4 +1,4 @@
-"""The simulated twin: the declared model played with the references and noise of a recording."""
+"""The simulated null: the declared model with the references and noise of a recording."""
 
 import pickle
 from dataclasses import replace
@@ -65,7 +65,7 @@ def test_the_declared_balances_leave_what_the_sensors_leave(fitted: list[Model])
         assert 0.3 * NOISE[balance] < rmse < NOISE[balance], balance
 
 
-def test_the_twin_shares_names_instants_references_and_conditions(
+def test_the_simulated_null_shares_names_instants_references_and_conditions(
     recorded: Campaign, twin: Campaign
 ) -> None:
     assert twin.names == recorded.names
@@ -77,7 +77,7 @@ def test_the_twin_shares_names_instants_references_and_conditions(
 
 
 @pytest.mark.parametrize("channel", ["proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"])
-def test_the_twins_noise_floor_is_the_recordings(
+def test_the_simulated_nulls_noise_floor_is_the_recordings(
     recorded: Campaign, twin: Campaign, channel: str
 ) -> None:
     ratios = [
@@ -88,7 +88,7 @@ def test_the_twins_noise_floor_is_the_recordings(
 
 
 @pytest.mark.parametrize("place", range(4), ids=["motor", "gearbox", "cable", "stretch"])
-def test_the_twins_residual_has_the_recordings_size(
+def test_the_simulated_nulls_residual_has_the_recordings_size(
     fitted: list[Model], twin: Campaign, place: int
 ) -> None:
     again = fit(fitted[place], twin, bootstrap=0)
@@ -98,14 +98,16 @@ def test_the_twins_residual_has_the_recordings_size(
     assert again.evidence.rmse == pytest.approx(before.rmse, rel=0.25)
 
 
-def test_the_twins_motor_residual_has_no_structure_beyond_chance(
+def test_the_simulated_nulls_motor_residual_has_no_structure_beyond_chance(
     fitted: list[Model], twin: Campaign
 ) -> None:
     again = fit(fitted[0], twin, bootstrap=0)
     assert not largest_structure(again, twin)[0].stands_out
 
 
-def test_twins_are_seeded_differ_and_travel(recorded: Campaign, fitted: list[Model]) -> None:
+def test_simulated_nulls_are_seeded_differ_and_can_be_pickled(
+    recorded: Campaign, fitted: list[Model]
+) -> None:
     one = Campaign(recorded.runs[:1])
     maker = pickle.loads(pickle.dumps(build_twin(fitted, one)))  # noqa: S301 - our own bytes
     (first,), (again,), (other,) = maker(1), maker(1), maker(2)

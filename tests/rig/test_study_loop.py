@@ -73,7 +73,7 @@ def test_the_command_writes_tables_and_json(made, tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["rows"][0]["task"]["samples"] == "closing"
     text = page.read_text()
-    assert "runs kept back" in text
+    assert "held-out test runs" in text
     assert all(step["effect"] in text for step in found["rows"][0]["steps"])
 
 

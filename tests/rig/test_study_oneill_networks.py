@@ -131,7 +131,7 @@ def deep(table, tmp_path_factory) -> NetworkStudy:
     return found
 
 
-def test_rows_are_scored_beside_the_paper(deep):
+def test_rows_are_scored_next_to_the_paper(deep):
     assert deep.not_run == ()
     assert {row.way for row in deep.rows} == {"end-to-end", "staged", "+ travel"}
     error = {(r.way, r.protocol, r.target): r.score.rmse for r in deep.rows}
@@ -142,7 +142,7 @@ def test_rows_are_scored_beside_the_paper(deep):
     assert any("Grip force at 12 mm" in note for note in shown.notes(deep))
 
 
-def test_the_papers_tables_stand_row_by_row_beside_the_printed_ones(deep):
+def test_the_papers_tables_are_row_by_row_next_to_the_printed_ones(deep):
     trained = {(r.pose, r.way, r.target, r.surrogate): r for r in deep.rows}
     one = next(iter(trained.values()))
     rows = [

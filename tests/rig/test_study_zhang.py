@@ -91,7 +91,7 @@ def test_networks_see_the_gripper_from_joint_3_on():
         assert not any(name[1] == "7" for name in zhang_networks.input_names(joint, gripper=False))
 
 
-def test_states_look_back_and_never_ahead(psm):
+def test_states_are_causal(psm):
     run = simulate(
         psm, with_gripper(random_path(np.random.default_rng(6), 4.0), 0.1, 0.8),
         np.random.default_rng(7),
@@ -103,7 +103,7 @@ def test_states_look_back_and_never_ahead(psm):
     np.testing.assert_array_equal(rows[0], [run.position[0, 0]] * 2 + [run.velocity[0, 2]])
 
 
-def test_free_motion_tells_what_the_coupling_matrix_gets_wrong():
+def test_free_motion_identifies_the_error_of_the_coupling_matrix():
     rng = np.random.default_rng(1)
     psm = with_instrument(rng, draw_arm(rng), "CF")
     runs = []
@@ -175,7 +175,7 @@ def test_motion_of_a_run_does_not_trail_a_smooth_path():
 
 
 @torch_only
-def test_the_network_on_the_rest_learns_memory_and_leaves_noise_alone(psm):
+def test_the_network_on_the_residual_learns_memory_and_not_noise(psm):
     rng = np.random.default_rng(8)
     motion = with_gripper(random_path(rng, 120.0), 0.1, 0.8)
     memory = dahl(motion.position[:, :1], np.array([0.1]))[:, 0]

@@ -59,7 +59,7 @@ def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path) -> None:
     assert told["since"].startswith("000")
 
 
-def test_record_tells_what_the_watch_saw(model, tmp_path, capsys) -> None:
+def test_record_reports_the_result_of_the_monitor(model, tmp_path, capsys) -> None:
     out = tmp_path / "logs"
     protocol = tmp_path / "one.toml"
     table = 'kind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2, 0.3]\nduration_s = 2.0\n'

@@ -1,7 +1,7 @@
 """Machines that other people built: their published recordings, handed over to `rig diagnose`.
 
 One module a machine reads the authors' own files and hands them over as MATLAB files with channels
-named by unit, and a declared model beside it: what a person who knows nothing of this project's
+named by unit, and a declared model with it: what a person who knows nothing of this project's
 inside would do today. No recording is part of this project; the folder of them is given by path.
 """
 

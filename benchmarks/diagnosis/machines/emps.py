@@ -2,8 +2,8 @@
 
 A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*, Workshop on Nonlinear
 System Identification Benchmarks, 2019: the standard model (mass, viscous and Coulomb friction,
-offset) leaves 4.083 % of the force. They found later that viscous friction differs by direction,
-166.7 and 240.4 N s/m; the error is then 3.112 %.
+offset) has a residual of 4.083 % of the force. They found later that viscous friction differs by
+direction, 166.7 and 240.4 N s/m; the error is then 3.112 %.
 
 Every file `DATA_EMPS*.mat` is used: `t` (s), `qm` (m), `vir` (V), `gtau` (N/V). A lap is one period
 of 6.24 s of the reference; a half lap goes one way and back within it. A millimetre is handed over

@@ -6,8 +6,8 @@ encoder (pulses). The files have no time: samples are put 10 ms apart. Counts of
 handed over as 1e-4 N each, the inner cell's as its share of full scale in the place of the torque
 at the spindle, a thousand pulses as a radian: only shapes matter here.
 
-Nobody knows the answer. On one sweep a quadratic in PWM leaves .56 to 1.5 % of the range of the
-jaw's force, a line in the inner cell .87 to 1.5 %.
+Nobody knows the answer. On one sweep a quadratic in PWM has a residual of .56 to 1.5 % of the range
+of the jaw's force, a line in the inner cell .87 to 1.5 %.
 """
 
 import csv

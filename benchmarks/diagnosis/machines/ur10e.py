@@ -1,9 +1,9 @@
 """Joint 6 of a Universal Robots UR10e moved alone, 100 Hz (S. Mamedov, Front. Robot. AI 7, 2020).
 
 A row has time, angles, speeds, measured currents of the six joints, and more (31 columns).
-Declared is inertia, viscous and Coulomb friction, all in the joint's current: they leave 1.1 % of
-the squared current, and the first two harmonics of the angle are 6 % of that. The whole answer is
-not known. The joint goes to and fro every 10 s; a run is half of that, from the middle of one
+Declared is inertia, viscous and Coulomb friction, all in the joint's current: the residual is 1.1 %
+of the squared current, and the first two harmonics of the angle are 6 % of that. The whole answer
+is not known. The joint goes to and fro every 10 s; a run is half of that, from the middle of one
 stroke to the middle of the next, so that each holds both directions.
 """
 
@@ -56,7 +56,7 @@ def read(folder: Path, target: str) -> list[Run]:
 
 
 def judge(runs: Sequence[Run], target: str, report: Report) -> Judgement:
-    """Return the errors beside those of the quick fit, as shares of the squared current."""
+    """Return the errors together with those of the quick fit, as shares of the squared current."""
     stated = errors(runs, target, report)
     squared = f"squared {100 * stated.before**2:.2f} -> {100 * stated.after**2:.2f} %"
     return Judgement(None, note=f"{stated.percent()}; {squared}, quick fit 1.1 %")

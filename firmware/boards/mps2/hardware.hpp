@@ -1,5 +1,5 @@
 // An emulated Cortex-M4 (QEMU's mps2-an386) as `rig::App` wants its hardware, with a small plant in
-// place of the rig. It tries the core as an Arm processor runs it; it tells nothing of timing: its
+// place of the rig. It tries the core as an Arm processor runs it; it shows nothing about timing: its
 // time passes only as the host asks for ticks, so a loaded computer changes nothing.
 //
 // On the serial line, whole numbers little-endian:

@@ -77,7 +77,7 @@ class GrasperHardware : public TeensyLink {
     }
 
   private:
-    // A controller that has a fault after it was enabled tells no current.
+    // A controller that has a fault after it was enabled reports no current.
     bool ready(std::size_t k) const {
         return enabled_ticks_ < wiring::kReadyAfterTicks ||
                digitalRead(wiring::kReadyPin[k]) == HIGH;

@@ -86,7 +86,7 @@ class ReferenceHardware : public TeensyLink {
         return reading >= wiring::kTorqueZero - 1 ? INT16_MAX : reading * 16;
     }
 
-    // A controller that has a fault after it was enabled tells no current.
+    // A controller that has a fault after it was enabled reports no current.
     bool drive_ready() const {
         return enabled_ticks_ < wiring::kReadyAfterTicks || digitalRead(wiring::kDriveReadyPin) == HIGH;
     }

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.recording import FloatArray
-from rig import trajectory
+from rig.protocols import trajectory
 from rig.simulation.plant import TICK_S
 from rig.simulation.varied.forms import Random
 from rig.simulation.varied.plant import Plant, over

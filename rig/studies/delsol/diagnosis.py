@@ -1,8 +1,8 @@
 """What the diagnosis names on a simulated hydraulic arm that is moved freely.
 
-The joints are balances of the project's own diagnosis, declared by the paper's model. One run in
-three is set aside before anything is fitted; what is told of an effect's gain is from those. As
-with `rig diagnose --quick`, chance is judged on surrogates, without simulated twins.
+The joints are torque equations of the project's own diagnosis, declared by the paper's model.
+One run in three is held out before any fit; the reported gain of an effect is from those. As with
+`rig diagnose --quick`, chance is estimated from permutation nulls, without simulated nulls.
 """
 
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ from rig.studies.delsol.hydraulic_arm import (
 RUNS, SECONDS = 18, 40.0
 HARMONICS = 5
 FUNDAMENTALS = (1, 2, 3)
-"""Turns of a run's slowest wave; the runs take them in turns, so that a spring, which goes with
-position, is not the inertia, which goes with position times frequency squared."""
+"""Periods of a run's lowest harmonic; the runs alternate, so that a spring, proportional to
+position, is not collinear with inertia, proportional to position times frequency squared."""
 
 HIGHEST_HZ = 5.0
 PULLS = ("spring.position", "friction.position")
@@ -70,7 +70,7 @@ Effects = tuple[tuple[int, Candidate], ...]
 
 
 def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named, ...], Effects]:
-    """Move an arm freely and diagnose its joints; return what is told, and its effects."""
+    """Move an arm freely and diagnose its joints; return the result and its effects."""
     recordings = free_runs(arm, rng)
     sealed = split(recordings)
     balances = closed(HYDRAULIC, SIGN_RAD_S)

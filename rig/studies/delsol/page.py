@@ -35,13 +35,13 @@ DISCARDS = (
 )
 
 NAMED_NOTE = (
-    f"The joints are balances of the diagnosis, on {RUNS} further runs of each arm along finite"
-    " Fourier series (equation 14); one run in three was set aside before anything was fitted, and"
+    f"The joints are torque equations of the diagnosis, on {RUNS} further runs per arm along finite"
+    " Fourier series (equation 14); one run in three was held out before any fit, and"
     " the errors are of those. Hoses drag on joint 1 alone, k q (1 + q^2), and every joint has"
-    " Dahl's friction, which the catalogue holds; a pull named on another joint is false. Chance is"
-    " judged on surrogates, without simulated twins. How many runs there are, how large and about"
-    " how many poses was chosen on arms 0 to 3, which are among these. What was named is fitted to"
-    " the paper's points beside its parameters: the rows with what was found."
+    " Dahl's friction, which the catalogue has; a pull on another joint is false. Chance is"
+    " estimated from permutation nulls alone. How many runs there are, how large and about"
+    " how many poses was chosen on arms 0 to 3, which are among these. Effects found are fitted to"
+    " the paper's points together with its parameters: the rows with identified effects."
 )
 
 
@@ -61,11 +61,11 @@ def lead(study: DelSolStudy) -> str:
     there = sum(any(f.joint == 1 and f.family in PULLS for f in arm) for arm in study.named)
     pull = [f for f in found if f.joint == 1 and f.family in PULLS]
     gain = [100 * (1 - f.after_n_m / f.before_n_m) for f in pull]
-    said = f", with {np.median(gain):.0f} % less error on runs set aside (median)" if gain else ""
+    said = f", with {np.median(gain):.0f} % less error on held-out runs (median)" if gain else ""
     false = [f for f in found if is_false(f)]
     which = sorted({f"{f.family} on joint {f.joint}" for f in false})
     return (
-        f"The diagnosis named the hoses' pull on joint 1 of {there} of {len(study.seeds)} arms"
+        f"The diagnosis identified the hoses' pull on joint 1 of {there} of {len(study.seeds)} arms"
         f"{said}. Of {len(found)} names on {JOINTS * len(study.seeds)} joints {len(false)} are"
         f" false{': ' + ', '.join(which) if which else ''}."
     )
@@ -102,7 +102,7 @@ def write_figures(folder: Path, study: DelSolStudy) -> list[Path]:
 
 
 def tables(study: DelSolStudy) -> list[TextTable]:
-    """Return the paper's tables with ours beside them."""
+    """Return the paper's tables with ours next to them."""
     joints = [f"joint {k + 1}" for k in range(JOINTS)]
     excited = [[f"joint {k + 1}", *(f"{f:.3f}" for f in row)] for k, row in enumerate(TABLE_1_HZ)]
     residual = [["paper", *(f"{value:.2f}" for value in TABLE_2_N_M)]]
@@ -144,15 +144,15 @@ def _medians(study: DelSolStudy, method: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _named(study: DelSolStudy) -> TextTable:
-    """Return on how many arms each joint was given which name, and what it gains."""
+    """Return for each joint the effects found, on how many arms, and their gain."""
     told = [finding for arm in study.named for finding in arm]
     rows = []
     for joint in range(1, JOINTS + 1):
         own = [finding for finding in told if finding.joint == joint]
         for family in sorted({f.family for f in own}, key=lambda f: (f not in PULLS, f)):
             rows.append([f"joint {joint}", *_of_name([f for f in own if f.family == family])])
-    header = ["", "name", "arms", "no rival", "rivals", "RMS before, N m", "after, N m"]
-    return TextTable(f"What the diagnosis named, {len(study.seeds)} arms", header, rows, NAMED_NOTE)
+    header = ["", "name", "arms", "unique", "alternatives", "RMS before, N m", "after, N m"]
+    return TextTable(f"Effects identified, {len(study.seeds)} arms", header, rows, NAMED_NOTE)
 
 
 def _of_name(found: Sequence[Named]) -> list[str]:

@@ -2,8 +2,8 @@
 
 Each seed draws an arm; its joints swing one after another by single sinusoids within the paper's
 frequencies (table 1); its closed-chain model is fitted by damped least squares to motion
-differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our way beside
-it fits the same points with the effects that the diagnosis named on further runs of the same arm.
+differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our method
+fits the same points with the effects that the diagnosis identified on further runs of the same arm.
 """
 
 from collections.abc import Callable
@@ -105,7 +105,7 @@ def run_delsol(
     """Do the study on arms of several seeds, from 0.
 
     Args:
-        seeds: How many.
+        seeds: Number of seeds.
         state: Folder where the outcome of each seed is kept.
         workers: Processes; each does one seed.
         on_seed: Called after each seed, also after one that was kept.
@@ -229,7 +229,7 @@ def conditions(table: FloatArray) -> FloatArray:
 def tip_force(motion: Motion, external: FloatArray) -> FloatArray:
     """Return the force at the tip by the pseudo-inverse of the transposed Jacobian, (n, 3).
 
-    Five joints cannot tell six components: the tip is taken to push and not to twist.
+    Six components are not observable with five joints: the tip is assumed to push and not to twist.
     """
     smooth = zero_phase(external, RATE_HZ, LOW_PASS)
     jacobians = closed_jacobians(HYDRAULIC, motion.position)[:, :3]

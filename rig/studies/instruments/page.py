@@ -8,7 +8,7 @@ from rig.studies.instruments.study import InstrumentStudy
 TITLE = "An estimator of one instrument on others"
 NOTE = (
     "Proximal torque from the measured current, RMSE in mN m over the closing samples of the runs"
-    " not used; fitted anew: on the instrument's other runs alone, in five folds. Of a network the"
+    " not used; fitted again: on the instrument's other runs alone, in five folds. Of a network the"
     " output layer is adapted. The stiffness of the states' prior was chosen on the instruments of"
     " the public data that are shown here, so that column is somewhat too good there; that of the"
     " networks' on Tool_4_Maryland_L_2 alone."
@@ -27,7 +27,7 @@ def lead(study: InstrumentStudy) -> str:
 
 
 def drawn_table(study: InstrumentStudy) -> TextTable:
-    """Return what the choice of the runs makes of the errors."""
+    """Return the effect of the choice of the runs on the errors."""
     cells = [
         [
             row.instrument,
@@ -61,7 +61,7 @@ def table(study: InstrumentStudy) -> TextTable:
             "" if found.covered is None else f"{found.covered:.1%}",
             str(len(found.unused)),
         ])  # fmt: skip
-    columns = ["estimator", "instrument", "runs used", "as it is", "adapted", "fitted anew"]
+    columns = ["estimator", "instrument", "runs used", "unchanged", "adapted", "fitted again"]
     return TextTable(
         "Other instruments", [*columns, "interval of 95 % covers", "runs not used"], cells, NOTE
     )

@@ -1,4 +1,4 @@
-"""One instrument's estimators on other instruments: as they are, adapted, and fitted anew.
+"""One instrument's estimators on other instruments: unchanged, adapted, and fitted again.
 
 The runs adapted with are the ones of the tables before: one run, or three. As much depends on which
 these are, states are adapted with each single run, and with threes drawn at random, too.
@@ -75,7 +75,7 @@ class InstrumentStudy:
 
 
 def recipes(networks: bool) -> dict[str, Recipe]:
-    """Return what fits each kind; networks only where they are wanted and torch is installed."""
+    """Return the recipe of each kind; networks only if requested and torch is installed."""
     found: dict[str, Recipe] = {"products of physical states": BankRecipe(TARGET, Bank(LOAD))}
     if networks and has_torch():
         inputs = (*STATE_INPUTS, LOAD)
@@ -103,7 +103,7 @@ def run_instruments(
         others: Name and runs of the others.
         used: Names of the runs adapted with, one row each.
         networks: Whether to train networks too.
-        seed: Seed of the folds of fits anew.
+        seed: Seed of the folds of the new fits.
         on_row: Called with the number of rows done and their total.
 
     Raises:
@@ -124,7 +124,7 @@ def run_instruments(
                     Path(name),
                     runs,
                     chosen,
-                    from_scratch=place == 0,  # it hardly depends on which runs are not used
+                    from_scratch=place == 0,  # it barely depends on which runs are not used
                     seed=seed,
                 )
                 rows.append(InstrumentRow(kind, instrument, result))

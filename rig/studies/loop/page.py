@@ -13,14 +13,14 @@ def lead(study: LoopStudy) -> str:
         for row in study.rows
     ]
     return (
-        f"On {len(study.sealed.confirm)} runs kept back, errors in mN m before and after: "
+        f"On {len(study.sealed.confirm)} held-out test runs, errors in mN m before and after: "
         + "; ".join(parts)
         + "."
     )
 
 
 def notes(study: LoopStudy) -> list[str]:
-    """Return what a reader must know before comparing."""
+    """Return remarks for a comparison."""
     sealed = study.sealed
     found = [
         f"Data: {study.source}. {len(sealed.discover)} runs discover, {len(sealed.confirm)} confirm"
@@ -64,7 +64,7 @@ def _errors(study: LoopStudy) -> TextTable:
         for row in study.rows
     ]
     return TextTable(
-        "Errors on the confirm runs, mN m",
+        "Errors on the held-out test runs, mN m",
         (
             "estimate",
             "samples",
@@ -91,8 +91,8 @@ def _effects(row: Row) -> TextTable:
         ("effect", "parameters", "gain %", "rmse, mN m"),
         cells,
         f"Tried: {row.candidates} points of {row.families} families. Gain: share of the squared"
-        " error that the model before it left, on discovery runs left out in turn; rmse on the"
-        " confirm runs.",
+        " error of the model before it, on training runs left out in turn; rmse on the"
+        " held-out test runs.",
     )
 
 

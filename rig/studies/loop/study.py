@@ -1,7 +1,8 @@
-"""The loop closed on measured data: from a linear model to named effects, proved on runs kept back.
+"""The loop closed on measured data: from a linear model to effects confirmed on held-out test runs.
 
 Each row starts from the paper's linear model of one torque, lets the search add effects of the
-catalogue on two thirds of the runs while every gate passes, and opens the others once, at the end.
+catalogue on two thirds of the runs while all acceptance criteria are met, and uses the others once,
+at the end.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +31,7 @@ from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
 
 TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
-"""Families left out: they know how long a run has lasted, which means nothing for another load."""
+"""Excluded families: they depend on the time since the start, which is irrelevant to a new load."""
 
 
 FLOOR = 0.002
@@ -42,8 +43,8 @@ class Task:
     """One row of the study.
 
     Attributes:
-        name: What is estimated from what.
-        balance: Balance whose effects are searched.
+        name: Target and regressor of the estimate.
+        balance: Equation whose effects are searched.
         target: Channel that is estimated.
         source: Channel of the linear model.
         measured: Channels an effect may read, besides the device's clock.
@@ -103,8 +104,8 @@ class Step:
     Attributes:
         effect: Id of its form.
         parameters: Its parameters.
-        gain: Share of squared error it removed from discovery runs left out.
-        rmse: Error on the confirm runs with it and those before it, means left in, N m.
+        gain: Share of squared error it removed from training runs left out.
+        rmse: Error on the test runs with it and those before it, means included, N m.
     """
 
     effect: str
@@ -119,10 +120,10 @@ class Row:
 
     Attributes:
         task: The task.
-        linear: Error of the linear model on the confirm runs, means left in, N m.
+        linear: Error of the linear model on the test runs, means included, N m.
         steps: Effects in the order they were added.
         parameters: Named parameters of the last model.
-        rmse: Its error on the confirm runs, means left in, N m.
+        rmse: Its error on the test runs, means included, N m.
         rmse_without_means: The same with each run's mean error removed.
         runs_improved: Confirm runs whose error fell.
         rmse_by_run: Confirm run to the error before and after, N m.
@@ -150,7 +151,7 @@ class LoopStudy:
         rows: One a task.
         sealed: The split, the same for every task.
         left_out: Runs left out of evidence, with the reason.
-        source: Where the data came from.
+        source: Source of the data.
         provenance: When, from which commit and seed.
     """
 
@@ -223,7 +224,7 @@ def _row(
 
     made = forwards(search, found)
     effects = made.found
-    on_stage(f"{what}: opening the confirm runs")
+    on_stage(f"{what}: scoring the held-out test runs")
     held = _prepared([r for r in recordings if r.name in sealed.confirm], wanted, declared)
     stages = [
         freeze(search.balance, [Part(e) for e in effects[:k]]) for k in range(len(effects) + 1)

@@ -55,7 +55,7 @@ class ClosingTable:
         }
 
     def save(self, path: Path) -> None:
-        """Write the table beside `path`, the values so that they can be mapped into memory."""
+        """Write the table next to `path`, the values so that they can be mapped into memory."""
         path.parent.mkdir(parents=True, exist_ok=True)
         for suffix, values in ((".npy", self.values), (".run.npy", self.run)):
             part = path.with_name(f".{path.name}{suffix}")

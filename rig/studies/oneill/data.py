@@ -22,12 +22,12 @@ def network_tables(
     folder: Path | None,
     on_run: Callable[[str], None] = lambda name: None,
 ) -> tuple[dict[str, ClosingTable], tuple[str, ...]]:
-    """Return the closing samples by pose, and what a reader must know about them.
+    """Return the closing samples by pose, and remarks about them.
 
     Args:
         neutral: The runs of experiments 1 and 2.
         left_out: Runs left out of them, with the reason.
-        folder: Folder that may hold the folders or archives of experiment 3, or lie beside them.
+        folder: Folder that may hold the folders or archives of experiment 3, or be next to them.
         on_run: Called with each run's name when it has been processed.
 
     Raises:

@@ -19,7 +19,7 @@ from estimation.recording import FloatArray, Recording
 from estimation.scores import Score, score
 
 AUTHORS_SKIP = 1 / 8
-"""The authors' linear fit leaves out this first part of the closing samples."""
+"""The authors' linear fit omits this first part of the closing samples."""
 
 TEST_SHARE = 0.15
 """Share of the samples that the paper's random split tests on."""
@@ -35,7 +35,7 @@ TARGET = "proximal_torque_n_m"
 
 
 class StudyError(EstimationError):
-    """The paper's processing leaves nothing to fit or to score."""
+    """After the paper's processing no samples remain to fit or to score."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def held_out(splits: list[Split], channels: Iterable[str], fitter: Fitter) -> Ta
     Args:
         splits: Splits of a campaign of closing samples; see `Campaign.folds`.
         channels: Channels the fitter needs, and any others wanted in the table.
-        fitter: What is fitted.
+        fitter: The estimator to fit.
 
     Returns:
         The channels, `TARGET` and `ESTIMATE` of all test runs, N m for the last two.

@@ -28,7 +28,7 @@ UNSEEN, LAG = 1.15, 1.2
 
 @dataclass(frozen=True)
 class Reached:
-    """What one estimate reaches.
+    """Result of one estimate.
 
     Attributes:
         live: On runs not seen, every filter causal.
@@ -74,7 +74,7 @@ class Reached:
 
 
 def reached(study: StateStudy, deep: NetworkStudy | None) -> list[Reached]:
-    """Return what is reached for every goal, from command and from measured current."""
+    """Return the results for every goal, from command and from measured current."""
     rows = {row.job: row for row in study.rows}
     found = []
     for pose, target in GOALS:
@@ -103,13 +103,13 @@ def lead(found: list[Reached]) -> Iterator[str]:
         errors.append(f"from {surrogate} {', '.join(own)}")
     yield (
         "The best estimator is a sum of products of physical states. On whole runs that it was not"
-        " fitted on, filtered as live, looking back half a second, its error (RMSE over closing"
+        " fitted on, filtered as live, with a memory of half a second, its error (RMSE over closing"
         f" samples) is {'; '.join(errors)}. In brackets the paper's network, trained on the same"
         " folds, without lag."
     )
     missed = [f"{one.name}: {', '.join(one.missed)}" for one in found if one.missed]
     if missed:
-        yield f"Missed of what is aimed at: {'; '.join(missed)}."
+        yield f"Missed goals: {'; '.join(missed)}."
     yield _intervals(found)
 
 
@@ -120,7 +120,7 @@ def _error(one: Reached) -> str:
 
 
 def _intervals(found: list[Reached]) -> str:
-    """Return in words what the intervals cover, live."""
+    """Return the coverage of the intervals in words, live."""
     told = [f"{_share([one.live.covered for one in found])} on runs not seen, aimed at 93 to 97 %"]
     wrong = [one for one in found if not _by_chance(one.live)]
     told[0] += f" (further from 95 % than by chance: {len(wrong)} of {len(found)} estimates)"
@@ -129,9 +129,7 @@ def _intervals(found: list[Reached]) -> str:
         between = [level.covered for own in levels for level in own[1:-1]]
         beyond = [level.covered for own in levels for level in (own[0], own[-1])]
         told.append(f"{_share(between)} on a frequency or power left out between others")
-        told.append(
-            f"{_share(beyond)} on the lowest or highest left out, where no fitted run tells"
-        )
+        told.append(f"{_share(beyond)} on the lowest or highest left out, outside the fitted range")
     return f"Intervals of 95 %, live, cover {'; '.join(told)}."
 
 
@@ -145,7 +143,7 @@ def _share(shares: list[float]) -> str:
 
 
 def table(found: list[Reached]) -> TextTable:
-    """Return what is reached beside what is aimed at."""
+    """Return the results and the goals."""
     cells = []
     for one in found:
         goal, beyond = GOALS[one.live.job.pose, one.live.job.target]

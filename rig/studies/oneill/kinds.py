@@ -50,7 +50,7 @@ class KindRow:
 
 
 def recipes() -> dict[str, Recipe]:
-    """Return what fits each kind; networks only where torch is installed."""
+    """Return the recipe of each kind; networks only where torch is installed."""
     physical = ModelRecipe(replace(model_file.read(Path("motor")), run_offsets=False))
     line = ModelRecipe(model_file.read(Path("linear")))
     found: dict[str, Recipe] = {"straight line": line, "physical model": physical}

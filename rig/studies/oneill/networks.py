@@ -60,7 +60,7 @@ class Job:
             with physical states, and `causal` for the last of them on channels filtered as live.
         surrogate: Key of `SURROGATES`.
         protocol: As for `held_out_masks`.
-        targets: What is estimated.
+        targets: Estimated channels.
     """
 
     pose: str
@@ -81,7 +81,7 @@ class Job:
 
     @property
     def nodes(self) -> int:
-        """Hidden nodes: the paper's 30, fewer where the inputs say more."""
+        """Hidden nodes: the paper's 30, fewer with more informative inputs."""
         return 30 if self.way in ("end-to-end", "staged") else STATE_NODES
 
     @property
@@ -117,7 +117,7 @@ class NetworkStudy:
         peak_torque_n_m: Largest distal torque of the neutral pose.
         every: Every n-th closing sample of a pose was trained on, by pose.
         settings: Settings of the training.
-        notes: What a reader must know.
+        notes: Remarks for the reader.
         provenance: When and from what this was made.
     """
 
@@ -331,8 +331,8 @@ def run_networks(
         every: Train on every n-th closing sample of the neutral pose, and on as many of others.
         seed: Seed of splits and of first weights.
         workers: Processes; each trains on one core.
-        minutes: No network is started after so long.
-        notes: What a reader must know.
+        minutes: No network is started after this time.
+        notes: Remarks for the reader.
         on_network: Called with the number of networks trained and their total.
 
     Raises:

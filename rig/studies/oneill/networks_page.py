@@ -32,7 +32,7 @@ WAYS = {
 
 
 def notes(study: NetworkStudy) -> list[str]:
-    """Return what a reader must know about the networks."""
+    """Return remarks on the networks."""
     settings = study.settings
     every = " and ".join(f"one of {n} ({pose})" for pose, n in study.every.items())
     told = [

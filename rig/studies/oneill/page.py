@@ -49,10 +49,10 @@ def lead(study: Study, more: "More | None" = None) -> list[str]:
 
 
 def notes(study: Study) -> list[str]:
-    """Return what a reader must know: the sample counts, runs left out, and the study's notes."""
+    """Return remarks for the reader: the sample counts, runs left out, and the study's notes."""
     counts = (
-        f"The paper's processing leaves {study.closing_samples:,} closing samples; the paper states"
-        f" {study.paper_samples:,}, the public data is known to give {study.public_samples:,}."
+        f"The paper's processing gives {study.closing_samples:,} closing samples; the paper states"
+        f" {study.paper_samples:,}, the public data gives {study.public_samples:,}."
     )
     if study.measured:
         same = study.closing_samples == study.public_samples

@@ -1,6 +1,6 @@
 """What an estimate from physical states is scored by, on runs that were not fitted.
 
-The run is the unit: a share of samples has a spread that is that of runs drawn anew.
+The run is the unit: the spread of a share of samples is that over resampled runs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
 """What each protocol that holds a level out holds out."""
 
 RESAMPLED = 2000
-"""Campaigns drawn from the runs, to see how far a share is chance."""
+"""Campaigns resampled from the runs, for the standard error of a share."""
 
 
 @dataclass(frozen=True)

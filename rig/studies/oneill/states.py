@@ -33,7 +33,7 @@ FOLDS = 5
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
 DRAWN = (Bank(LOADS["command"]), "live")
-"""What the figures show."""
+"""Content of the figures."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class StateStudy:
         schema: Name of this layout.
         rows: The rows.
         weights: Number of weights of the neutral pose's estimator.
-        notes: What a reader must know.
+        notes: Remarks for the reader.
     """
 
     schema: str
@@ -106,7 +106,7 @@ def run_states(
     Args:
         neutral: Runs of experiments 1 and 2.
         left_out: Runs left out of them, with the reason.
-        folder: Folder that may hold the parts of experiment 3, or lie beside them.
+        folder: Folder that may hold the parts of experiment 3, or be next to them.
         seed: Seed of the folds.
         on_run: Called with each run's name when it has been processed.
         on_row: Called with the number of rows done and their total.
@@ -185,7 +185,7 @@ def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
 
 
 def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[RunEvidence]]:
-    """Return what is fitted by target; runs without a valid closing sample were left out before."""
+    """Return the runs of the fit by target; runs without valid closing samples are excluded."""
     bank, filters = kind
     found: dict[str, list[RunEvidence]] = {target: [] for target in TARGETS}
     for run in runs:

@@ -15,18 +15,18 @@ PROTOCOLS = ("run-wise", "lofo", "lopo")
 
 
 def notes(study: StateStudy) -> list[str]:
-    """Return what a reader must know about the rows."""
+    """Return remarks on the rows."""
     return [
         f"Physical states: {study.weights} weights of products of states and of a ripple in the"
-        f" spindle's angle, linear, by ridge regression; penalty and share of the runs' means that"
-        f" is left out are chosen in every fit, out of {len(CHOICES)}, by runs left out of it in"
-        f" turn. Nothing looks back further than {TRAVEL_WINDOW_S} s. All closing samples of"
+        f" spindle's angle, linear, by ridge regression; penalty and removed share of the runs'"
+        f" means are chosen in every fit, out of {len(CHOICES)}, by runs left out of it in"
+        f" turn. No input is older than {TRAVEL_WINDOW_S} s. All closing samples of"
         " held-out runs are scored, against the sensor filtered without lag; live rows have inputs"
         " filtered causally, in fit and in use.",
-        "Which states there are was chosen, out of some 150 sets, with the errors reported here in"
-        " view: on held-out runs, frequencies and powers of the neutral pose by the command without"
-        " lag, and of pitch and roll too. So these rows are somewhat too good; another instrument"
-        " is the better judge.",
+        "Which states there are was chosen, out of some 150 sets, with the errors reported here"
+        " known: on held-out runs, frequencies and powers of the neutral pose by the command"
+        " without lag, and of pitch and roll too. So these errors are biased low; another"
+        " instrument is a more independent test.",
         *study.notes,
     ]
 
@@ -71,8 +71,8 @@ def _errors(study: StateStudy) -> TextTable:
     columns += ["runs' offsets"]
     note = (
         f"Runs: {FOLDS} folds of whole runs, as of the networks. The runs' offsets: root mean"
-        " square of each held-out run's mean error; an estimate that forgets after half a second"
-        " cannot know them."
+        " square of each held-out run's mean error; an estimate with a memory of half a second"
+        " cannot estimate them."
     )
     return TextTable("Physical states: RMSE by what was held out", columns, cells, note)
 
@@ -148,5 +148,5 @@ def _ablation(study: StateStudy) -> TextTable:
         if any(effect in by for by in by_target.values())
     ]
     columns = ["left out", *(f"{name}, {unit}" for name, unit, _ in SHOWN.values())]
-    note = "Command, neutral pose, without lag, run-wise RMSE; each row is fitted anew."
-    return TextTable("Physical states: what each effect brings", columns, cells, note)
+    note = "Command, neutral pose, without lag, run-wise RMSE; each row is a new fit."
+    return TextTable("Physical states: improvement by each effect", columns, cells, note)

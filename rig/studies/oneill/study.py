@@ -1,9 +1,9 @@
 """The linear rows of Table I of O'Neill et al. 2018, made again on measured or simulated data.
 
-The public data set is probably not the paper's exact set: the paper's processing leaves 308,117
+The public data set is probably not the paper's exact set: the paper's processing gives 308,117
 closing samples of Tool_4_Maryland_L_4, the paper states 260,581, and no threshold, window or subset
 of runs explains the difference. The same processing gives the paper's count of its third experiment
-exactly. So the paper's errors are printed beside ours, and not expected to be met.
+exactly. So the paper's errors are printed next to ours, and are not expected to agree.
 """
 
 from collections.abc import Callable
@@ -96,7 +96,7 @@ class Study:
         schema: Name of this layout.
         source: What the data is.
         measured: Whether the data was measured on the paper's instrument.
-        notes: What a reader must know before comparing.
+        notes: Remarks for a comparison.
         closing_samples: Closing samples of all runs after the paper's processing.
         paper_samples: The paper's count.
         public_samples: The count the public data is known to give.
@@ -153,7 +153,7 @@ class Source:
         campaign: The runs.
         name: What the data is, for the reader.
         measured: Whether it was measured on the paper's instrument.
-        notes: What the reader must know.
+        notes: Remarks for the reader.
     """
 
     campaign: Campaign
@@ -255,7 +255,7 @@ def run_study(
 def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
     """Return the surrogates whose channels the first run has; note the ones that are missing."""
     if len(campaign) == 0:
-        raise DataError("There is no run to study.")
+        raise DataError("The campaign is empty.")
     columns = set(next(iter(campaign)).columns)
     found = {
         name: channel
@@ -273,7 +273,7 @@ def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
 
 
 def without_flagged(closing: Campaign) -> tuple[Campaign, dict[str, str]]:
-    """Leave out runs with flagged closing samples, and say why."""
+    """Exclude runs with flagged closing samples, with the reason."""
     left_out = {}
     for run in closing:
         flagged = [s for s in run.stretches if np.any(run.flags & np.uint8(s.flag))]
@@ -308,7 +308,7 @@ def _whole_rows(
 ) -> list[Row]:
     """Return the rows of the paper's own protocols: the authors' fit and the random split.
 
-    The authors' fit takes all runs in file order, flagged ones too, as the paper knows no flags.
+    The authors' fit takes all runs in file order, flagged ones too, as the paper has no flags.
     """
     rows = []
     for protocol, campaign in (("authors", closing), ("random", kept)):

@@ -1,4 +1,4 @@
-"""Tables I to V of O'Neill et al. 2018, made again, each row beside the printed one."""
+"""Tables I to V of O'Neill et al. 2018, reproduced, each row next to the printed one."""
 
 from collections.abc import Iterator
 

@@ -45,13 +45,13 @@ def _reached(study: Study) -> str:
         for model in (EFFECTS, WITHIN)
     ]
     return (
-        f" What was aimed at is reached by {said[0]} and {said[1]}; beyond that by {said[2]} and"
+        f" The goal is reached by {said[0]} and {said[1]}; the further goal by {said[2]} and"
         f" {said[3]}."
     )
 
 
 def notes(study: Study) -> list[str]:
-    """Return what a reader must know before comparing."""
+    """Return remarks for a comparison."""
     first, second = study.paths
     return [
         "The torque is motor current times nominal constants: the arm has no torque sensor. Both"
@@ -137,8 +137,8 @@ def _others(study: Study) -> TextTable:
             if row.without_offset_percent is not None:
                 rows.append(["the same, offsets removed", *_percent(row.without_offset_percent)])
     note = (
-        "Nothing was chosen on these runs. Offsets removed: each joint's mean error, which a zero"
-        " of its current or a spring leaves after a restart."
+        "Nothing was chosen on these runs. Offsets removed: each joint's mean error, by a zero"
+        " of its current or a spring after a restart."
     )
     return TextTable("NRMSD on further runs, %", ["model", *joints], rows, note)
 
@@ -182,7 +182,7 @@ def _parameters(study: Study) -> TextTable:
     ]
     note = (
         "m: mass, l: first moment, L: inertia about the joint, Ke: spring, Fv and Fs: viscous and"
-        " Coulomb friction, Ia: drive inertia, tau0: offset. Standard errors know noise only."
+        " Coulomb friction, Ia: drive inertia, tau0: offset. Standard errors include noise only."
         " Physically consistent: every link's pseudo-inertia is positive semidefinite, and no"
         " friction, spring or drive inertia is negative."
     )

@@ -70,7 +70,7 @@ class Parameter:
     Attributes:
         name: The combination.
         value: By weighted least squares.
-        standard_error: Of that value; knows noise only.
+        standard_error: Of that value; includes noise only.
         consistent: By the physically consistent fit.
     """
 
@@ -123,7 +123,7 @@ def run_study(
         on_step: Called with what is being done.
 
     Raises:
-        ArmError: A path does not tell the thesis' parameters, or holds no arm.
+        ArmError: The thesis' parameters are not identifiable from a path, or it contains no arm.
         DataError: A path is too short.
     """
     on_step("columns")

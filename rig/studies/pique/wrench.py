@@ -61,8 +61,7 @@ TABLES = {
 
 HAND, SERIES, CONTACT = TABLES
 BODY = "3.3 in the tip's frame, by the body Jacobian"
-"""The same contact in the frame in which a hand that is held would feel it; the thesis gives no
-numbers of it."""
+"""The same contact in the tip's frame; the thesis gives no numbers of it."""
 
 PUSHED = ((5.0, 7.0, 7.0), 0.0)
 TWISTED = ((2.3, 4.0, 5.0), 0.1)
@@ -125,7 +124,7 @@ def run_wrench_study(
     """Do the study on arms of several seeds.
 
     Args:
-        seeds: How many; from 0.
+        seeds: Number of seeds; from 0.
         state: Folder where the outcome of each seed is kept.
         workers: Processes at once.
         on_seed: Called after each seed, also after one that was kept.
@@ -200,7 +199,7 @@ def _touched(
     largest_n: tuple[float, float, float],
     torsion_n_m: float,
 ) -> tuple[ArmRun, FloatArray]:
-    """Return what an arm's sensors tell of touching a pin, and the force sensor under it."""
+    """Return the readings of an arm's sensors in contact with a pin, and of the force sensor."""
     motion = contact_motion(rng, 60.0)
     wrench = pin(rng, motion, largest_n, torsion_n_m)
     return simulate(arm, motion, rng, wrench), ati(passed_on(motion, wrench), rng)
@@ -235,7 +234,7 @@ def _our_columns(run: ArmRun) -> FloatArray:
 
 
 def _smoothed(values: FloatArray, derivative: int = 0) -> FloatArray:
-    """Return what a window of past samples tells half a window late, as `LiveWrench` does."""
+    """Return the result of a window of past samples, half a window late, as `LiveWrench` does."""
     late: FloatArray = savgol_filter(
         values, WINDOW, ORDER, deriv=derivative, delta=1 / RATE_HZ, axis=0
     )[CUT]
@@ -257,10 +256,10 @@ def _with_slip(motion: Motion) -> FloatArray:
 
 
 def ati(wrench: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return what a force sensor under the pin shows of a wrench.
+    """Return the reading of a force sensor under the pin for a wrench.
 
-    Noise, a bias, drift, cross-talk of 1 % and a frame turned by 1 degree and moved by 1 mm: within
-    what the makers of such sensors state and what mounting by hand leaves.
+    Noise, a bias, drift, cross-talk of 1 % and a frame turned by 1 degree and moved by 1 mm:
+    within the makers' specifications and the accuracy of mounting by hand.
     """
     full = np.repeat([7.0, 1.0], 3)
     turn = Rotation.from_rotvec(np.radians(1.0) * rng.normal(size=3) / np.sqrt(3)).as_matrix()

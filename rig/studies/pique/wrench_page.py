@@ -33,14 +33,14 @@ NOTES = (
     "The force sensor has noise, bias, drift, cross-talk of 1 % and a frame turned and moved;"
     " wrenches are in the base frame. Both sides pass a zero-phase Butterworth filter at 5 Hz;"
     " causal: both pass a window of past samples instead, an eighth of a second late.",
-    "In contact the thesis measured forces and moments apart, and so are they here; it names up to"
+    "In contact the thesis measured forces and moments separately, as here; it states up to"
     f" 7 N and a bad grip of the torsion about z, and no sizes. Largest forces {PUSHED[0]} N where"
-    f" forces, {TWISTED[0]} N where moments are measured, and a torsion of {TWISTED[1]} N m, of"
-    f" which the sensor feels at most {GRIP_N_M} N m, and joints that move over {CONTACT_SHARE:.0%}"
-    " of their ranges were set on arms that are not shown here so that its method comes near its"
-    " table 3.3: what the grip does not pass on is an error of every method.",
-    "By the body Jacobian the same contact is told in the tip's frame. Bending moments at the tip"
-    " are nil there but for the sensor's faults, so they have no range to be a share of.",
+    f" forces, {TWISTED[0]} N where moments are measured, and a torsion of {TWISTED[1]} N m,"
+    f" of which the sensor gets at most {GRIP_N_M} N m, and joints that move over"
+    f" {CONTACT_SHARE:.0%} of their ranges were set on arms that are not shown here so that its"
+    " method comes near its table 3.3: the loss in the grip is an error of every method.",
+    "By the body Jacobian the same contact is expressed in the tip's frame. Bending moments at the"
+    " tip are zero there except for the sensor's errors, so they have no range for a ratio.",
 )
 
 

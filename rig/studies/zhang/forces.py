@@ -44,7 +44,7 @@ class Learnt:
     physics: Physics
 
     def external(self, run: PsmRun) -> dict[str, FloatArray]:
-        """Return what the torque of a run holds beyond free motion, by method, shape (n, 7)."""
+        """Return the torque of a run minus that of free motion, by method, shape (n, 7)."""
         free = np.column_stack([net(run) for net in (*self.networks, self.gripper)])
         return {NETWORKS: run.torque - free, OURS: run.torque - self.physics(run)}
 
@@ -82,7 +82,7 @@ def _traces(experiment: str, forces: dict[str, FloatArray], scored: np.ndarray) 
 def _grasped(
     psm: Psm, grasp: Grasp, rng: np.random.Generator
 ) -> tuple[PsmRun, FloatArray, np.ndarray]:
-    """Return a run with a grasp, the force that the resistive sensor tells, and what is scored."""
+    """Return a run with a grasp, the force of the resistive sensor, and the scored samples."""
     force = grasp.force(psm)
     run = simulate(psm, grasp.motion, rng, grip_n_m=-grasp.arm_m * force, lead=lead_samples())
     return run, grasp.sensed(force, rng)[lead_samples() :], grasp.scored[lead_samples() :]

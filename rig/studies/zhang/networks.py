@@ -2,8 +2,8 @@
 
 Joints 1 and 2 take the states of the six joints, the others the gripper's too; each state with
 those before it in a short window, as in the authors' earlier work. Where the gripper never moved,
-its states tell nothing and are left out. The paper states neither window nor size; these networks
-are small and trained by Levenberg-Marquardt, which takes a second each.
+its states contain no information and are omitted. The paper states neither window nor size; these
+networks are small and trained by Levenberg-Marquardt, which takes a second each.
 """
 
 from collections.abc import Sequence

@@ -60,11 +60,11 @@ def lead(study: ZhangStudy) -> str:
 
 
 def notes(study: ZhangStudy) -> list[str]:
-    """Return what a reader must know before comparing."""
+    """Return remarks for a comparison."""
     return [
         "The simulated arms are not measured ones: strengths of friction, noise and vibration, the"
         " coupling's error, and how instruments differ, were chosen over several rounds on other"
-        " arms so that the paper's networks meet its tables (decision 55). That they do so is no"
+        " arms so that the paper's networks meet its tables (decision 55). This is not"
         " evidence. Arms are drawn around those strengths by seed; all are reported.",
         f"Paper's networks: {MINUTES:g} minutes a condition, split 5:1:1; an instrument's transfer"
         f" {OTHER_MINUTES[0]:g} + {OTHER_MINUTES[1]:g} + {OTHER_MINUTES[2]:g} minutes. Ours: the"
@@ -73,12 +73,12 @@ def notes(study: ZhangStudy) -> list[str]:
         "Our networks in the paper's place have one layer of 8 nodes and a window of three states,"
         " trained by Levenberg-Marquardt on five samples a second; the paper states neither size"
         " nor window. NRMSE is RMSE over the range of the torque in the test.",
-        "Two rows of Table I are cut in our copy of the paper: only J3 is known.",
-        "Ours knows each joint's way since it turned back, however long ago, and takes the gripper"
+        "Two rows of Table I are cut off in our copy of the paper: only J3 is known.",
+        "Ours uses each joint's travel since its last reversal, however long ago, and the gripper"
         " torque measured as an input of joints 3 to 6. The candidates are the arm catalogue, slips"
-        " over longer ways and drag of the moving gripper; the simulated friction (Dahl) is none.",
-        "The small network sees its joint's motion and the stretches of springs that slip, and is"
-        " kept where it takes 10 % of the squared rest away on pieces held out.",
+        " over longer travel and drag of the moving gripper, not the simulated friction (Dahl).",
+        "The small network's inputs are its joint's motion and deflections of presliding springs."
+        " It is kept where it removes 10 % of the squared residual on held-out segments.",
     ]
 
 
@@ -127,7 +127,7 @@ def _better(study: ZhangStudy) -> tuple[int, int]:
     wins = []
     for cell in (*compared, "grasp | RMSE, NRMSE, scale"):
         near = np.array([word is True for word in study.near(cell)])
-        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is no error
+        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is not an error
         ours, theirs = (study.values(f"{cell} | {method}") for method in (OURS, NETWORKS))
         wins.append((ours < theirs)[:, near])
     ours, theirs = (
@@ -161,7 +161,7 @@ def _figure_3(study: ZhangStudy) -> TextTable:
     cases = [cell for cell in study.outcomes[0] if cell.startswith("Figure 3")]
     rows = [[cell.split(" | ")[1], *_range(study, cell, 4)] for cell in cases]
     return TextTable(
-        "Figure 3: torque on one path, beside that with the gripper held at 0",
+        "Figure 3: torque on one path, compared with the gripper held at 0",
         ["gripper", *(f"{j}, {'N' if j == 'J3' else 'N m'}" for j in JOINTS)],
         rows,
         "RMS of the difference, median (least to greatest). The paper shows curves, no numbers.",
@@ -193,8 +193,8 @@ def _table_1_ours(study: ZhangStudy) -> TextTable:
         ]
         wins = study.values(f"{cell} | {OURS}") < study.values(f"{cell} | {NETWORKS}")
         rows.append([f"{test}: arms where ours is better", *map(str, wins.sum(axis=0))])
-    title = "Ours beside Table I, trained on both conditions: NRMSE, %"
-    note = "No method goes below the noise. M also rings in J3 and J4, which no state foretells."
+    title = "Ours and Table I, trained on both conditions: NRMSE, %"
+    note = "No method goes below the noise. M also rings in J3 and J4, which no state predicts."
     return TextTable(title, ["tested on", *JOINTS], rows, note)
 
 

@@ -1,4 +1,4 @@
-"""Our way beside the networks: an arm's model, effects found by search, a network on the rest.
+"""Our method: an arm's model, effects found by search, and a network on the residual.
 
 Everything is causal, as the networks are: friction's memory is walked along the measured path, and
 velocity and acceleration are those of a polynomial through past positions, at its end. What the
@@ -33,8 +33,8 @@ SETTLE = 100
 """Samples at the start of a run that are not fitted: slip elements have not slipped yet."""
 
 WINDOW, DEGREE = 15, 4
-"""Past samples that velocity and acceleration come from, and the degree of their polynomial. Taken
-at its end, they hardly trail: differences of past velocities do, which shows as late torque."""
+"""Past samples that velocity and acceleration come from, and the degree of their polynomial. At
+its end, they barely lag; differences of past velocities lag, which shows as late torque."""
 
 CLOSED_RAD = 0.03
 """Angle below which the jaws touch."""
@@ -79,7 +79,7 @@ def base_columns(arm: Arm, run: PsmRun, motion: Motion) -> FloatArray:
 
 
 def base_block() -> Block:
-    """Return what is known of the declared columns: frictions are not negative."""
+    """Return the bounds of the declared columns: frictions are not negative."""
     names = base_of(PSM).names
     own = [name.startswith("F") and len(name) == 3 for name in names]
     signs = np.array([*own, False, False, True, True, False, False, *(False for _ in LEAKS)])
@@ -108,7 +108,7 @@ def of_moving_gripper() -> list[ArmEffect]:
     def drag(k: int) -> ArmEffect:
         return ArmEffect(
             f"gripper drag on J{k + 1}",
-            "friction of the moving gripper's cables, felt in a joint they run through",
+            "friction of the moving gripper's cables on a joint that they run through",
             lambda m: on_joint(np.tanh(m.velocity[:, [GRIPPER]] / DRAG_RAD_S), k, JOINTS),
         )
 
@@ -117,13 +117,13 @@ def of_moving_gripper() -> list[ArmEffect]:
 
 @dataclass(frozen=True)
 class Physics:
-    """A fitted arm: declared columns, the effects found, and networks on what they leave.
+    """A fitted arm: declared columns, the effects found, and networks on the residual.
 
     Attributes:
         arm: The arm with its instrument's nominal coupling.
         effects: What was found, in order.
         values: Parameters of the declared columns, then of the effects.
-        rest: Of each joint, the network on what is left; None where none helps.
+        rest: For each joint, the network on the residual; None where none improves it.
     """
 
     arm: Arm

@@ -2,8 +2,9 @@
 
 The arm's declared part is that of `rig.arm.simulated`. Its instrument's cables add what Zhang et
 al. 2022 report: a coupling matrix that is not quite the nominal one, friction that remembers, and
-vibration of the moving gripper. Joint torque is what the motors show through the nominal matrix,
-A_nominal^-T A_true^T tau (`rig.grasper.coupling` tells the erratum of the paper's equation 4).
+vibration of the moving gripper. Joint torque is computed from the motors' torque with the nominal
+matrix, A_nominal^-T A_true^T tau (`rig.grasper.coupling` has the erratum of the paper's equation
+4).
 """
 
 from dataclasses import dataclass, replace
@@ -103,7 +104,7 @@ class Psm:
 
 @dataclass(frozen=True)
 class PsmRun:
-    """What the arm's sensors tell of a run.
+    """The readings of the arm's sensors in a run.
 
     Attributes:
         position: Measured positions, shape (n, 7), rad or m.
@@ -157,15 +158,15 @@ def simulate(
     grip_n_m: FloatArray | None = None,
     lead: int = 0,
 ) -> PsmRun:
-    """Return what the sensors tell of a motion.
+    """Return the readings of the sensors in a motion.
 
     Args:
         psm: The arm.
         motion: Its motion, shape (n, 7).
         rng: For the noise.
         wrench: Spatial wrench of the tip on its surroundings, shape (n, 6); None in free space.
-        grip_n_m: Torque of the gripper on what it holds, shape (n,); None where it holds nothing.
-        lead: Samples at the start that are not told: they leave the cables in their state.
+        grip_n_m: Torque of the gripper on the object, shape (n,); None without an object.
+        lead: Samples at the start that are discarded: they bring the cables to their initial state.
     """
     joints = np.zeros((len(motion), JOINTS))
     joints[:, :GRIPPER] = _declared(psm.arm.values, motion)
@@ -212,7 +213,7 @@ def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _cables(psm: Psm, wrist: FloatArray) -> FloatArray:
-    """Return what the friction of the instrument's motors shows as joint torque, shape (n, 4)."""
+    """Return the joint torque by the friction of the instrument's motors, shape (n, 4)."""
     motors = wrist @ np.linalg.inv(psm.true_coupling).T
     friction = psm.cable_n_m * dahl(motors, np.full(4, CABLE_SLIP_RAD))
     shown: FloatArray = friction @ np.linalg.inv(psm.nominal_coupling)

@@ -1,4 +1,4 @@
-"""Grasps of the simulated seven-joint arm: what is held, how the arm moves, what a sensor tells.
+"""Grasps of the simulated seven-joint arm: object, motion and force sensor.
 
 Every run begins with free motion, from which the arm comes to its pose, so that cables are in a
 state that history explains. Zhang et al. 2022 hold a force-sensing resistor; here it has errors of
@@ -66,7 +66,7 @@ class Grasp:
         return force
 
     def sensed(self, force: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return what a force-sensing resistor tells of a force, N."""
+        """Return the reading of a force-sensing resistor for a force, N."""
         gain = 1 + SENSOR_GAIN * rng.normal()
         late = SENSOR_HYSTERESIS_N * dahl(force[:, None], np.array([0.5]))[:, 0]
         told: FloatArray = gain * force + late + SENSOR_NOISE_N * rng.normal(size=len(force))

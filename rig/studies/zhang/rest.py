@@ -1,8 +1,9 @@
-"""The small network on what our model of a seven-joint arm leaves.
+"""The small network on the residual of our model of a seven-joint arm.
 
-What is left is mostly friction's memory: springs that slip tell it only nearly. A network that
-sees only where a joint is and how fast it goes cannot know it, so each network sees the stretches
-of such springs too, of the joint itself or, in the wrist, of the motors behind the coupling.
+The residual is mostly friction with memory, which presliding springs model only approximately.
+It does not follow from a joint's position and velocity alone, so the inputs of each network include
+the deflections of such springs too, of the joint itself or, in the wrist, of the motors behind the
+coupling.
 """
 
 from collections.abc import Sequence
@@ -28,8 +29,8 @@ HELD_OUT = 6
 """Every so many pieces of the samples choose the step, and whether the network is kept."""
 
 LEAST_GAIN = 0.1
-"""Share of the squared rest on those pieces that a network must take away to be kept. Below, it
-fits the pieces' noise: the rest then holds nothing that these states tell."""
+"""Share of the squared residual on those segments that a network must remove to be kept. Below,
+it fits noise: the residual does not depend on these states."""
 
 
 def rest_rows(arm: Arm, joint: int, motion: Motion) -> FloatArray:
@@ -54,11 +55,11 @@ def rest_rows(arm: Arm, joint: int, motion: Motion) -> FloatArray:
 
 
 def rest_network(rows: FloatArray, left: FloatArray) -> Network | None:
-    """Return a network on what a model leaves; None where it helps little on pieces held out.
+    """Return a network on a model's residual; None where it improves held-out segments too little.
 
     Args:
         rows: Its inputs, shape (n, inputs).
-        left: What is left, shape (n,).
+        left: Residual, shape (n,).
     """
     piece = np.arange(len(rows)) * 3 * HELD_OUT // len(rows)
     out = piece % HELD_OUT == HELD_OUT - 1

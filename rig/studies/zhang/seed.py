@@ -23,7 +23,7 @@ STREAM = 20220
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one arm gives.
+    """Results of one arm.
 
     Attributes:
         cells: Its errors.

@@ -79,7 +79,7 @@ class ZhangStudy:
         return middle
 
     def near(self, condition: str) -> list[bool | None]:
-        """Say of each of the paper's numbers whether its method lands near it here.
+        """Return for each of the paper's numbers whether its method comes near it here.
 
         The median over the seeds counts; None where the paper's number is not known.
         """
@@ -90,7 +90,7 @@ class ZhangStudy:
         ]
 
     def near_in_contact(self) -> tuple[bool, bool, bool]:
-        """Say whether force, moment (by either of its numbers) and grasp land near the paper's."""
+        """Whether force, moment (by either of its numbers) and grasp land near the paper's."""
         force, moment, grasp = worst_axes(self.median(f"contact | wrench, grasp | {NETWORKS}"))
         return (
             abs(force / PAPER_FORCE_N - 1) <= WITHIN,
@@ -113,7 +113,7 @@ def run_zhang(
     """Do the study on arms of several seeds, from 0.
 
     Args:
-        seeds: How many.
+        seeds: Number of seeds.
         state: Folder where the outcome of each seed is kept.
         workers: Processes; each does one seed on one core.
         on_seed: Called after each seed, also after one that was kept.

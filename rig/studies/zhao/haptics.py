@@ -1,6 +1,6 @@
 """Haptic experiments of Zhao and Nelson 2016, section 4: stiffness from angle and estimated force.
 
-Three materials are told apart, and a stiff inclusion is found among seven places, three grasps
+Three materials are distinguished, and a stiff inclusion is found among seven places, three grasps
 each. Stiffness is the slope of estimated force over joint angle while the grasp closes. Friction
 adds to that slope, to all places alike, so the answer does not need it declared; its size does.
 """
@@ -62,7 +62,7 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Answer:
-    """What one method says.
+    """The result of one method.
 
     Attributes:
         method: Name of the method.
@@ -87,7 +87,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Answers:
-    """What the methods say of one grasper, in the order of `run_haptics`."""
+    """The results of the methods on one grasper, in the order of `run_haptics`."""
 
     answers: tuple[Answer, ...]
 

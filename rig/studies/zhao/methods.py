@@ -35,7 +35,7 @@ ToForce = Callable[[Recording], FloatArray]
 
 @dataclass(frozen=True)
 class Lacking:
-    """What the diagnosis says a degree of freedom's model lacks.
+    """The effects that the diagnosis finds missing in a degree of freedom's model.
 
     Attributes:
         findings: Family and verdict of each finding.
@@ -129,7 +129,7 @@ def calibration_runs(dof: str, axes: Axes, seed: int, repeats: int = 2) -> list[
 
 
 def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
-    """Return what the diagnosis finds missing in the declared model on a grasper's runs."""
+    """Return the effects that the diagnosis identifies on a grasper's runs."""
     runs = calibration_runs(dof, axes, seed, repeats)
     model = declared(dof)
     diagnosis, stories = diagnose(runs, [model], split(runs, seed))
@@ -197,7 +197,7 @@ def slope(dof: str, axes: Axes, method: CurrentForce, seed: int) -> float:
 def outcome(
     dof: str, tests: Mapping[str, Sequence[Recording]], estimate: ToForce, arm_m: float
 ) -> Outcome:
-    """Return what a method gives on the runs that are reported."""
+    """Return the result of a method on the reported runs."""
     errors, delays = [], []
     for kind, runs in tests.items():
         of_kind = []

@@ -40,7 +40,7 @@ def lead(study: Study) -> str:
 
 
 def notes(study: Study) -> list[str]:
-    """Return what a reader must know before comparing."""
+    """Return remarks for a comparison."""
     found = []
     for dof, lacking in study.lacking.items():
         said = ", ".join(f"{family} ({verdict})" for family, verdict in lacking.findings)
@@ -56,13 +56,13 @@ def notes(study: Study) -> list[str]:
         " state the order of its 3 Hz filter; 2 is used. Each method is calibrated on other runs"
         " than it is reported on.",
         "Ours: the declared model (torque constant, offset) with the effects that the diagnosis"
-        f" named on a grasper that is not reported (seed {LOOKED_AT}), fitted on runs whose objects"
-        f" differ, low-passed at {FILTER.cutoff_hz:g} Hz on both sides of the balance, causal, and"
-        " brought up to date by the angle.",
-        f"The diagnosis found missing: {'; '.join(found)}.",
+        f" found on a grasper that is not reported (seed {LOOKED_AT}), fitted on runs whose objects"
+        f" differ, low-passed at {FILTER.cutoff_hz:g} Hz on both sides of the equation, causal, and"
+        " compensated for lag by the angle.",
+        f"Effects found by the diagnosis: {'; '.join(found)}.",
         "The catalogue's bearing and the simulated one share their form: both lose a share of the"
-        " load behind them and let go of a part of it. On a real grasper the form may be another,"
-        " and less may be gained.",
+        " downstream load and relax by a part of it. On a real grasper the form may differ,"
+        " and the gain may be smaller.",
     ]
 
 

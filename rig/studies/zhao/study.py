@@ -80,7 +80,7 @@ class Grasper:
 
 @dataclass(frozen=True)
 class Looked:
-    """What the diagnosis said of one degree of freedom, as it is kept."""
+    """The stored result of the diagnosis of one degree of freedom."""
 
     findings: tuple[tuple[str, str], ...]
     terms: tuple[Mapping[str, Any], ...]

@@ -134,7 +134,7 @@ def test_limits_are_checked_by_name():
 
 def test_a_wrist_whose_cables_would_leave_their_pulleys_is_refused():
     wide = Limits.degrees((-170, 170), (-60, 60), (-60, 60))
-    with pytest.raises(GrasperError, match="leaves pulley"):
+    with pytest.raises(GrasperError, match="lifts off pulley"):
         planetary_grasper(PATH, limits=wide)
     modest = Limits.degrees((-60, 60), (-60, 60), (-60, 60))
     assert planetary_grasper(PATH, limits=modest).limits is modest

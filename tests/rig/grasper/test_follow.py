@@ -86,7 +86,7 @@ def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potent
     np.testing.assert_allclose(axes, HERE + axes_of_joints(0.5 * (joints - joints[0])), atol=1e-12)
 
 
-def test_a_master_that_sends_nothing_is_told(potentiometers):
+def test_a_silent_master_is_reported(potentiometers):
     potentiometers.stop()
     with pytest.raises(LinkTimeoutError, match="sent nothing"):
         next(setpoints(potentiometers, CHIEF, HERE, 1.0))
@@ -146,7 +146,7 @@ def test_a_broken_wire_disarms_the_motors(link, monkeypatch, tmp_path):
     assert not is_armed(link.board, GRASPER)
 
 
-def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
+def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
     pieces = []
 
     def asked(*given):
@@ -166,7 +166,7 @@ def test_ctrl_c_leaves_with_the_motors_out_of_force(link, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("config", "url", "said"),
     [
-        ("simulated", None, "is no grasper"),
+        ("simulated", None, "is not a grasper"),
         ("bench", None, "Where is the master"),
         ("bench", "sim://", "simulated master"),
     ],

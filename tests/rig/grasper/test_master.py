@@ -12,7 +12,7 @@ from rig.grasper.master import Master, master_of
 
 
 def configured(**master):
-    return load_config(Path("grasper")).changed(master=master)
+    return load_config(Path("grasper")).changed(machine={"master": master})
 
 
 def test_zero_and_turn_of_each_potentiometer_are_the_configurations():

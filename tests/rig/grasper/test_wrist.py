@@ -64,7 +64,7 @@ def test_overlapping_pulleys_are_refused():
     assert PATH.interference() == []
 
 
-def test_a_cable_that_leaves_its_pulley_is_refused():
+def test_a_cable_that_lifts_off_its_pulley_is_refused():
     with pytest.raises(GrasperError, match="leaves pulley 1"):
         PATH.length_m(-1.5, 0.0)
     with pytest.raises(GrasperError, match="leaves pulley 2"):

@@ -142,7 +142,7 @@ def test_a_sidecar_maps_and_scales_other_names(save):
         ("scale = -0.5", 'scale = "x"', "does not map"),
         ("scale = -0.5", "gain = 2", "does not map"),
         ("[conditions]", "[condition]", "does not map"),
-        ("[conditions]", "[conditions", "is no TOML"),
+        ("[conditions]", "[conditions", "is not valid TOML"),
     ],
 )
 def test_a_wrong_sidecar_is_refused(save, old, new, message):

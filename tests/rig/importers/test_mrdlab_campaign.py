@@ -21,7 +21,7 @@ FOLDERS = ("Tool_4_Maryland_L_Pitch_1", "Tool_4_Maryland_L_Roll_1")
 
 @pytest.fixture
 def one(tmp_path, make_log) -> Path:
-    """A folder of three logs and the texts that lie beside them."""
+    """A folder of three logs and their text files."""
     folder = tmp_path / "Tool_4_Maryland_L_4"
     folder.mkdir()
     for stem in ("10", "00", "01"):

@@ -34,7 +34,7 @@ class AcmeImporter:
 
 @pytest.fixture
 def installed(monkeypatch):
-    """Install entry points beside the project's own, as a package would."""
+    """Install entry points in addition to the project's own, as a package would."""
 
     def _install(**values):
         entries = [EntryPoint(n, v, "rig.importers") for n, v in {**OWN, **values}.items()]
@@ -65,7 +65,7 @@ def test_a_third_party_format_opens_by_its_entry_point(installed, tmp_path):
     [
         ("acme_gone:IMPORTER", "cannot be loaded: No module named 'acme_gone'"),
         ("acme_rig:GONE", "cannot be loaded"),
-        ("acme_rig:NOTHING", "is no importer"),
+        ("acme_rig:NOTHING", "is not an importer"),
     ],
 )
 def test_an_entry_point_that_does_not_load_is_named(installed, value, message):
@@ -74,7 +74,7 @@ def test_an_entry_point_that_does_not_load_is_named(installed, value, message):
         importers()
 
 
-def test_each_format_is_told_from_the_others(installed, tmp_path, make_log):
+def test_each_format_is_distinguished_from_the_others(installed, tmp_path, make_log):
     from scipy.io import savemat
 
     installed()
@@ -88,7 +88,7 @@ def test_each_format_is_told_from_the_others(installed, tmp_path, make_log):
     assert [n for n, i in importers().items() if i.recognises(tmp_path)] == ["dvrk-psm", "mrdlab"]
 
 
-def test_what_no_importer_knows_is_refused_with_the_list(installed, tmp_path):
+def test_an_unknown_format_is_refused_with_the_list(installed, tmp_path):
     installed()
     path = tmp_path / "run.xyz"
     path.write_text("?")

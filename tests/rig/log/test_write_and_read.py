@@ -35,7 +35,7 @@ def times(count, first=0):
 
 
 class Clock:
-    """A clock that stands still until it is told to move."""
+    """A clock that stands still until it is moved."""
 
     def __init__(self):
         self.now_s = 100.0

@@ -1,0 +1,96 @@
+"""Cases whose rig, protocol and hidden forms are all drawn at random (`rig.simulation.varied`)."""
+
+import itertools
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.diagnosis import scoring
+from benchmarks.diagnosis.case import KINDS, Case, Judgement, Report, write_recordings
+from benchmarks.diagnosis.seeds import BLOCK
+from benchmarks.diagnosis.truths import same_on_one_rig
+from estimation.files import write_text_atomic
+from rig.simulation.varied import Case as Drawn
+from rig.simulation.varied import draw
+
+
+def cases(
+    seed: int, counts: Mapping[str, int], kept: Path, gear_ratio: float | None = None
+) -> Iterator[Case]:
+    """Yield the cases of a block of seeds, the classes in turn.
+
+    Args:
+        seed: First seed of the block.
+        counts: Cases of each class, at most a block.
+        kept: Folder where the answers are kept: to draw a case takes seconds.
+        gear_ratio: One gear ratio for all rigs, for a version that derives channels with one ratio.
+    """
+    of_kind = [[seed + k for k in range(min(counts.get(kind, 0), BLOCK))] for kind in KINDS]
+    for turn in itertools.zip_longest(*of_kind):
+        for kind, one in zip(KINDS, turn, strict=True):
+            if one is not None:
+                yield _case(_Lazy(one, kind, gear_ratio, kept))
+
+
+@dataclass(frozen=True)
+class _Lazy:
+    """A case that is drawn when it is needed."""
+
+    seed: int
+    kind: str
+    gear_ratio: float | None
+    kept: Path
+
+    @property
+    def name(self) -> str:
+        ratio = "" if self.gear_ratio is None else f"-ratio-{self.gear_ratio:g}"
+        return f"{self.kind}-{self.seed}{ratio}"
+
+    @cached_property
+    def drawn(self) -> Drawn:
+        return draw(self.seed, self.kind, gear_ratio=self.gear_ratio)
+
+    def truth(self) -> scoring.Truth:
+        path = self.kept / f"{self.name}.json"
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_text_atomic(path, json.dumps(_described(self.drawn)))
+        content = json.loads(path.read_text())
+        hidden = [scoring.Hidden(*effect) for effect in content["hidden"]]
+        return scoring.Truth(self.kind, hidden, content["runs"], content["either"])
+
+    def write(self, folder: Path) -> None:
+        write_recordings(folder, self.drawn.recordings)
+
+    def write_without(self, folder: Path) -> None:
+        write_recordings(folder, self.drawn.twin.evidence)
+
+    def judge(self, report: Report) -> Judgement:
+        return scoring.judge(self.truth(), report)
+
+
+def _case(lazy: _Lazy) -> Case:
+    without = None if lazy.kind == "clean" else lazy.write_without
+    return Case(lazy.name, lazy.kind, lazy.write, lazy.judge, without)
+
+
+def _described(drawn: Drawn) -> dict[str, object]:
+    """Return what is hidden, as `scoring.Truth` has it."""
+    truth = drawn.truth
+    plans = drawn.stage.plans
+    hidden = []
+    for place, effect in enumerate(truth.effects):
+        shown = [
+            equation
+            for equation, columns in truth.columns.items()
+            if any(np.any(run[:, place]) for run in columns)
+        ]
+        outside = effect.family == "unknown"
+        groups = [sorted(same_on_one_rig(word)) for word in effect.variables] if outside else []
+        hidden.append([[effect.family, *effect.synonyms], shown, groups])
+    runs = sorted({plans[k].name for effect in truth.effects for k in effect.runs})
+    return {"hidden": hidden, "runs": runs, "either": list(truth.together)}
