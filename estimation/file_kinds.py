@@ -19,6 +19,8 @@ SVG = "a figure (SVG)"
 MARKDOWN = "a Markdown file"
 C_HEADER = "a C header"
 CSV = "a table (CSV)"
+PARQUET = "a table (Parquet)"
+ARRAYS = "arrays (.npz)"
 ESTIMATOR = "an estimator (.npz)"
 
 MAGIC = {
@@ -26,7 +28,7 @@ MAGIC = {
     b"\x89PNG\r\n": "a picture (PNG)",
     b"\x89HDF\r\n": "an HDF5 file",
     b"%PDF": "a PDF file",
-    b"PAR1": "a table (Parquet)",
+    b"PAR1": PARQUET,
     b"MATLAB 5": "a MATLAB file",
     b"\x1f\x8b": "a compressed file (gzip)",
     b"\xfd7zXZ": "a compressed file (xz)",
@@ -71,7 +73,7 @@ def _kind_of_archive(content: bytes) -> str:
         return "a damaged archive"
     if "schema.npy" in names:
         return ESTIMATOR
-    return "arrays (.npz)" if all(n.endswith(".npy") for n in names) else "an archive (zip)"
+    return ARRAYS if all(n.endswith(".npy") for n in names) else "an archive (zip)"
 
 
 def _kind_of_text(text: str) -> str:

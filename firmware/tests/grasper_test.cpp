@@ -19,13 +19,14 @@ constexpr std::int32_t kTop = std::numeric_limits<std::int32_t>::max();
 // The body of an arm command: gains, limits that nothing crosses, then what the test changes.
 struct Arming {
     double gains[3][5] = {{2, 0, 0, 1, 5000}, {2, 0, 0, 1, 5000}, {2, 0, 0, 1, 5000}};
-    std::int32_t limits[3][9] = {};
+    std::int32_t limits[3][18] = {};
     std::int32_t choice[6] = {kTop, kTop, kTop, 50000, 0, 0};
 
     Arming() {
         for (auto& axis : limits) {
             for (std::int32_t& limit : axis) limit = kTop;
             axis[2] = -kTop - 1;
+            axis[12] = axis[13] = 0;  // current and command are not compared
         }
     }
 
@@ -135,7 +136,7 @@ TEST_CASE("a board starts with all motors off, 0 A asked of each, and ticks at 2
     CHECK(board.duties[wiring::kSetPin[2]] == 2048);
 }
 
-TEST_CASE("what is wired to a motor is read with it, and one that is not ready reports no current") {
+TEST_CASE("what is wired to a motor is read with it, and one that is not ready tells no current") {
     rig::GrasperHardware grasper;
     grasper.begin();
     for (std::size_t k = 0; k < Profile::kMotors; ++k) {

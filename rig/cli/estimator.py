@@ -5,9 +5,15 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.help import GroupedHelp
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
-estimator_app = typer.Typer(help="Compare estimators.", no_args_is_help=True)
+estimator_app = typer.Typer(
+    help="Compare estimators.",
+    cls=GroupedHelp,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 
 
 @estimator_app.callback()

@@ -6,9 +6,9 @@ from typer.core import TyperGroup
 
 GROUPS = {
     "Begin": ("demo", "config", "doctor", "devices", "selftest", "udev", "firmware"),
-    "At the rig": ("live", "record", "grip", "stop", "calibrate", "cal", "grasper"),
+    "At the rig": ("live", "record", "grip", "stop", "clear", "calibrate", "cal", "grasper"),
     "Recordings": ("log", "replay"),
-    "Models": ("fit", "diagnose", "loop", "effects", "adapt", "export"),
+    "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, results
+from rig.output.console import JsonFlag, remarks, results
 
 
 def live(
@@ -65,6 +65,7 @@ def live(
 
     settings = chosen_rig(config, sim)
     refuse_problems(settings)
+    remarks().print(f"{settings.name}: starting ...")
     machine = machine_of(settings)
     if protocol is None and settings.is_simulated:
         protocol = machine.first_look(settings)

@@ -116,8 +116,12 @@ def repair(
 
 @log_app.command()
 def export(
-    path: OneLog,
-    format_name: Annotated[str, typer.Option("--format", help="csv, parquet or npz.")] = "csv",
+    path: Annotated[
+        Path, typer.Argument(help="A log; or a folder, for one table of all its runs.")
+    ],
+    format_name: Annotated[
+        str, typer.Option("--format", help="csv or parquet; of a single log npz, too.")
+    ] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
@@ -134,10 +138,20 @@ def export(
     store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Export a log, one file for each topic."""
+    """Export a log, one file for each topic; or a campaign as one table.
+
+    The table of a campaign (a folder or an archive of any format that is known) has a row a sample,
+    with its run and conditions. Parquet holds units, instrument, calibrations and notes as
+    metadata; beside a CSV they stand in NAME.csv.json.
+    """
     from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log
 
+    if path.is_dir() or not path.name.endswith((".mcap", ".part")):
+        if topic or calibration or record:
+            raise UsageError("--topic, --calibration and --record are of a single log.")
+        _export_campaign(path, format_name, out, force, json)
+        return
     known = [item.value for item in ExportFormat]
     if format_name not in known:
         raise UsageError(
@@ -153,6 +167,33 @@ def export(
     else:
         for target in written:
             results(json).print(f"wrote {target}")
+
+
+def _export_campaign(
+    path: Path, format_name: str, out: Path | None, force: bool, json: bool
+) -> None:
+    """Write all runs at a path as one table."""
+    from rig.cli.left_out import say_left_out
+    from rig.errors import UsageError
+    from rig.importers.registry import open_campaign
+    from rig.importers.tidy import TidyFormat, write_tidy
+
+    known = [item.value for item in TidyFormat]
+    if format_name not in known:
+        raise UsageError(
+            f"A campaign is not exported as {format_name!r}.",
+            fix=f"Choose one of {', '.join(known)}.",
+        )
+    campaign = open_campaign(path)
+    say_left_out(path, campaign)
+    if out is not None and out.is_dir():
+        out = out / f"{path.resolve().name}.{format_name}"
+    target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
+    written = write_tidy(campaign, target, TidyFormat(format_name), force)
+    if json:
+        emit_json({"written": [written], "runs": campaign.evidence.names})
+    else:
+        results(json).print(f"wrote {written}: {len(campaign.evidence)} runs")
 
 
 def _other_calibrations(

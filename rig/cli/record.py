@@ -48,7 +48,7 @@ def record(
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
+    from rig.errors import KNOWN_ERRORS, UsageError
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import (
@@ -95,6 +95,8 @@ def record(
             for result in record_campaign(session, todo, folder, notes=notes, on_progress=show):
                 done += result.expected
                 recorded.append(result)
+                if bar.disable:  # no terminal: a line a run in place of the bar
+                    screen.print(f"{len(recorded)}/{len(todo)} {result.name}")
                 if watch is not None and (news := watch.after(result.path)):
                     bar.console.print(news, style="yellow", markup=False)
                 if result.drifted or not result.complete:
@@ -102,6 +104,12 @@ def record(
                     bar.console.print(text, style="yellow", markup=False)
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
+        raise
+    except KNOWN_ERRORS:
+        screen.print(
+            f"{len(recorded)} of {len(todo)} runs are recorded. Go on, once it is put right, with: "
+            f"rig record --resume {folder}"
+        )
         raise
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     results(json).print(

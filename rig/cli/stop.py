@@ -56,7 +56,7 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
             logger.disarm()
     except (DriverError, RigError) as error:
         screen = remarks()
-        screen.print(f"{name}: UNKNOWN. Treat the motors as live; cut their supply by hand.")
+        screen.print(f"{name}: UNKNOWN. Treat the motors as live. Cut the motor supply by hand.")
         why = f"{_ended(ending)} {error.what} {error.why}".strip()
         for word, text in (("why", why), ("fix", error.fix)):
             screen.print(f"  {word}: {text}", markup=False)

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
+from estimation.file_kinds import ARRAYS, CSV, PARQUET
+from estimation.files import check_output
 from rig.errors import MissingExtraError, UsageError
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.recalibrate import recalibrated
@@ -61,6 +63,7 @@ def export_log(
 
     Raises:
         ExportExistsError: A file is there already and `force` is False; nothing is written then.
+        OutputError: A file cannot be written, or one of another kind is there.
         UsageError: The log has no such topic.
         MissingExtraError: Parquet, without pyarrow.
         DamagedLogError: The log is damaged.
@@ -78,6 +81,8 @@ def export_log(
         raise ExportExistsError(
             f"There is a file {taken[0]} already.", fix="Overwrite it with --force."
         )
+    for target in targets.values():
+        check_output(target, _KINDS[export_format])
     for name, target in targets.items():
         _write_atomically(_WRITERS[export_format], target, log.topics[name])
     return list(targets.values())
@@ -160,6 +165,9 @@ def _write_npz(path: Path, topic: Topic) -> None:
     with path.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **_columns(topic))
 
+
+_KINDS = {ExportFormat.CSV: CSV, ExportFormat.PARQUET: PARQUET, ExportFormat.NPZ: ARRAYS}
+"""What a file of each format is replaced by with `force`: its own kind."""
 
 _WRITERS: dict[ExportFormat, Callable[[Path, Topic], None]] = {
     ExportFormat.CSV: _write_csv,

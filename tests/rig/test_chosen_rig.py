@@ -31,6 +31,7 @@ NEED_A_RIG = [
     "selftest",
     "doctor",
     "stop",
+    "clear",
     "config show",
     "config check",
     "cal check",

@@ -1,10 +1,7 @@
 """Recipes of sensor faults: catalogue names, forms drawn anew each time."""
 
-from collections.abc import Callable
-
 import numpy as np
 
-from estimation.recording import FloatArray
 from rig.simulation.varied.drawn import Drawn, Ranges, Recipe, order_over
 from rig.simulation.varied.faults import Fault
 from rig.simulation.varied.forms import POINTS, Random, Table, course, grid, wave
@@ -72,7 +69,7 @@ def crosstalk(channel: str, source: str) -> Recipe:
     _, other, known = PLACES[source]
 
     def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        form: Callable[[FloatArray], FloatArray] = power(random, 0.8, 1.25)
+        form = power(random, 0.8, 1.25)
         table = ranges.sided(other, form, odd=True)
         if source == "jaw_angle_rad":  # an angle's zero is anywhere: over its range, not its sign
             table = ranges.table(other, np.linspace(-1.0, 1.0, POINTS))

@@ -9,28 +9,40 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
 
 from estimation.candidates import candidates
 from estimation.derived import CABLE_ANGLE, CABLE_LOAD, GEARBOX, MOTOR_LOAD, zero_phase_channels
+from estimation.effects import Remembering
 from estimation.model import Term
 from estimation.recording import FloatArray, Recording
 from rig.simulation.varied import residual
-from rig.simulation.varied.residual import EQUATIONS, EVERY, Fitted, Prepared
+from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared
 
-POINTS = 40
+POINTS = 25
 """Most points of a family's shapes that are tried."""
 
 ODDS = 6.0
 """Twice the logarithm of likelihoods that noise leaves open: odds of twenty to one."""
 
-FORM = 0.02
-"""Share of an effect's power that counts as its form, not as another cause."""
+FORM = 0.1
+"""Share of an effect's power that counts as its form, not as another cause: truths are bent, and
+the catalogue's form of the true family may leave as much."""
+
+STRIDE = 4
+"""One in so many samples of 1 kHz is walked over by a family with memory."""
+
+FREE = 0.5
+"""Share of itself by which a declared gain may change beside a family: one that takes the whole
+torque from another column is no explanation of this machine."""
 
 LONGEST_LAG = 60
 
 
 def reproducing(
     recordings: Sequence[Recording],
+    twin: Sequence[Prepared],
     runs: Sequence[Prepared],
     columns: Mapping[str, Sequence[FloatArray]],
     clean: Mapping[str, Fitted],
@@ -39,11 +51,13 @@ def reproducing(
     """Return the families that reproduce an effect to within the noise of these runs.
 
     Args:
-        recordings: The runs without noise, the effect on.
-        runs: The same, filtered.
+        recordings: The runs without noise and without the effect. Families take their channels from
+            these: where the effect is on, a reading that carries it would reproduce anything.
+        twin: The same, filtered.
+        runs: The runs without noise, the effect on, filtered.
         columns: Equation to the effect's true columns, one array (n, k) a run.
         clean: The declared equations fitted on noisy runs without the effect: what noise is.
-        known: The effect's own families: at least as good as the best of these is good enough.
+        known: The effect's own families, of which the first is always among the answer.
     """
     good: set[str] | None = None
     for equation in EQUATIONS:
@@ -57,13 +71,13 @@ def reproducing(
         base = np.concatenate(
             [residual.centred(_base(run, equation, clean[equation])) for run in runs]
         )
-        beyond = _left(base, whole)
+        gains = clean[equation].weights
+        beyond = _left(base, whole, gains)
         seen = ODDS * noise / count
         if beyond < 4.0 * seen:
             continue  # this equation does not show it
-        lefts = _lefts(recordings, runs, equation, base, whole)
-        own = min((lefts[f] for f in known if f in lefts), default=0.0)
-        enough = own + seen + FORM * beyond
+        lefts = _lefts(recordings, twin, equation, places, (base, whole, gains))
+        enough = seen + FORM * beyond
         fitting = {family for family, left in lefts.items() if left <= enough}
         good = fitting if good is None else good & fitting
     return tuple(sorted((good or set()) | set(known[:1])))
@@ -85,52 +99,79 @@ def _base(run: Prepared, equation: str, fitted: Fitted) -> FloatArray:
     if not fitted.widths:
         return middle
     wide = residual.columns_of(run, equation, [1.05 * w for w in fitted.widths])
-    moved = (wide - middle)[:, np.any(wide != middle, axis=0)]
-    return np.hstack([middle, moved])
+    sign = residual.sign_column(equation)
+    return np.hstack([middle, (wide - middle)[:, [sign]]])
 
 
-def _left(table: FloatArray, whole: FloatArray) -> float:
-    """Return the mean square that a least-squares fit leaves."""
+def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
+    """Return the mean square that a least-squares fit leaves, declared gains near their own.
+
+    Args:
+        table: Declared columns, the derivative by a width if there is one, a family's columns.
+        whole: What is fitted.
+        gains: Of the declared columns; each may change by `FREE` of itself.
+    """
     scale = np.sqrt(np.mean(table**2, axis=0)) + np.finfo(float).tiny
-    gram = (table / scale).T @ (table / scale) / len(whole)
-    right = (table / scale).T @ whole / len(whole)
-    weights = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
-    return float(max(np.mean(whole**2) - weights @ right, 0.0))
+    scaled = table / scale
+    gram = scaled.T @ scaled / len(whole)
+    right = scaled.T @ whole / len(whole)
+    most = np.full(len(scale), np.inf)
+    most[: len(gains)] = FREE * np.abs(gains) * scale[: len(gains)]
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-10 * values[-1]
+    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+    rotated = (vectors[:, kept].T @ right) / np.sqrt(values[kept])
+    weights = np.linalg.lstsq(root, rotated)[0]
+    if np.any(np.abs(weights) > most):
+        weights = optimize.lsq_linear(root, rotated, (-most - 1e-300, most + 1e-300)).x
+    left = np.mean(whole**2) - 2.0 * weights @ right + weights @ gram @ weights
+    return float(max(left, 0.0))
 
 
 def _lefts(
     recordings: Sequence[Recording],
     runs: Sequence[Prepared],
     equation: str,
-    base: FloatArray,
-    whole: FloatArray,
+    places: Sequence[NDArray[np.intp]],
+    fitted: tuple[FloatArray, FloatArray, FloatArray],
 ) -> dict[str, float]:
     """Return family to the least that its columns leave beside the declared ones."""
+    base, whole, gains = fitted
     model = residual.declared(equation)
     declared_ids = {term.effect.id for term in model.terms}
     terms = [
         term
         for term in candidates(equation, list(recordings[0].columns))
-        if term.effect.id not in declared_ids and term.effect.id != "sensor.offset"
+        if term.effect.id not in declared_ids
     ]
     names = list(dict.fromkeys(c for term in terms for c in term.channels.values()))
-    thin = [_channels(r, run, names) for r, run in zip(recordings, runs, strict=True)]
-    kept = [run.places[equation] // EVERY for run in runs]
+    whole_runs = [_channels(r, run, names) for r, run in zip(recordings, runs, strict=True)]
     found: dict[str, float] = {}
     for term in terms:
         for shape in _shapes(term):
             tables = [
-                residual.centred(term.columns(channels, shape)[at])
-                for channels, at in zip(thin, kept, strict=True)
+                residual.centred(_columns(term, shape, channels, at))
+                for channels, at in zip(whole_runs, places, strict=True)
             ]
-            left = _left(np.hstack([base, np.concatenate(tables)]), whole)
+            left = _left(np.hstack([base, np.concatenate(tables)]), whole, gains)
             family = term.effect.family
             found[family] = min(found.get(family, np.inf), left)
     return found
 
 
+def _columns(
+    term: Term, shape: Sequence[float], channels: Mapping[str, FloatArray], at: NDArray[np.intp]
+) -> FloatArray:
+    """Return a term's columns at some samples; one with memory walks over every few of them."""
+    if not isinstance(term.effect, Remembering):
+        return term.columns({c: channels[c][at] for c in term.channels.values()}, shape)
+    thin = {c: channels[c][::STRIDE] for c in term.channels.values()}
+    walked = term.columns(thin, shape)
+    return np.column_stack([np.interp(at / STRIDE, np.arange(len(w)), w) for w in walked.T])
+
+
 def _channels(recording: Recording, run: Prepared, names: Sequence[str]) -> dict[str, FloatArray]:
-    """Return a run's channels at every tenth sample; loads that others predict are as measured."""
+    """Return a run's channels; loads that others predict are as measured."""
     instead = {
         MOTOR_LOAD: run.channels["proximal_torque_n_m"],
         CABLE_LOAD: run.channels["proximal_torque_n_m"],
@@ -138,9 +179,8 @@ def _channels(recording: Recording, run: Prepared, names: Sequence[str]) -> dict
         GEARBOX: run.channels[GEARBOX],
     }
     others = [name for name in names if name not in instead and name not in run.channels]
-    filtered = zero_phase_channels(recording, others)
-    found = {name: filtered[name] for name in [*others, "time_s"]}
-    return {name: values[::EVERY] for name, values in {**run.channels, **found, **instead}.items()}
+    derived = zero_phase_channels(recording, [*others, "motor_angle_rad"]).columns
+    return {**run.channels, **{name: derived[name] for name in others}, **instead}
 
 
 def _shapes(term: Term) -> Iterator[tuple[float, ...]]:

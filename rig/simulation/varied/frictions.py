@@ -1,12 +1,18 @@
 """Recipes of losses at motor and spindle: catalogue names, forms drawn anew each time."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from estimation.recording import FloatArray
 from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
-from rig.simulation.varied.forms import Random, bend, course, falling, grid, rising, smooth
+from rig.simulation.varied.forms import Random, Table, bend, course, falling, grid, rising, smooth
 from rig.simulation.varied.hidden import BANK, Hidden
 from rig.simulation.varied.plant import Plant, over
+
+Form = Callable[[FloatArray], FloatArray]
+Drawer = Callable[[Random, Ranges], Table]
+"""Draws one factor of an effect over its variable's range."""
 
 WORDS = {"motor": "motor shaft", "spindle": "spindle"}
 LOADS = {"motor": "gear_torque", "spindle": "cable_torque"}
@@ -19,7 +25,7 @@ def level(plant: Plant, place: str) -> float:
     return torque / plant.ratio if place == "motor" else torque
 
 
-def power(random: Random, low: float, high: float):  # type: ignore[no-untyped-def]
+def power(random: Random, low: float, high: float) -> Form:
     """Return a bent power of a size on the unit range, with its exponent drawn."""
     exponent, factor = random.uniform(low, high), bend(random)
 
@@ -29,11 +35,11 @@ def power(random: Random, low: float, high: float):  # type: ignore[no-untyped-d
     return form
 
 
-def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: object) -> Recipe:
+def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:
     """Return a recipe of friction whose level is a product of tables drawn by functions."""
 
     def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        made = tuple(table(random, ranges) for table in tables)  # type: ignore[operator]
+        made = tuple(table(random, ranges) for table in tables)
         dwell = over(random, 0.2, 1.5), over(random, 0.02, 0.3)
         part = Hidden(place, "table", made, friction=True, dwell_s=dwell)
         return Drawn(WORDS[place], family, variables, part, level(plant, place))
@@ -41,21 +47,21 @@ def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: object
     return recipe
 
 
-def slow(place: str):  # type: ignore[no-untyped-def]
+def slow(place: str) -> Drawer:
     """Return what draws a level that falls with the size of the speed."""
 
-    def table(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+    def table(random: Random, ranges: Ranges) -> Table:
         return ranges.way(f"{place}_way", falling(random, grid() / random.uniform(0.05, 0.3)))
 
     return table
 
 
-def loaded(place: str):  # type: ignore[no-untyped-def]
+def loaded(place: str) -> Drawer:
     """Return what draws a level that grows with the load, of either sign."""
     return lambda random, ranges: ranges.sided(LOADS[place], power(random, 0.6, 1.7), odd=False)
 
 
-def along(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+def along(random: Random, ranges: Ranges) -> Table:
     """Draw a level that goes slowly with the spindle's angle."""
     forms = (
         rising(random),
@@ -66,7 +72,7 @@ def along(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
     return ranges.table("spindle_angle", form - form.min())
 
 
-def fading(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+def fading(random: Random, ranges: Ranges) -> Table:
     """Draw a level that fades or grows with time, in each run or over the campaign."""
     clock = "campaign_time" if random.random() < 0.4 else "run_time"
     form = course(random, grid())
@@ -74,19 +80,26 @@ def fading(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
     return ranges.table(clock, form.max() - form if random.random() < 0.6 else form)
 
 
-def stepping(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+def fading_within(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that goes towards another one in each run."""
+    time = random.uniform(0.15, 0.8)
+    form = (1.0 - np.exp(-grid() / time)) * bend(random, 0.15)
+    return ranges.table("run_time", form.max() - form if random.random() < 0.5 else form)
+
+
+def stepping(random: Random, ranges: Ranges) -> Table:
     """Draw a level that comes at one moment of each run or of the campaign."""
     clock = "campaign_time" if random.random() < 0.4 else "run_time"
     sharp = random.uniform(0.002, 0.015)
     return ranges.table(clock, 0.5 + 0.5 * np.tanh((grid() - random.uniform(0.3, 0.7)) / sharp))
 
 
-def rested(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+def rested(random: Random, ranges: Ranges) -> Table:
     """Draw a level that grows with rest."""
     return ranges.table("dwell", rising(random))
 
 
-def sided_share(random: Random, ranges: Ranges):  # type: ignore[no-untyped-def]
+def sided_share(random: Random, ranges: Ranges) -> Table:
     """Draw a factor that differs by the direction of the spindle."""
     share, width = random.uniform(0.15, 0.4), random.uniform(0.01, 0.05)
     return ranges.table(
@@ -188,3 +201,11 @@ def _recipes() -> dict[str, Recipe]:
 
 
 FRICTIONS = _recipes()
+
+WITHIN: dict[str, Recipe] = {
+    f"friction.warmup {place} within": rubbing(
+        place, "friction.warmup", ("time", "velocity_sign"), fading_within
+    )
+    for place in WORDS
+}
+"""Frictions of which runs that all load alike show no more than that they go with time."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
 from rig.simulation.varied.forms import Random, Table, falling, grid, smooth, spots
-from rig.simulation.varied.frictions import LOADS, WORDS, level, loaded, rubbing
+from rig.simulation.varied.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
 from rig.simulation.varied.hidden import Hidden
 from rig.simulation.varied.plant import Plant
 
@@ -25,7 +25,7 @@ def pushed(random: Random, ranges: Ranges) -> Table:
     return Table("acceleration", -size, size, values if random.random() < 0.5 else 1.0 - values)
 
 
-def windowed(place: str):  # type: ignore[no-untyped-def]
+def windowed(place: str) -> Drawer:
     """Return what draws a level that is there at some loads only."""
 
     def table(random: Random, ranges: Ranges) -> Table:

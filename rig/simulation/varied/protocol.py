@@ -135,7 +135,7 @@ def _shape(random: Random, duration_s: float) -> FloatArray:
     """Return how the load goes with time in every run where it confounds, 0.2 to 1."""
     t = trajectory.times(duration_s) / duration_s
     time = random.uniform(0.2, 0.8)
-    kinds = (1.0 - np.exp(-t / time), t, t / (t + time), t**2)
+    kinds = (1.0 - np.exp(-t / time), t, t / (t + time))
     form = kinds[int(random.integers(len(kinds)))]
     return np.asarray(0.2 + 0.8 * form / form[-1])
 

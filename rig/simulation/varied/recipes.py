@@ -6,7 +6,7 @@ from rig.simulation.varied.broken import BROKEN
 from rig.simulation.varied.drawn import Recipe
 from rig.simulation.varied.drives import DRIVES
 from rig.simulation.varied.forms import Random
-from rig.simulation.varied.frictions import FRICTIONS
+from rig.simulation.varied.frictions import FRICTIONS, WITHIN
 from rig.simulation.varied.outside import OUTSIDE
 
 KINDS = ("strong", "weak", "pair", "outside", "some_runs", "confounded", "clean")
@@ -22,7 +22,7 @@ STRENGTHS = {
 """Kind to the strength of each of its effects, see `rig.simulation.varied.strength`."""
 
 CATALOGUED: Mapping[str, Recipe] = {**FRICTIONS, **DRIVES, **BROKEN}
-RECIPES: Mapping[str, Recipe] = {**CATALOGUED, **OUTSIDE}
+RECIPES: Mapping[str, Recipe] = {**CATALOGUED, **WITHIN, **OUTSIDE}
 
 CONFOUNDING = {
     "load_position": (
@@ -30,14 +30,11 @@ CONFOUNDING = {
         "friction.load spindle",
         "friction.position motor",
         "friction.position spindle",
-        "spring.position motor",
-        "spring.position spindle",
     ),
     "load_time": (
         "friction.load motor",
         "friction.load spindle",
-        "friction.warmup motor",
-        "friction.warmup spindle",
+        *WITHIN,
     ),
 }
 """Load of a protocol that confounds to what is hidden under it."""

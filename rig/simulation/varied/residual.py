@@ -24,6 +24,9 @@ EVERY = 10
 WIDTHS = tuple(float(x) for x in np.geomspace(2e-3, 0.6, 14))
 """Widths of a friction's sign that are tried, shares of the usual fast speed."""
 
+FINER = 9
+"""Widths that are tried between the neighbours of the best one."""
+
 
 @cache
 def declared(equation: str) -> Model:
@@ -119,47 +122,69 @@ def centred(values: FloatArray) -> FloatArray:
 def fit(runs: Sequence[Prepared], equation: str, added: Sequence[FloatArray] = ()) -> Fitted:
     """Fit a declared equation, each run with an offset of its own.
 
+    The width of a friction's sign is searched on a grid, then on a finer one about its best: all
+    other columns are taken out of the sign's and of the target once, so that a width costs little.
+
     Args:
         runs: The runs.
         equation: The equation.
         added: Columns beside the declared ones, one array (n, k) a run, filtered, at the full rate.
     """
-    target = [centred(r.channels[declared(equation).target][r.places[equation]]) for r in runs]
-    beside = [centred(a[r.places[equation]]) for a, r in zip(added, runs, strict=False)]
-    whole = np.concatenate(target)
-    best: tuple[float, tuple[float, ...], FloatArray, FloatArray] | None = None
-
-    def tried(widths: tuple[float, ...]) -> float:
-        nonlocal best
-        tables = [centred(columns_of(r, equation, widths)) for r in runs]
-        if beside:
-            tables = [np.hstack(pair) for pair in zip(tables, beside, strict=True)]
-        table = np.concatenate(tables)
-        scale = np.sqrt(np.mean(table**2, axis=0)) + np.finfo(float).tiny
-        gram = (table / scale).T @ (table / scale)
-        right = (table / scale).T @ whole
-        weights = np.linalg.lstsq(gram, right, rcond=1e-12)[0] / scale
-        left = whole - table @ weights
-        loss = float(left @ left)
-        if best is None or loss < best[0]:
-            best = (loss, widths, weights, left)
-        return loss
-
+    parts = [r.channels[declared(equation).target][r.places[equation]] for r in runs]
+    target = np.concatenate([centred(part) for part in parts])
+    beside = [a[r.places[equation]] for a, r in zip(added, runs, strict=False)]
     speed = _friction_speed(equation)
-    if speed is None:
-        tried(())
-    else:
-        fast = float(
-            np.percentile(np.abs(np.concatenate([r.channels[speed][::EVERY] for r in runs])), 95)
-        )
-        losses = [tried((share * fast,)) for share in WIDTHS]
-        at = int(np.argmin(losses))
-        near = WIDTHS[max(at - 1, 0)], WIDTHS[min(at + 1, len(WIDTHS) - 1)]
-        for share in np.geomspace(*near, 7)[1:-1]:
-            tried((float(share) * fast,))
-    assert best is not None  # noqa: S101 - one is tried at least
-    cuts = np.cumsum([len(y) for y in target])[:-1]
-    return Fitted(equation, best[1], best[2], tuple(np.split(best[3], cuts)))
+    widths: tuple[float, ...] = ()
+    if speed is not None:
+        fixed = _centred_table(runs, equation, (1.0,), beside, sign_column(equation))
+        basis = np.linalg.qr(fixed / (np.sqrt(np.mean(fixed**2, axis=0)) + 1e-300))[0]
+        speeds = [r.channels[speed][r.places[equation]] for r in runs]
+        fast = float(np.percentile(np.abs(np.concatenate(speeds)), 95))
+        best = _best_share(WIDTHS, speeds, fast, basis, target)
+        near = WIDTHS[max(best - 1, 0)], WIDTHS[min(best + 1, len(WIDTHS) - 1)]
+        finer = [float(x) for x in np.geomspace(*near, FINER)]
+        widths = (finer[_best_share(finer, speeds, fast, basis, target)] * fast,)
+    table = _centred_table(runs, equation, widths, beside)
+    scale = np.sqrt(np.mean(table**2, axis=0)) + np.finfo(float).tiny
+    scaled = table / scale
+    weights = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ target, rcond=1e-12)[0] / scale
+    left = target - table @ weights
+    cuts = np.cumsum([len(part) for part in parts])[:-1]
+    return Fitted(equation, widths, weights, tuple(np.split(left, cuts)))
+
+
+def _centred_table(
+    runs: Sequence[Prepared],
+    equation: str,
+    widths: Sequence[float],
+    beside: Sequence[FloatArray],
+    without: int | None = None,
+) -> FloatArray:
+    """Return all runs' columns, each run's mean removed, without one of the declared ones."""
+    tables = []
+    for k, run in enumerate(runs):
+        own = columns_of(run, equation, widths)
+        if without is not None:
+            own = np.delete(own, without, axis=1)
+        tables.append(centred(np.hstack([own, beside[k]]) if beside else own))
+    return np.concatenate(tables)
+
+
+def _best_share(
+    shares: Sequence[float],
+    speeds: Sequence[FloatArray],
+    fast: float,
+    basis: FloatArray,
+    target: FloatArray,
+) -> int:
+    """Return the place of the width, a share of the fast speed, that leaves the least."""
+    rest = target - basis @ (basis.T @ target)
+    gains = []
+    for share in shares:
+        sign = np.concatenate([centred(np.tanh(v / (share * fast))) for v in speeds])
+        own = sign - basis @ (basis.T @ sign)
+        gains.append(float(own @ rest) ** 2 / max(float(own @ own), 1e-300))
+    return int(np.argmax(gains))
 
 
 def left_with(runs: Sequence[Prepared], fitted: Fitted) -> tuple[FloatArray, ...]:
@@ -173,7 +198,14 @@ def left_with(runs: Sequence[Prepared], fitted: Fitted) -> tuple[FloatArray, ...
 
 
 def _friction_speed(equation: str) -> str | None:
+    """Return the speed whose sign an equation's friction takes; None without friction."""
     for term in declared(equation).terms:
         if term.effect.shape:
             return dict(term.channels)["speed"]
     return None
+
+
+def sign_column(equation: str) -> int:
+    """Return the place of the friction that takes a speed's sign among the declared columns."""
+    terms = [t for t in declared(equation).terms if t.effect.id != "sensor.offset"]
+    return next(k for k, term in enumerate(terms) if term.effect.shape)

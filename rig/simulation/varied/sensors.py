@@ -123,8 +123,7 @@ def read(
     chain: Chain,
     true: FloatArray,
     errors: Mapping[str, FloatArray],
-    noise: Sequence[int],
-    silent: bool = False,
+    noise: Sequence[FloatArray] | None,
 ) -> dict[str, FloatArray]:
     """Return what the sensors of a run read.
 
@@ -132,10 +131,8 @@ def read(
         chain: The sensors.
         true: What there is, columns as `READINGS`, shape (n, 6 or more).
         errors: Reading to what a faulty sensor adds to it, shape (n,).
-        noise: Seed of the run's noise.
-        silent: Without noise, zeros and steps of the converters.
+        noise: Of each sensor, from `noise_of`; None for none, and no steps of the converters.
     """
-    random = np.random.default_rng(list(noise))
     t = np.arange(len(true)) * TICK_S
     found = {}
     for k, (name, reading) in enumerate(zip(READINGS, chain.readings, strict=True)):
@@ -145,8 +142,8 @@ def read(
             values = np.interp(t - late_s, t, values)
         if reading.lag_s > 0.0:
             values = lagged(values, reading.lag_s)
-        if not silent:
-            values = values + _noise(random, reading, len(values))
+        if noise is not None:
+            values = values + noise[k]
             values = np.floor(values / reading.quantum + 0.5) * reading.quantum
         found[name] = values
     return found
@@ -157,6 +154,12 @@ def lagged(values: FloatArray, time_s: float) -> FloatArray:
     keep = np.exp(-TICK_S / time_s)
     start = np.array([keep * values[0]])
     return np.asarray(signal.lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
+
+
+def noise_of(chain: Chain, n: int, seed: Sequence[int]) -> tuple[FloatArray, ...]:
+    """Return noise and zero of each sensor in one run, shape (n,) each."""
+    random = np.random.default_rng(list(seed))
+    return tuple(_noise(random, reading, n) for reading in chain.readings)
 
 
 def _noise(random: Random, reading: Reading, n: int) -> FloatArray:

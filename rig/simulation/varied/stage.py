@@ -17,7 +17,7 @@ from rig.simulation.varied.hidden import MOST, Hidden, rows_of
 from rig.simulation.varied.plant import Controller, Plant, constants_of
 from rig.simulation.varied.protocol import LEAD_S, Plan, Protocol
 from rig.simulation.varied.residual import Prepared
-from rig.simulation.varied.sensors import READINGS, Chain, read
+from rig.simulation.varied.sensors import READINGS, Chain, noise_of, read
 
 EPOCH_NS = 1_700_000_000_000_000_000
 RATE_HZ = 1000.0
@@ -66,6 +66,8 @@ class Stage:
         plans: The runs.
         chain: The sensors.
         seed: Seed of the noise.
+        clean: Runs without effects that were played.
+        noise: Noise of runs that was drawn.
     """
 
     plant: Plant
@@ -75,6 +77,7 @@ class Stage:
     chain: Chain
     seed: int
     clean: dict[int, Moved] = field(default_factory=dict, repr=False)
+    noise: dict[int, tuple[FloatArray, ...]] = field(default_factory=dict, repr=False)
 
     def moved(self, index: int, switched: Sequence[Switched] = ()) -> Moved:
         """Return what the plant does in one run; kept where no effect moves it.
@@ -127,7 +130,9 @@ class Stage:
         plan, moved = self.plans[index], self.moved(index, switched)
         errors = self.errors(index, moved, switched)
         chain = self.chain.on_time if silent else self.chain
-        readings = read(chain, moved.true, errors, (self.seed, index), silent)
+        if index not in self.noise:
+            self.noise[index] = noise_of(self.chain, len(moved.true), (self.seed, index))
+        readings = read(chain, moved.true, errors, None if silent else self.noise[index])
         columns = {name: values[FIRST:] for name, values in readings.items()}
         limit = self.controller[1].limit_a
         columns["target_angle_rad"] = plan.setpoints[FIRST:, 0]
@@ -159,6 +164,11 @@ class Stage:
                 raise UnstableError(self.plans[k].name)
             found.append(run)
         return found
+
+    def forget(self) -> None:
+        """Drop what was kept to build it faster; it is made again when asked for."""
+        self.clean.clear()
+        self.noise.clear()
 
     @property
     def every(self) -> tuple[int, ...]:

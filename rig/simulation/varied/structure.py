@@ -73,12 +73,18 @@ def _shown_by_fault(
 
 
 def oracle(
-    runs: Sequence[Prepared], added: Mapping[str, Sequence[FloatArray]]
+    runs: Sequence[Prepared], added: Columns, declared: Mapping[str, Fitted]
 ) -> dict[str, Fitted]:
-    """Fit the declared equations with the true columns beside them."""
+    """Fit the equations with the true columns beside the declared ones.
+
+    Args:
+        runs: The runs.
+        added: From `columns`.
+        declared: Fits of the declared columns alone, which stand where there are no others.
+    """
     found = {}
     for equation in EQUATIONS:
-        there = [np.any(a) for a in added[equation]]
-        extra = added[equation] if any(there) else ()
-        found[equation] = residual.fit(runs, equation, extra)
+        there = any(np.any(a) for a in added[equation])
+        extra = added[equation]
+        found[equation] = residual.fit(runs, equation, extra) if there else declared[equation]
     return found

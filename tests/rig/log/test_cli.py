@@ -1,6 +1,7 @@
 """The verbs as they are typed."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 import typer
 
+from estimation.files import OutputError
 from estimation.recording import Recording
 from rig.cli.log import log_app
 from rig.configuration.config import load_config
@@ -138,6 +140,47 @@ def test_export(rig, log, tmp_path):
     rig("export", log, "--format", "npz", "--force")
     with pytest.raises(UsageError, match="csv, parquet, npz"):
         rig("export", log, "--format", "xls")
+
+
+@pytest.mark.parametrize("format_name", ["parquet", "csv"])
+def test_a_campaign_is_exported_as_one_table_with_units_and_conditions(rig, tmp_path, format_name):
+    from pyarrow import csv, parquet
+
+    folder, time_s = tmp_path / "campaign", np.arange(50) / 1000
+    folder.mkdir()
+    for k, name in enumerate(("a", "b", "bad")):
+        columns = {"motor_current_a": time_s + k} | ({"jaw_angle_rad": time_s} if k else {})
+        made = Recording(name, time_s, columns, conditions={"load_a": 0.1 * k, "object": "spring"})
+        excluded = "cable slipped" if name == "bad" else None
+        write_recording(folder / f"{name}.mcap", replace(made, excluded=excluded, notes="dry"))
+    code, _, err = rig("export", folder, "--format", format_name)
+    assert code == ExitCode.OK
+    assert "cable slipped" in err
+    path = tmp_path / f"campaign.{format_name}"
+    table = parquet.read_table(path) if format_name == "parquet" else csv.read_csv(path)
+    rows = table.to_pydict()
+    assert rows["run"] == ["a"] * 50 + ["b"] * 50
+    assert rows["condition_load_a"] == [0.0] * 50 + [0.1] * 50
+    np.testing.assert_array_equal(rows["motor_current_a"], [*time_s, *(time_s + 1)])
+    assert np.isnan(np.array(rows["jaw_angle_rad"], float)).sum() == 50
+    if format_name == "parquet":
+        about = json.loads(table.schema.metadata[b"rig.runs"])
+        assert table.schema.field("motor_current_a").metadata[b"unit"] == b"A"
+    else:
+        beside = json.loads((tmp_path / "campaign.csv.json").read_text())
+        about = beside["runs"]
+        assert beside["units"]["motor_current_a"] == "A"
+    assert about["b"]["notes"] == "dry"
+    assert about["b"]["conditions"] == {"load_a": 0.1, "object": "spring"}
+    with pytest.raises(OutputError, match="already"):
+        rig("export", folder, "--format", format_name)
+    assert rig("export", folder, "--format", format_name, "--force")[0] == ExitCode.OK
+    log = folder / "a.mcap"
+    before = log.read_bytes()
+    for source, more in ((folder, []), (log, ["--topic", "/rig/sample"])):
+        with pytest.raises(OutputError, match="not replaced"):
+            rig("export", source, "--format", format_name, "--out", log, "--force", *more)
+    assert log.read_bytes() == before
 
 
 def test_a_folder_without_logs(rig, tmp_path):
