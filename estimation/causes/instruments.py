@@ -67,6 +67,8 @@ def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
             run.channels[instrumented(channel, equation.name)] = equation.estimate(run.channels)
     if equation.of_angle and equation.target in layout.measured:
         angle = equation.estimate(run.channels | {c: known[c] for c in own if c in known})
+        # an estimate has no offset, and a place along the travel needs one
+        angle = angle + float(np.mean(run.channels[equation.target] - angle))
         run.channels[instrumented(equation.target, equation.name)] = angle
         base = next((a for a in ANGLES if equation.target.endswith(a)), "")
         if base:

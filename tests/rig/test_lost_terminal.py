@@ -10,6 +10,8 @@ import pytest
 
 from rig.log.reader import read_log
 
+pytestmark = pytest.mark.integration
+
 PROTOCOL = """
 name = "long"
 [[runs]]

@@ -11,16 +11,17 @@ from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import (
-    KINDS,
     NAMES,
     HiddenEffect,
-    Kind,
     UnknownHiddenEffectError,
     draw,
     table,
 )
+from rig.simulation.hidden_kinds import KINDS, Kind
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
+
+pytestmark = pytest.mark.integration
 
 OPEN_RAD = -1366 * 2 * np.pi / 8192
 Columns = dict[str, NDArray[np.float64]]
@@ -267,7 +268,7 @@ def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ([HiddenEffect("gremlin")], "no hidden effect 'gremlin'"),
+        ([HiddenEffect("gremlin")], "Unknown hidden effect 'gremlin'"),
         ([HiddenEffect("jaw_spring", -1.0)], "strength -1.0"),
         ([HiddenEffect("jaw_spring", float("nan"))], "strength nan"),
         ([HiddenEffect("jaw_spring"), HiddenEffect("jaw_spring")], "named twice"),
