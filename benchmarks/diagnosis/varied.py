@@ -79,7 +79,7 @@ def _case(lazy: _Lazy) -> Case:
 
 
 def _described(drawn: Drawn) -> dict[str, object]:
-    """Return what is hidden, as `scoring.Truth` has it."""
+    """Return the hidden effects, as `scoring.Truth` has them."""
     truth = drawn.truth
     plans = drawn.stage.plans
     hidden = []

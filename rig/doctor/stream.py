@@ -12,9 +12,21 @@ WATCHED_S = 1.0
 MOST_READS = 20_000
 MOST_SILENT_READS = 100
 RATE_TOLERANCE = 0.02
-STANDING_STILL = ("motor_", "spindle_", "jaw_", "fsr_", "position_", "angle", "command_")
+STANDING_STILL = (
+    "motor_",
+    "spindle_",
+    "jaw_",
+    "fsr_",
+    "position_",
+    "angle",
+    "command_",
+    "supply_",
+    "temperature_",
+)
 STANDING_STILL_UNITS = ("rad", "1")
-"""Channels that rightly do not change at rest: encoders, a motor without current, an idle FSR."""
+"""Channels that rightly do not change at rest: encoders, a motor without current, an idle FSR, and
+supply voltage and temperature, which drives report in steps of 0.1 V and 0.5 K or more.
+"""
 
 
 def device_findings(name: str, open_it: Callable[[], Device]) -> list[Finding]:

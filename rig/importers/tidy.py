@@ -108,7 +108,7 @@ def _unit(name: str) -> dict[str, str]:
 
 
 def _about(recording: Recording) -> dict[str, Any]:
-    """Return what is known about a run, as JSON takes it."""
+    """Return the metadata of a run, as values that JSON can hold."""
     own = recording.instrument
     return {
         "rig": recording.rig,

@@ -173,5 +173,5 @@ def test_rig_clear_reports_the_trip_of_a_board_that_clears_it_by_arming(
     monkeypatch.setattr("rig.bench.clearing.open_logger", lambda _: link)
     assert main(["clear", "-c", "simulated"]) == 0
     told = capsys.readouterr().out
-    assert "heard nothing from this computer" in told
+    assert "received nothing from this computer" in told
     assert "next arming" in told

@@ -10,6 +10,8 @@ import pytest
 
 from rig.log.reader import read_log
 
+pytestmark = pytest.mark.usefixtures("hang_up_is_heard")
+
 PROTOCOL = """
 name = "long"
 [[runs]]

@@ -267,7 +267,7 @@ def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ([HiddenEffect("gremlin")], "no hidden effect 'gremlin'"),
+        ([HiddenEffect("gremlin")], "Unknown hidden effect 'gremlin'"),
         ([HiddenEffect("jaw_spring", -1.0)], "strength -1.0"),
         ([HiddenEffect("jaw_spring", float("nan"))], "strength nan"),
         ([HiddenEffect("jaw_spring"), HiddenEffect("jaw_spring")], "named twice"),

@@ -65,9 +65,9 @@ def test_overlapping_pulleys_are_refused():
 
 
 def test_a_cable_that_lifts_off_its_pulley_is_refused():
-    with pytest.raises(GrasperError, match="leaves pulley 1"):
+    with pytest.raises(GrasperError, match="lifts off pulley 1"):
         PATH.length_m(-1.5, 0.0)
-    with pytest.raises(GrasperError, match="leaves pulley 2"):
+    with pytest.raises(GrasperError, match="lifts off pulley 2"):
         PATH.length_m(0.0, 3.0)
 
 
