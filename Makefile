@@ -3,34 +3,53 @@ PYTHON ?= python3
 CXX    ?= g++
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
+PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo test lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo test test-unit test-long lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
 
-# what users run; nothing in it needs a compiler
+# what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) -e '.[learn,arm]'
-	touch $@
+	@echo "setup: what the demo needs, into $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) -e .
+	@touch $@
 
-# what developers add: linters, tests, and the oracles they compare with
+# what developers add: linters, tests, the oracles they compare with, and the extras they test
 $(VENV)/.developing: $(VENV)/.installed
-	$(PIP) -e '.[dev,learn]'
-	touch $@
+	@echo "setup: what tests need (torch and Pinocchio among it), into $(VENV); minutes, once"
+	@$(PIP) -e '.[dev,learn]'
+	@touch $@
 
 setup: $(VENV)/.installed firmware
 
 demo: setup
 	$(BIN)/rig demo
 
+PYTEST := $(BIN)/python -m pytest -q -n auto --dist worksteal
+
+# what is checked before every commit: all but the long tests
 test: lint
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	@echo "test: unit and integration tests, on every core; the others: make test-long"
+	@$(PYTEST) -m "not long"
+
+# parts by themselves: no session, no process, no simulated campaign
+test-unit: $(VENV)/.developing
+	@echo "test: unit tests, on every core"
+	@$(PYTEST) -m "not long and not integration"
+
+# whole diagnoses, studies and trained networks
+test-long: $(VENV)/.developing firmware
+	@echo "test: long tests, on every core; tens of minutes"
+	@$(PYTEST) -m long
 
 lint: $(VENV)/.developing firmware
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports --no-cache
+	@echo "lint: rules and format"
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check .
+	@echo "lint: types"
+	@$(BIN)/mypy
+	@echo "lint: who may import whom"
+	@$(BIN)/lint-imports --no-cache
 
 site: $(VENV)/.developing
 	$(BIN)/mkdocs build --strict
@@ -64,7 +83,7 @@ MUTANTS ?=
 mutants: $(VENV)/.developing
 	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
-figures: $(VENV)/.installed
+figures: $(VENV)/.developing
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done
 
 # the C++ core is optional: without a compiler the Python fake speaks for the board

@@ -7,7 +7,7 @@ class DriverError(Exception):
     Attributes:
         what: What happened, in one sentence.
         why: The cause as far as it is known; may be empty.
-        fix: Action or next command; may be empty.
+        fix: What to do or to type next; may be empty.
     """
 
     def __init__(self, what: str, why: str = "", fix: str = "") -> None:
@@ -54,7 +54,7 @@ class UnknownSchemeError(LinkError):
 
 
 class ProtocolMismatchError(DriverError):
-    """The board's firmware and this program have different protocols."""
+    """The board's firmware and this program speak different protocols."""
 
 
 class CommandRefusedError(DriverError):
@@ -71,3 +71,15 @@ class CommandRefusedError(DriverError):
 
 class DisarmUnconfirmedError(DriverError):
     """The board was commanded to disarm and has not confirmed it: its state is unknown."""
+
+
+class MissingExtraError(LinkError):
+    """A library that this room needs here is not installed.
+
+    Attributes:
+        extra: The project's extra that holds it, a key of `optional-dependencies`.
+    """
+
+    def __init__(self, what: str, why: str, extra: str) -> None:
+        self.extra = extra
+        super().__init__(what, why, f"Install the project's extra {extra!r}.")

@@ -106,7 +106,7 @@ def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
         elif name in (CABLE_LOAD, CABLE_ANGLE):
             needed |= {"distal_torque_n_m", "spindle_angle_rad"}
         elif name != "time_s":
-            needed.add(_differentiated(_now(name))[0])
+            needed.add(origin_of(_now(name))[0])
     return tuple(sorted(needed))
 
 
@@ -144,7 +144,7 @@ def _plain(name: str) -> str:
     return name.replace(FALL, "_").replace(RISE, "_")
 
 
-def _differentiated(name: str) -> tuple[str, int]:
+def origin_of(name: str) -> tuple[str, int]:
     """Return the channel a channel is the derivative of, and how many times."""
     for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
         if name.endswith(suffix):
@@ -177,7 +177,7 @@ def _derive(
 
     @cache
     def differentiated(name: str) -> FloatArray:
-        source, times = _differentiated(name)
+        source, times = origin_of(name)
         if times and tracked and source in tracked:
             return tracked[source][:, times]
         values = filtered[source]
@@ -332,7 +332,7 @@ class CausalChannels:
         self._last_row: FloatArray = np.empty(0)
         self._kept = max(2, _window(sample_rate_hz) if looks_back(self.names) else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
-        moving = [source for source, times in map(_differentiated, map(_now, self.names)) if times]
+        moving = [source for source, times in map(origin_of, map(_now, self.names)) if times]
         angles = [name for name in self.measured if tracked and name.endswith("_angle_rad")]
         self._tracked = {name: self.measured.index(name) for name in angles if name in moving}
         self._tracker = tracker(sample_rate_hz) if self._tracked else None

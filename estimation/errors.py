@@ -17,5 +17,17 @@ class EstimationError(Exception):
         super().__init__(" ".join(part for part in (what, why, fix) if part))
 
 
+class MissingExtraError(EstimationError):
+    """A library that this room needs here is not installed.
+
+    Attributes:
+        extra: The project's extra that holds it, a key of `optional-dependencies`.
+    """
+
+    def __init__(self, what: str, why: str, extra: str) -> None:
+        self.extra = extra
+        super().__init__(what, why, f"Install the project's extra {extra!r}.")
+
+
 class UnknownNameError(EstimationError):
     """What was named does not exist: a slip of whoever typed it."""

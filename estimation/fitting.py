@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize
+from scipy import optimize
 
 from estimation.campaign import Campaign
 from estimation.derived import CAMPAIGN_TIME, settled_places
@@ -189,14 +189,7 @@ def _solve(problem: _Problem, gram: FloatArray) -> FloatArray:
     scale = np.sqrt(np.maximum(np.diag(gram)[:-1], np.finfo(float).tiny))
     normal = gram[:-1, :-1] / np.outer(scale, scale)
     _check_independent(problem, normal, np.diag(gram)[:-1])
-    root = linalg.cholesky(normal)
-    right = linalg.solve_triangular(root, gram[:-1, -1] / scale, trans="T")
-    free: FloatArray = linalg.solve_triangular(root, right) / scale
-    if np.all(free >= problem.lower) and np.all(free <= problem.upper):
-        return free
-    bounds = (problem.lower * scale, problem.upper * scale)
-    bounded: FloatArray = optimize.lsq_linear(root, right, bounds, method="bvls").x / scale
-    return bounded
+    return solve_within(gram[:-1, :-1], gram[:-1, -1], problem.lower, problem.upper)
 
 
 def _check_independent(problem: _Problem, normal: FloatArray, power: FloatArray) -> None:

@@ -52,6 +52,18 @@ class UsageError(RigError):
     exit_code = ExitCode.USAGE
 
 
+class MissingExtraError(UsageError):
+    """A library that a command needs is not installed.
+
+    Attributes:
+        extra: The project's extra that holds it, a key of `optional-dependencies`.
+    """
+
+    def __init__(self, what: str, why: str, extra: str) -> None:
+        self.extra = extra
+        super().__init__(what, why, f"Install the project's extra {extra!r}.")
+
+
 class DataError(RigError):
     """A file is damaged, truncated or not what it claims to be."""
 

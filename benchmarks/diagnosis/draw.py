@@ -19,8 +19,8 @@ from rig.protocols.motion import motion_of
 from rig.protocols.protocol import RunPlan, load_protocol
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
-from rig.simulation.hidden import KINDS as HIDDEN
 from rig.simulation.hidden import NAMES, HiddenEffect
+from rig.simulation.hidden_kinds import KINDS as HIDDEN
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.plant import TICK_S
 from rig.simulation.play import play

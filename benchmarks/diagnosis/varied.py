@@ -79,7 +79,7 @@ def _case(lazy: _Lazy) -> Case:
 
 
 def _described(drawn: Drawn) -> dict[str, object]:
-    """Return the hidden effects, as `scoring.Truth` has them."""
+    """Return the hidden effects as a `scoring.Truth`."""
     truth = drawn.truth
     plans = drawn.stage.plans
     hidden = []

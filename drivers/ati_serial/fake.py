@@ -14,7 +14,7 @@ from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import AtiSerial
 from drivers.ati_serial.protocol import Calibration
 from drivers.device import Device
-from drivers.errors import LinkError
+from drivers.errors import MissingExtraError
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
@@ -77,15 +77,13 @@ def _server(block: bytes) -> "ModbusServer":
     """Return the Modbus server; its library is an extra, loaded only here.
 
     Raises:
-        LinkError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         from drivers.ati_serial.fake_modbus import ModbusServer
     except ModuleNotFoundError as error:
-        raise LinkError(
-            "The simulated digital F/T needs the pymodbus library.",
-            f"{error}.",
-            "Run: pip install 'rig[modbus]'.",
+        raise MissingExtraError(
+            "The simulated digital F/T needs the pymodbus library.", f"{error}.", "modbus"
         ) from error
     return ModbusServer(protocol.FIRST_CALIBRATION, block)
 

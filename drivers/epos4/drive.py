@@ -20,7 +20,7 @@ from drivers.epos4.setup import set_up
 from drivers.errors import (
     DisarmUnconfirmedError,
     DriverError,
-    LinkError,
+    MissingExtraError,
 )
 from drivers.polling import PollSchedule
 from drivers.transport.can_bus import CanBus
@@ -330,12 +330,12 @@ def _link(bus: CanBus, node_id: int) -> "CanopenLink":
     """Return the link; the `canopen` library is an extra, loaded only here.
 
     Raises:
-        LinkError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         from drivers.epos4.canopen_link import CanopenLink
     except ModuleNotFoundError as error:
-        raise LinkError(
-            "An EPOS4 needs the canopen library.", f"{error}.", "Run: pip install 'rig[can]'."
+        raise MissingExtraError(
+            "An EPOS4 needs the canopen library.", f"{error}.", "can"
         ) from error
     return CanopenLink(bus, node_id)

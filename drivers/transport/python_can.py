@@ -22,6 +22,7 @@ from drivers.errors import (
     LinkError,
     LinkLostError,
     LinkTimeoutError,
+    MissingExtraError,
     PortBusyError,
     PortNotFoundError,
     PortPermissionError,
@@ -255,7 +256,7 @@ def _explain(url: str, name: str, channel: str, error: Exception) -> LinkError:
     code = getattr(error, "errno", None) or getattr(error, "error_code", None)
     up = f"Run: sudo ip link set {channel} up type can bitrate N."
     if isinstance(error, (ImportError, can.CanInterfaceNotImplementedError)):
-        return LinkError(f"{url} cannot be opened.", f"{error}.", "Run: pip install 'rig[can]'.")
+        return MissingExtraError(f"{url} cannot be opened.", f"{error}.", "can")
     if code in (errno.ENODEV, errno.ENOENT, errno.ENXIO):
         fix = up if name == "socketcan" else "Is the adapter plugged in?"
         return PortNotFoundError(f"There is no CAN bus {url}.", str(error), fix)

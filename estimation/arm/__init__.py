@@ -1,4 +1,4 @@
 """Arms: kinematics, torque regressors and their identification, as functions on arrays.
 
-Rigid-body algorithms come from Pinocchio, an optional dependency: `pip install 'rig[arm]'`.
+Rigid-body algorithms come from Pinocchio, an optional dependency (extra `arm`).
 """

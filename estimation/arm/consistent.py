@@ -17,6 +17,7 @@ from estimation.arm.kinematics import ArmError
 from estimation.arm.recursion import LINK
 from estimation.arm.regressor import names
 from estimation.arm.tables import Arm
+from estimation.errors import MissingExtraError
 from estimation.recording import FloatArray
 
 PULL = 1e-6
@@ -45,15 +46,13 @@ def solver() -> Any:
     """Return the Clarabel module; imported when first needed, since it is optional.
 
     Raises:
-        ArmError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         import clarabel
     except ImportError as error:
-        raise ArmError(
-            "A physically consistent fit needs Clarabel, which is not installed.",
-            "It is an optional dependency.",
-            "Type: pip install 'rig[arm]'",
+        raise MissingExtraError(
+            "A physically consistent fit needs Clarabel, which is not installed.", "", "arm"
         ) from error
     return clarabel
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from estimation.arm.tables import Arm, DhRow
-from estimation.errors import EstimationError
+from estimation.errors import EstimationError, MissingExtraError
 from estimation.recording import FloatArray
 
 TIP = "tip"
@@ -16,23 +16,17 @@ class ArmError(EstimationError):
     """An arm's motion does not fit the arm, or does not identify its parameters."""
 
 
-class PinocchioMissingError(ArmError):
-    """Pinocchio is not installed."""
-
-
 def pinocchio() -> Any:
     """Return the Pinocchio module; imported when first needed, since it is large and optional.
 
     Raises:
-        PinocchioMissingError: It is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         import pinocchio as module
     except ImportError as error:
-        raise PinocchioMissingError(
-            "Arm dynamics need Pinocchio, which is not installed.",
-            "It is an optional dependency.",
-            "Type: pip install 'rig[arm]'",
+        raise MissingExtraError(
+            "Arm dynamics need Pinocchio, which is not installed.", "", "arm"
         ) from error
     return module
 

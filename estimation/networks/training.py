@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg.blas import dsyrk
 
+from estimation.errors import MissingExtraError
 from estimation.networks.network import Network, NetworkError, to_unit
 from estimation.recording import FloatArray
 
@@ -77,6 +78,20 @@ def has_torch() -> bool:
     return find_spec("torch") is not None
 
 
+def require_torch() -> None:
+    """Refuse to go on without torch.
+
+    Raises:
+        MissingExtraError: It is not installed.
+    """
+    if not has_torch():
+        raise MissingExtraError(
+            "Training a network needs torch, which is not installed.",
+            "A trained network runs without it.",
+            "learn",
+        )
+
+
 def train(
     inputs: FloatArray,
     targets: FloatArray,
@@ -100,15 +115,11 @@ def train(
             and its number of nodes.
 
     Raises:
-        NetworkError: torch is missing, a column is constant or not finite, there are too few
+        MissingExtraError: torch is not installed.
+        NetworkError: A column is constant or not finite, there are too few
             rows, or the network to start from has other inputs or outputs.
     """
-    if not has_torch():
-        raise NetworkError(
-            "A network cannot be trained: torch is not installed.",
-            "Only training needs it; a trained network runs without.",
-            "Install it: pip install 'rig[learn]'.",
-        )
+    require_torch()
     settings = settings or Settings()
     if start is None:
         ranges = [_range(inputs, names[0]), _range(targets, names[1])]

@@ -9,7 +9,8 @@ from drivers.teensy.channels import raw_channels
 from drivers.teensy.device import TeensyDevice
 from rig.bench.logger import open_logger
 from rig.configuration.check import LOGGER
-from rig.configuration.config import Config, DeviceSection, is_simulated
+from rig.configuration.config import Config, is_simulated
+from rig.configuration.sections import DeviceSection
 from rig.machines.choose import machine_of
 
 SIMULATED_STEP_S = 0.02

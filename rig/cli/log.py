@@ -142,7 +142,7 @@ def export(
 
     The table of a campaign (a folder or an archive of any format that is known) has a row a sample,
     with its run and conditions. Parquet holds units, instrument, calibrations and notes as
-    metadata; those of a CSV are in NAME.csv.json.
+    metadata; for a CSV they are written to NAME.csv.json.
     """
     from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log

@@ -134,6 +134,11 @@ def _report(error: Exception, words: list[str]) -> int:
     code = exit_code_of(error)
     what = getattr(error, "what", None) or f"{type(error).__name__}: {error}"
     why, fix = getattr(error, "why", ""), getattr(error, "fix", "")
+    extra = getattr(error, "extra", "")
+    if extra:
+        from rig.cli.extras import as_typed, install_command, offer
+
+        fix = f"Install the extra {extra!r}: {as_typed(install_command(extra))}"
     lines = [f"error: {what}"]
     for word, text in (("why", why), ("fix", fix)):
         first, *more = text.splitlines() or [""]
@@ -142,6 +147,8 @@ def _report(error: Exception, words: list[str]) -> int:
     sys.stderr.write("\n".join(lines) + "\n")
     if "--json" in words:
         emit_json({"error": {"what": what, "why": why, "fix": fix, "exit_code": int(code)}})
+    if extra and "--json" not in words and offer(extra):
+        sys.stderr.write("Installed. Type the command again.\n")
     return code
 
 

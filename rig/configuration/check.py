@@ -13,7 +13,9 @@ from pydantic import ConfigDict, ValidationError, create_model
 
 from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
 from drivers.registry import CanUse, Driver, drivers, fakes
-from rig.configuration.config import SHIPPED, Config, DeviceSection, LoggerSection, is_simulated
+from rig.configuration.config import SHIPPED, Config, is_simulated
+from rig.configuration.machine_settings import settings_of
+from rig.configuration.sections import DeviceSection, LoggerSection
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
@@ -43,9 +45,11 @@ def problems(config: Config) -> list[Problem]:
     found = [
         p for name, section in sections.items() for p in _driver_problems(name, section, known)
     ]
-    if config.logger.profile == "grasper" and config.logger.driver != "teensy":
-        what = f"The driver {config.logger.driver} cannot carry three motors at 2 kHz."
-        found.append(Problem(LOGGER, what, 'Write driver = "teensy", and a board on USB.'))
+    carried_by = settings_of(config.logger.profile).drivers
+    if config.logger.driver not in carried_by:
+        what = f"The driver {config.logger.driver} cannot run a {config.logger.profile}."
+        fix = " or ".join(f'driver = "{name}"' for name in carried_by)
+        found.append(Problem(LOGGER, what, f"Write {fix}."))
     if LOGGER in config.devices:
         found.append(Problem(f"devices.{LOGGER}", "The name is the logger's.", "Choose another."))
     found += _name_problems(config)

@@ -1,263 +1,59 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
-import math
 import tomllib
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, get_args
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
-    ConfigDict,
-    Discriminator,
     Field,
-    Tag,
+    SerializeAsAny,
     ValidationError,
-    model_validator,
+    ValidationInfo,
+    field_validator,
 )
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
 from calibration.store import CalibrationStore, active_lines, compose, default_folder
-from estimation.recording import Instrument
+from rig.configuration.machine_settings import (
+    DriftSection,
+    LimitsSection,
+    OwnSection,
+    ReferenceLimits,
+    settings_of,
+)
 from rig.configuration.plausibility import PlausibilitySection
+from rig.configuration.sections import (
+    ControllerSection,
+    DeviceSection,
+    InstrumentSection,
+    Length,
+    LoggerSection,
+    Name,
+    SafetySection,
+    Section,
+    SimulationSection,
+    profiles,
+)
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
 SHIPPED = Path(__file__).parent / "shipped"
 SIMULATED = SHIPPED / "simulated.toml"
 
-POT_RAD_PER_COUNT = math.radians(300.0) / 4095
 
-
-def _not_zero(value: float) -> float:
-    if value == 0.0:
-        raise ValueError("a potentiometer of 0 rad a count shows nothing")
-    return value
-
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Torque = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-Current = Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
-Angle = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-Force = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
-Turn = Annotated[float, Field(ge=-0.01, le=0.01, allow_inf_nan=False), AfterValidator(_not_zero)]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LoggerSection(_Section):
-    """The board or drive that moves and samples the rig, and its URL.
-
-    Attributes:
-        driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
-            on CANopen whose position loop runs in this computer.
-        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
-            `can:...`.
-        options: The driver's own options.
-        bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
-            with from the factory if none.
-        profile: Samples and motors of the board: the reference rig, or the 3-DOF grasper.
-    """
-
-    driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
-    url: str
-    profile: Literal["reference", "grasper"] = "reference"
-    options: dict[str, Any] = Field(default_factory=dict)
-    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
-
-
-class DeviceSection(_Section):
-    """A further device whose channels are recorded with the logger's.
-
-    Attributes:
-        driver: Name of its driver; `rig devices` lists them.
-        url: URL; `sim://` for its fake.
-        options: The driver's own options.
-        bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
-            from the factory if none.
-    """
-
-    driver: str
-    url: str
-    options: dict[str, Any] = Field(default_factory=dict)
-    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
-
-
-class ControllerSection(_Section):
-    """Gains of the logger's position controller, in its own ticks: see `drivers.teensy.control`."""
-
-    kp: Number
-    ki: Number
-    kd: Number
-    velocity_filter: float = Field(gt=0, le=1)
-    limit: Positive = 10000.0
-
-    def gains(self) -> list[float]:
-        """Return the gains in the order the controller takes them."""
-        return [self.kp, self.ki, self.kd, self.velocity_filter, self.limit]
-
-
-class LimitsSection(_Section):
-    """Limits checked at every sample, on the absolute value; a crossing ends in the safe state.
-
-    Every key is the name of a channel; which there are depends on `[logger] profile`.
-    """
-
-
-class ReferenceLimits(LimitsSection):
-    """Limits of the reference rig."""
-
-    proximal_torque_n_m: Torque
-    distal_torque_n_m: Torque
-    motor_current_a: Current
-    load_command_a: float = Field(ge=0, le=60)
-    spindle_angle_rad: Angle
-
-
-class GrasperLimits(LimitsSection):
-    """Limits of the 3-DOF grasper, for each of its motors: the yaw's, and those of both jaws."""
-
-    yaw_current_a: Current
-    jaw_1_current_a: Current
-    jaw_2_current_a: Current
-    yaw_force_n: Force
-    jaw_1_force_n: Force
-    jaw_2_force_n: Force
-    yaw_angle_rad: Angle
-    jaw_1_angle_rad: Angle
-    jaw_2_angle_rad: Angle
-
-
-def _kind_of_limits(value: Any) -> str:
-    """Say whose limits these are meant to be, by the motors they name."""
-    names = value if isinstance(value, dict) else type(value).model_fields
-    return "grasper" if any(name.startswith(("yaw_", "jaw_")) for name in names) else "reference"
-
-
-AnyLimits = Annotated[
-    Annotated[ReferenceLimits, Tag("reference")] | Annotated[GrasperLimits, Tag("grasper")],
-    Discriminator(_kind_of_limits),
-]
-
-
-class SafetySection(_Section):
-    """Monitors in addition to the limits, on the board and again on this computer; always on.
-
-    A time or a heat of 0 switches its watch off.
-
-    Attributes:
-        safe_state: State of the drive motor after a trip: `release`, no current; or
-            `hold`, stay where it stands with a low command, where encoder and current are sound.
-        hold_command_ratio: Largest command while holding, of full scale.
-        continuous_current_a: Motor current that warms the motor no further.
-        heat_a2_s: Heat above it the motor can take: integral of current squared less that squared.
-        stall_current_a: Current above which a motor that stands still is stalled.
-        stall_motor_angle_rad: Motor shaft angle within which it stands still.
-        stall_s: How long it may be stalled.
-        motor_speed_rad_s: Fastest motor shaft. The shipped protocols need up to 260.
-        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; if unset it
-            follows from the spindle's limit and [plausibility].
-        jaw_open_rad: Jaw angle below which it must not open; likewise.
-        saturated_s: How long a torque or current sensor may be at the end of its range.
-        stale_s: How long its reading may not change at all.
-        watchdog_s: How long this computer may be silent.
-    """
-
-    safe_state: Literal["release", "hold"] = "release"
-    hold_command_ratio: float = Field(default=0.05, ge=0, le=0.5)
-    continuous_current_a: Current = 0.5
-    heat_a2_s: float = Field(default=0.5, ge=0, le=2000)
-    stall_current_a: Current = 0.55
-    stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
-    stall_s: float = Field(default=1.0, ge=0, le=600)
-    motor_speed_rad_s: float = Field(default=400.0, gt=0, le=20000)
-    jaw_closed_rad: Number | None = None
-    jaw_open_rad: Number | None = None
-    saturated_s: float = Field(default=0.02, ge=0, le=60)
-    stale_s: float = Field(default=0.5, ge=0, le=60)
-    watchdog_s: float = Field(default=0.25, ge=0.005, le=1)
-
-
-class DriftSection(_Section):
-    """Largest change of a sensor's zero over a run that passes; without a limit none is judged.
-
-    The first three are sensors of the reference rig, the others of the grasper.
-    """
-
-    proximal_torque_n_m: Torque | None = None
-    distal_torque_n_m: Torque | None = None
-    motor_current_a: Current | None = None
-    yaw_force_n: Force | None = None
-    jaw_1_force_n: Force | None = None
-    jaw_2_force_n: Force | None = None
-
-
-class InstrumentSection(_Section):
-    """Identity of the instrument on the rig."""
-
-    model: str | None = None
-    serial: str | None = None
-    lot: str | None = None
-    side: str | None = None
-    uses: int | None = Field(default=None, ge=0)
-
-    def identity(self) -> Instrument:
-        """Return the identity as a recording keeps it."""
-        return Instrument(**self.model_dump())
-
-
-class MasterSection(_Section):
-    """The master a grasper follows: potentiometers of yaw, pitch and grasp.
-
-    Attributes:
-        url: URL, such as `usb:16c0:0483:SERIAL`; a simulated grasper has a simulated one.
-        zero_counts: Counts of the converter at each joint's zero.
-        rad_per_count: Turn of each joint for a count, negative where it is mounted the other way
-            round; by default a potentiometer of 300 degrees over 12 bits.
-    """
-
-    url: str | None = None
-    zero_counts: tuple[Number, Number, Number] = (2048.0, 2048.0, 2048.0)
-    rad_per_count: tuple[Turn, Turn, Turn] = (POT_RAD_PER_COUNT,) * 3
-
-
-class SimulationSection(_Section):
-    """The simulated rig behind a `sim://` logger.
-
-    Attributes:
-        seed: Seed of noise, offsets and drift.
-        spread: Relative spread of the plant's parameters drawn by the seed.
-        hidden: Hidden effect to strength; effects that no declared model contains.
-        draw_hidden: Seed that draws one more hidden effect without showing its name.
-        firmware: Put the compiled firmware core in the loop where it is built.
-        plant: `measured`, with losses that no declared model holds, or `declared`, without them.
-        grasper: Prototype of the simulated grasper, where the profile is the grasper's.
-    """
-
-    seed: int = 0
-    spread: float = Field(default=0.0, ge=0, lt=0.5)
-    hidden: dict[str, Number] = Field(default_factory=dict)
-    draw_hidden: int | None = None
-    firmware: bool = True
-    plant: Literal["measured", "declared"] = "measured"
-    grasper: Literal["third", "journal", "ball"] = "third"
-
-
-class Config(_Section):
+class Config(Section):
     """The whole configuration.
 
     Attributes:
         calibration: Calibration set: a TOML file, or a shipped one by name.
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.
+        machine: What else the machine is configured by; which keys there are depends on
+            `[logger] profile`, as those of limits and drift do.
         devices: Further devices by the name their recorded channels go under.
         serials: Serial numbers of the devices on the rig, compared with those of the records.
     """
@@ -265,13 +61,13 @@ class Config(_Section):
     name: str
     logger: LoggerSection
     controller: ControllerSection
-    limits: AnyLimits
+    limits: SerializeAsAny[LimitsSection]
     safety: SafetySection = SafetySection()
     plausibility: PlausibilitySection = PlausibilitySection()
-    drift: DriftSection = DriftSection()
+    drift: SerializeAsAny[DriftSection] = Field(default=DriftSection(), validate_default=True)
     instrument: InstrumentSection = InstrumentSection()
     simulation: SimulationSection = SimulationSection()
-    master: MasterSection = MasterSection()
+    machine: SerializeAsAny[OwnSection] = Field(default=OwnSection(), validate_default=True)
     calibration: str = "reference"
     calibration_store: str | None = None
     serials: dict[str, str] = Field(default_factory=dict)
@@ -279,15 +75,24 @@ class Config(_Section):
     lever_arm_m: Length = 0.012
     model: str | None = None
 
-    @model_validator(mode="after")
-    def _limits_are_the_profiles(self) -> "Config":
-        wanted = GrasperLimits if self.logger.profile == "grasper" else ReferenceLimits
-        if not isinstance(self.limits, wanted):
+    @field_validator("limits", "drift", "machine", mode="before")
+    @classmethod
+    def _is_the_machines(cls, value: Any, info: ValidationInfo) -> Any:
+        """Check a table against the machine that `[logger] profile` names."""
+        if "logger" not in info.data:  # that table is wrong itself, and is reported
+            return {"limits": LimitsSection, "drift": DriftSection}.get(
+                str(info.field_name), OwnSection
+            )()
+        profile = info.data["logger"].profile
+        settings = settings_of(profile)
+        kinds = {"limits": settings.limits, "drift": settings.drift, "machine": settings.own}
+        kind = kinds[str(info.field_name)]
+        if isinstance(value, dict) and value and not set(value) & set(kind.model_fields):
             raise ValueError(
-                f"[limits] are not those of [logger] profile = {self.logger.profile!r}, which has "
-                + ", ".join(wanted.model_fields)
+                f"[{info.field_name}] are not those of [logger] profile = {profile!r}, which has "
+                + (", ".join(kind.model_fields) or "none")
             )
-        return self
+        return kind.model_validate(value.model_dump() if isinstance(value, Section) else value)
 
     @property
     def reference_limits(self) -> ReferenceLimits:
@@ -411,13 +216,22 @@ def load_config(path: Path | None = None) -> Config:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:
         raise UsageError(
-            f"{path} is not a configuration.", explain(error, _keys(Config), text)
+            f"{path} is not a configuration.", explain(error, _known_keys(), text)
         ) from error
 
 
 def _found(path: Path) -> Path:
     """Return the shipped configuration of that name, or the path itself."""
     return SHIPPED / f"{path}.toml" if str(path) in shipped_configs() else path
+
+
+def _known_keys() -> set[str]:
+    """Every key of a configuration, whatever machine it is of."""
+    keys = _keys(Config)
+    for settings in map(settings_of, profiles()):
+        for kind in (settings.limits, settings.drift, settings.own):
+            keys |= _keys(kind)
+    return keys
 
 
 def _keys(model: type[BaseModel]) -> set[str]:

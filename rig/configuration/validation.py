@@ -25,14 +25,14 @@ def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -
     """
     sentences = []
     for problem in error.errors():
-        path = ".".join(str(part) for part in _path(problem["loc"])) or "the file"
+        path = ".".join(str(part) for part in problem["loc"]) or "the file"
         message = problem["msg"]
         if problem["type"] == "extra_forbidden":
             near = difflib.get_close_matches(str(problem["loc"][-1]), list(known), n=1)
             message = "there is no such key" + (f"; did you mean {near[0]!r}?" if near else "")
         elif problem["loc"] and isinstance(problem["input"], (int, float)):
             message += f", given {problem['input']}{_unit(str(problem['loc'][-1]))}"
-        number = line_of(text, list(_path(problem["loc"])))
+        number = line_of(text, problem["loc"])
         place = f"line {number}, {path}" if number else path
         sentences.append(f"{place}: {message}" + ("" if message.endswith("?") else "."))
     return "\n".join(sentences)
@@ -66,15 +66,6 @@ def line_of(text: str, path: Sequence[int | str]) -> int | None:
         if own == list(path):
             return number
     return nearest
-
-
-def _path(location: tuple[int | str, ...]) -> Iterable[int | str]:
-    """Return where a key stands in the file, without the kind of limits pydantic chose there."""
-    return (
-        (part for k, part in enumerate(location) if k != 1 or location[0] != "limits")
-        if len(location) > 2
-        else location
-    )
 
 
 def _unit(key: str) -> str:

@@ -8,7 +8,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
-from rig.errors import UsageError
+from rig.errors import MissingExtraError, UsageError
 
 CONNECT_S = 20.0
 RETRIES = 3
@@ -45,10 +45,10 @@ def _cluster(address: str) -> Iterator[Executor]:
     try:
         import distributed
     except ImportError as error:
-        raise UsageError(
-            "A cluster needs the package distributed.",
-            "It is an extra, since most diagnoses run on one machine.",
-            "Type `pip install 'rig[cluster]'`.",
+        raise MissingExtraError(
+            "A cluster needs the library distributed, which is not installed.",
+            "Most diagnoses run on one machine.",
+            "cluster",
         ) from error
     try:
         connect: Any = distributed.Client

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.recording import Recording
-from rig.configuration.config import ReferenceLimits
+from rig.configuration.machine_settings import ReferenceLimits
 from rig.protocols.protocol import Protocol
 
 LOADS_A = (0.15, 0.5, 0.9)

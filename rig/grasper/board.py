@@ -5,7 +5,7 @@ from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.grasper_guard import GRASPER_LOGIC
 from drivers.transport.simulated import Board
-from rig.configuration.config import SimulationSection
+from rig.configuration.sections import SimulationSection
 from rig.errors import UsageError
 from rig.grasper.bench import GrasperBench
 from rig.grasper.plant import PROTOTYPES

@@ -10,11 +10,13 @@ import numpy as np
 from rig.bench.devices import open_section
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.configuration.config import Config, DeviceSection, is_simulated
+from rig.configuration.config import Config, is_simulated
+from rig.configuration.sections import DeviceSection
 from rig.errors import UsageError
 from rig.grasper.follow import LEAD_S, setpoints
 from rig.grasper.machine import AXES
 from rig.grasper.master import master_of
+from rig.grasper.settings import master_section
 from rig.machines.reading import Reading
 from rig.recording.recorder import LiveRecorder
 
@@ -81,13 +83,7 @@ def follow_master(
         SafetyTripError: A limit was crossed.
         DriverError: A link is lost.
     """
-    if config.logger.profile != "grasper":
-        raise UsageError(
-            f"{config.name} is not a grasper.",
-            "Only the 3-DOF grasper has a master.",
-            'Name a configuration with [logger] profile = "grasper".',
-        )
-    url = url or config.master.url
+    url = url or master_section(config).url
     if url is None and not config.is_simulated:
         raise UsageError("Where is the master?", fix="Write for example --master usb:16c0:0483.")
     section = DeviceSection(driver=DRIVER, url=url or SIMULATED_URL)

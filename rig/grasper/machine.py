@@ -19,7 +19,7 @@ from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, SafeState, Trip
 from rig.configuration.config import Config
 from rig.errors import UsageError
-from rig.log.streams import GRASPER_COUNTS
+from rig.grasper.counts import GRASPER_COUNTS
 from rig.machines.machine import FloatArray, MachinePlan
 from rig.machines.plausible_counts import jump_limit, loop_limits
 from rig.machines.safety import InCounts, check_setpoints, ticks_of

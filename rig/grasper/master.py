@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from estimation.recording import FloatArray
 from rig.configuration.config import Config
 from rig.grasper.coupling import GrasperError
+from rig.grasper.settings import master_section
 
 TOP_COUNT = 4095
 
@@ -41,4 +42,5 @@ class Master:
 
 def master_of(config: Config) -> Master:
     """Return the master as a configuration describes it."""
-    return Master(config.master.zero_counts, config.master.rad_per_count)
+    section = master_section(config)
+    return Master(section.zero_counts, section.rad_per_count)

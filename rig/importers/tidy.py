@@ -108,7 +108,7 @@ def _unit(name: str) -> dict[str, str]:
 
 
 def _about(recording: Recording) -> dict[str, Any]:
-    """Return the metadata of a run, as values that JSON can hold."""
+    """Return the metadata of a run as plain JSON types."""
     own = recording.instrument
     return {
         "rig": recording.rig,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.errors import UsageError
+from rig.errors import MissingExtraError, UsageError
 from rig.live.block import SampleBlock
 
 HOST, PORT = "127.0.0.1", 8765
@@ -55,10 +55,10 @@ class FoxgloveServer:
         try:
             import foxglove
         except ImportError as error:
-            raise UsageError(
-                "Foxglove's library is not installed.",
-                "It is an extra, since the display in the terminal does not need it.",
-                "Type: pip install 'rig[viz]'",
+            raise MissingExtraError(
+                "The stream to Foxglove needs its library, which is not installed.",
+                "The display in the terminal does not need it.",
+                "viz",
             ) from error
         self._context = foxglove.Context()
         try:

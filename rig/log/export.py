@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from estimation.file_kinds import ARRAYS, CSV, PARQUET
 from estimation.files import check_output
-from rig.errors import UsageError
+from rig.errors import MissingExtraError, UsageError
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.recalibrate import recalibrated
 from rig.log.writer import PART_SUFFIX
+
+CSV_ROWS = 10_000
+"""Rows of a CSV file that are held in memory at a time."""
 
 Columns = dict[str, NDArray[np.generic]]
 
@@ -62,6 +65,7 @@ def export_log(
         ExportExistsError: A file is there already and `force` is False; nothing is written then.
         OutputError: A file cannot be written, or one of another kind is there.
         UsageError: The log has no such topic.
+        MissingExtraError: Parquet, without pyarrow.
         DamagedLogError: The log is damaged.
     """
     log = read_log(path, None if topic is None or calibrations is not None else [topic])
@@ -120,8 +124,17 @@ def _columns(topic: Topic) -> Columns:
 
 
 def _table(topic: Topic) -> Any:
-    """Return the topic as an Arrow table whose fields carry unit and description."""
-    import pyarrow as pa
+    """Return the topic as an Arrow table whose fields carry unit and description.
+
+    Raises:
+        MissingExtraError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa
+    except ImportError as error:
+        raise MissingExtraError(
+            "Parquet needs pyarrow, which is not installed.", "CSV and NPZ do not.", "parquet"
+        ) from error
 
     columns = {name: pa.array(values) for name, values in _columns(topic).items()}
     notes = {
@@ -133,16 +146,19 @@ def _table(topic: Topic) -> Any:
 
 
 def _write_csv(path: Path, topic: Topic) -> None:
-    from pyarrow import csv
-
-    options = csv.WriteOptions(quoting_style="none", quoting_header="none")
-    csv.write_csv(_table(topic), path, options)
+    columns = _columns(topic)
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write(",".join(columns) + "\n")
+        for first in range(0, topic.log_time_ns.size, CSV_ROWS):
+            part = [values[first : first + CSV_ROWS].tolist() for values in columns.values()]
+            file.writelines(",".join(map(repr, row)) + "\n" for row in zip(*part, strict=True))
 
 
 def _write_parquet(path: Path, topic: Topic) -> None:
+    table = _table(topic)
     from pyarrow import parquet
 
-    parquet.write_table(_table(topic), path, compression="zstd")
+    parquet.write_table(table, path, compression="zstd")
 
 
 def _write_npz(path: Path, topic: Topic) -> None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
-from rig.configuration.config import Config, LimitsSection
+from rig.configuration.config import Config
+from rig.configuration.machine_settings import LimitsSection
 from rig.errors import SafetyTripError
 from rig.machines.plausible_counts import jaw_ends_rad, jump_limit, loop_limits, pair_limits
 from rig.machines.reading import Reading

@@ -4,7 +4,7 @@ from drivers.teensy.fake import PythonBoard
 from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
-from rig.configuration.config import SimulationSection
+from rig.configuration.sections import SimulationSection
 from rig.machines.choose import SIMULATED_BOARDS, installed
 from rig.simulation import hidden, parameters
 from rig.simulation.bench import SimulatedBench

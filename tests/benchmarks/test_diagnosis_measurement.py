@@ -33,6 +33,8 @@ from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.varied import DEVELOP, JUDGE, HiddenTruth
 from rig.simulation.varied import Truth as VariedTruth
 
+pytestmark = pytest.mark.integration
+
 RUNS = [plan.name for plan in plans_of("usual")]
 
 

@@ -27,6 +27,7 @@ SOURCE = os.environ.get("RIG_NETFT_CPP", "")
 COMPILER = shutil.which(os.environ.get("CXX", "g++"))
 PEERS = Path(__file__).with_name("peers")
 pytestmark = [
+    pytest.mark.integration,
     pytest.mark.skipif(not SOURCE, reason="RIG_NETFT_CPP names no archive of netft-cpp"),
     pytest.mark.skipif(not COMPILER, reason="no C++ compiler for netft-cpp"),
 ]

@@ -23,6 +23,8 @@ from drivers.ati_serial.driver import AtiSerial
 from drivers.errors import LinkTimeoutError
 from drivers.transport.serial_port import open_line
 
+pytestmark = pytest.mark.integration
+
 pytest.importorskip("pymodbus")
 BAUD_RATE = 115_200
 ROOT = Path(__file__).parents[2]

@@ -13,6 +13,7 @@ from drivers.errors import (
     LinkError,
     LinkLostError,
     LinkTimeoutError,
+    MissingExtraError,
     PortBusyError,
     PortNotFoundError,
     PortPermissionError,
@@ -145,7 +146,7 @@ def test_a_url_that_opens_nothing_says_why(url: str, error: type[LinkError], wor
         (OSError(errno.EAFNOSUPPORT, "Address family"), LinkError, "has no CAN support"),
         (OSError(errno.EPERM, "Not permitted"), PortPermissionError, "udev"),
         (can.CanInitializationError("held", errno.EBUSY), PortBusyError, "in use"),
-        (can.CanInterfaceNotImplementedError("no module"), LinkError, "pip install"),
+        (can.CanInterfaceNotImplementedError("no module"), MissingExtraError, "extra 'can'"),
         (ValueError("odd"), LinkError, "odd"),
     ],
 )

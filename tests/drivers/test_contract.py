@@ -21,6 +21,8 @@ from tests.drivers.emulated_board import open_fake as open_emulated
 from tests.drivers.fault_names import EVIDENCE, SAID
 from tests.drivers.test_grasper_twin import ScriptedGrasper, moving
 
+pytestmark = pytest.mark.integration
+
 NAMES = sorted(drivers())
 EMULATED = "teensy on a Cortex-M4"
 GRASPER_BOARD = "teensy at a grasper"

@@ -15,6 +15,8 @@ from drivers.epos4.driver import open_epos4
 from drivers.epos4.faults import DriveFaultError
 from drivers.errors import DriverError
 
+pytestmark = pytest.mark.integration
+
 CHANNEL = "239.74.163.9"
 ROOT = Path(__file__).parents[2]
 

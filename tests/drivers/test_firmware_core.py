@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.integration
+
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PROBE = "#include <doctest/doctest.h>\n"
 

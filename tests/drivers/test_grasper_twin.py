@@ -22,6 +22,8 @@ from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.bench_physics import TICK_FUNCTION
 
+pytestmark = pytest.mark.integration
+
 GAINS = np.array([[2.0, 0.01, -20.0, 0.3, 5000.0], [3.0, 0, -9, 1, 4000], [1, 0, 0, 0.5, 900]])
 WIDEST = GrasperLimits()
 HELD = {"safe_state": SafeState.HOLD, "hold_command_e4": 300}

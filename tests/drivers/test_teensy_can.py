@@ -22,6 +22,8 @@ from rig.simulation.bench import SimulatedBench
 from tests.drivers.bench_physics import PlainBench
 from tests.rig.simulated import simulated
 
+pytestmark = pytest.mark.integration
+
 bodies = st.lists(st.binary(min_size=1, max_size=120), min_size=1, max_size=6)
 
 

@@ -22,6 +22,8 @@ pytest.importorskip("unicorn", reason="no emulator: pip install unicorn pyelftoo
 
 from tests.drivers.teensy_image import K64, RT1062, TeensyImage
 
+pytestmark = pytest.mark.integration
+
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 CHIPS = {"teensy35": K64, "teensy41": RT1062, "teensy41-grasper": RT1062}
 ENABLES = {

@@ -16,7 +16,9 @@ from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pytestmark = pytest.mark.integration
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 def campaign(presliding_on: int | None, runs: int = 9, seconds: float = 15.0) -> list[Recording]:

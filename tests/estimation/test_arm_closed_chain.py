@@ -16,7 +16,7 @@ from estimation.arm.kinematics import ArmError
 from estimation.arm.periodic import periodic_motion
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
-pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 PERIOD_S = 0.01
 

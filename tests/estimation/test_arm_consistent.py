@@ -14,7 +14,7 @@ from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM, PSM_CLOSED, Arm
 from rig.arm.simulated import excitation
 
-pytest.importorskip("clarabel", reason="Clarabel is not installed (rig[arm])")
+pytest.importorskip("clarabel", reason="Clarabel is not installed (extra arm)")
 
 
 def points(seed: int, count: int = 5) -> np.ndarray:

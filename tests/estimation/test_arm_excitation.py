@@ -21,7 +21,7 @@ from estimation.arm.excitation import (
 from estimation.arm.tables import PSM
 from rig.cli.study import study_app
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 @settings(max_examples=20, deadline=None)

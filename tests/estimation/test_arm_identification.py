@@ -13,7 +13,7 @@ from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.recording import Recording
 
-pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 PERIOD_S = 0.01
 

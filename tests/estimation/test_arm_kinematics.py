@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from estimation.arm.kinematics import ArmError, body_jacobian, spatial_jacobian, tip_pose
 from estimation.arm.tables import PSM, DhRow
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 within_limits = st.tuples(*(st.floats(j.lower, j.upper) for j in PSM.joints)).map(np.array)
 

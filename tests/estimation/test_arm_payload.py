@@ -10,7 +10,7 @@ from estimation.arm.motion import motion_of
 from estimation.arm.payload import added_mass, carried_torque, point_mass
 from estimation.arm.tables import PSM, DhRow, PointMass, Tool
 
-pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 PERIOD_S = 0.02
 SAMPLES = 200

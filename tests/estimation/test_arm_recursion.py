@@ -14,7 +14,7 @@ from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM, Arm
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
-pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 FULL = replace(PSM, joints=tuple(replace(joint, link="full") for joint in PSM.joints))
 TILTED = replace(FULL, gravity_m_s2=(3.0, -2.0, -9.0))

@@ -15,7 +15,7 @@ from estimation.arm.wrench import (
     spatial_jacobians,
 )
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 WRENCH = np.array([3.0, -2.0, 1.0, 0.2, 0.1, -0.1])
 ERROR = np.array([0.02, 0.02, 0.1, 0.001, 0.002, 0.002])

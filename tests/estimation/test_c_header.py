@@ -19,7 +19,7 @@ from tests.estimation.synthetic import campaign
 
 TARGET = "proximal_torque_n_m"
 COMPILER = shutil.which("cc") or shutil.which("gcc")
-pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+pytestmark = [pytest.mark.integration, pytest.mark.skipif(COMPILER is None, reason="no C compiler")]
 
 MAIN = """
 #include <stdio.h>

@@ -28,6 +28,8 @@ from estimation.fitting import fit
 from estimation.recording import Flag, Instrument, Stretch
 from tests.estimation import synthetic
 
+pytestmark = pytest.mark.long
+
 MOTOR = model_file.read(Path("motor"))
 QUICK = Gates(surrogates=99)
 

@@ -20,6 +20,8 @@ from estimation.recording import Recording
 from estimation.stream import Stream
 from tests.estimation import synthetic
 
+pytestmark = pytest.mark.integration
+
 TRUE = {
     "change.step": ((7.0, 2.0), [0.02]),
     "change.step.campaign": ((100.0, 2.0), [0.02]),

@@ -22,9 +22,9 @@ from estimation.networks.training import Settings, has_torch
 from estimation.recording import MissingChannelError, Recording
 from tests.estimation.synthetic import campaign
 
-torch_only = pytest.mark.skipif(
-    not has_torch(), reason="torch is not installed: pip install 'rig[learn]'"
-)
+pytestmark = pytest.mark.integration
+
+torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 TARGET = "proximal_torque_n_m"
 PAPER_INPUTS = ("spindle_angle_rad", "spindle_velocity_rad_s", "motor_current_a")
 STATES = (*PAPER_INPUTS, "motor_acceleration_rad_s2", "spindle_travel_rad")

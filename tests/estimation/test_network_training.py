@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimation.errors import MissingExtraError
 from estimation.networks import training
 from estimation.networks.network import NetworkError, to_unit
 from estimation.networks.training import Settings, train
 from tests.estimation.test_networks import IN, OUT, make
 
-pytest.importorskip("torch", reason="torch is not installed: pip install 'rig[learn]'")
+pytestmark = pytest.mark.integration
+
+pytest.importorskip("torch", reason="torch is not installed (extra learn)")
 
 
 def rows(count: int, seed: int = 0) -> np.ndarray:
@@ -86,7 +89,7 @@ def test_rows_that_cannot_be_learnt_from_are_refused(monkeypatch):
     with pytest.raises(NetworkError, match="do not hold 2 columns"):
         train(x[:, :1], y, (IN, OUT[:1]))
     monkeypatch.setattr(training, "has_torch", lambda: False)
-    with pytest.raises(NetworkError, match="torch is not installed"):
+    with pytest.raises(MissingExtraError, match="torch, which is not installed"):
         train(x, y, (IN, OUT[:1]))
 
 

@@ -6,6 +6,8 @@ import pytest
 from estimation.diagnosis.result import Diagnosis, Finding
 from tests.estimation.test_diagnosis import diagnosed, runs
 
+pytestmark = pytest.mark.long
+
 HAVE = (1, 2, 5, 8, 10, 11)
 
 

@@ -15,6 +15,8 @@ from rig.cli.main import main
 from rig.log.convert import write_recording
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.integration
+
 TARGET = "proximal_torque_n_m"
 
 

@@ -9,6 +9,8 @@ from rig.calibrate.hands import HandledBench, LoadedRdt
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def rig(tmp_path, monkeypatch, capsys):

@@ -17,6 +17,8 @@ from rig.canopen.process import CanopenProcess
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 
+pytestmark = pytest.mark.integration
+
 
 def config(**changes: object) -> Config:
     settings = load_config(Path("canopen_virtual"))

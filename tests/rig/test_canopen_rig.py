@@ -26,6 +26,8 @@ from rig.machines.choose import machine_of
 from rig.protocols.protocol import Protocol
 from rig.recording.campaign import open_campaign_folder, record_campaign
 
+pytestmark = pytest.mark.integration
+
 ANGLE = np.linspace(-1.0, -0.8, 600)
 NO_LOAD = np.zeros(600)
 

@@ -13,6 +13,8 @@ from rig.cli.main import app, main
 from rig.errors import DataError, ExitCode, UsageError, exit_code_of
 from rig.output.console import plain
 
+pytestmark = pytest.mark.integration
+
 
 def test_help_imports_nothing_heavy():
     code = (

@@ -7,6 +7,8 @@ import pytest
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED, load_config
 
+pytestmark = pytest.mark.integration
+
 CERTIFICATE = """
 name = "certificate"
 [channels.proximal_torque_n_m]

@@ -12,6 +12,8 @@ from rig.cli.main import main
 from rig.configuration.config import SIMULATED
 from rig.simulation.parameters import PlantParameters
 
+pytestmark = pytest.mark.integration
+
 
 @pytest.fixture
 def calibrate(tmp_path, monkeypatch, capsys):

@@ -14,6 +14,8 @@ from rig.diagnosis.schema import DiagnosisSchema
 from rig.importers.registry import open_campaign
 from rig.log.reader import read_log
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):

@@ -24,6 +24,8 @@ from rig.diagnosis.ledger import Ledger, LedgerError
 from rig.diagnosis.schema import FILE, DiagnosisSchema, json_schema
 from tests.estimation.test_diagnosis import runs, spring, tight_spot
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 
 

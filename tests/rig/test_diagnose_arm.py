@@ -16,7 +16,9 @@ from rig.diagnosis import subject
 from rig.diagnosis.noise import repeats
 from rig.diagnosis.schema import DiagnosisSchema
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (rig[arm])")
+pytestmark = pytest.mark.long
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 def runs() -> Campaign:

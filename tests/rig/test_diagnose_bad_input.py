@@ -16,6 +16,8 @@ from rig.cli.main import main
 from rig.diagnosis import subject
 from tests.estimation.test_diagnosis import runs, spring
 
+pytestmark = pytest.mark.long
+
 Spoil = Callable[[list[Recording]], list[Recording]]
 
 

@@ -19,6 +19,8 @@ from rig.protocols.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import HiddenEffect
 from tests.rig.rippled import MOTOR, QUICK, few, record
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(autouse=True, scope="module")
 def _few_effects():

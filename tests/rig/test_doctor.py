@@ -25,6 +25,8 @@ from rig.doctor.udev import USB, has_rule, udev_rules
 from rig.errors import ExitCode, UsageError
 from tests.rig.simulated import simulated
 
+pytestmark = pytest.mark.integration
+
 
 def by_check(findings: list[Finding]) -> dict[str, Finding]:
     return {finding.check: finding for finding in findings}

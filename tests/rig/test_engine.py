@@ -21,6 +21,8 @@ from rig.errors import UsageError
 from rig.simulation.hidden import HiddenEffect
 from tests.rig.rippled import MOTOR, QUICK, few, record
 
+pytestmark = pytest.mark.long
+
 distributed = pytest.importorskip("distributed")
 
 PATIENCE_S = 120.0

@@ -13,6 +13,8 @@ from rig.cli.main import main
 from rig.log.convert import write_recording
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 TARGET = "proximal_torque_n_m"
 OFF_N_M = 0.1
 """More than the half width of the estimator's interval in a part of every run."""

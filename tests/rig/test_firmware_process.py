@@ -20,6 +20,8 @@ from rig.configuration.config import load_config
 from rig.errors import SafetyTripError
 from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
 
+pytestmark = pytest.mark.integration
+
 HOST = """
 import sys
 import numpy as np

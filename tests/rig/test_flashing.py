@@ -19,6 +19,8 @@ from rig.errors import SafetyTripError, UsageError
 from rig.machines.choose import machine_of
 from rig.simulation.firmware_process import PROGRAM
 
+pytestmark = pytest.mark.integration
+
 TEENSY = {"vid": 0x16C0, "pid": 0x0483}
 
 

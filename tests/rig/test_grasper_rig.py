@@ -21,6 +21,8 @@ from rig.log.reader import read_log
 from rig.protocols.protocol import Protocol, load_protocol
 from rig.recording.campaign import open_campaign_folder, record_campaign
 
+pytestmark = pytest.mark.integration
+
 STILL = np.zeros(2000)
 
 

@@ -11,6 +11,8 @@ from rig.errors import SafetyTripError
 from rig.live.grip import hold_grip
 from tests.rig.simulated import is_armed, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 
 def test_a_torque_is_held_by_the_estimate_and_the_sensor_agrees(capsys):
     assert main(["grip", "--torque", "0.06", "--json"]) == 0

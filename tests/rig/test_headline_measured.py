@@ -17,7 +17,7 @@ from rig.importers.jaw_steps import with_one_zero
 from rig.importers.registry import open_campaign
 from rig.models.adapt import run_adaptation
 
-pytestmark = pytest.mark.measured
+pytestmark = [pytest.mark.long, pytest.mark.measured]
 
 ROOT = Path(__file__).parents[2]
 TARGET, LOAD = "proximal_torque_n_m", "motor_current_a"

@@ -15,6 +15,8 @@ from rig.live.model_status import with_model_status
 from rig.live.replay import replay_blocks
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.integration
+
 SPINDLE = "proximal_torque_n_m"
 
 

@@ -15,6 +15,8 @@ from rig.errors import UsageError
 from rig.live import foxglove as served
 from rig.live.block import DeviceStatus, SampleBlock
 
+pytestmark = pytest.mark.integration
+
 pytest.importorskip("foxglove")
 
 

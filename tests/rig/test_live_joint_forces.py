@@ -23,6 +23,8 @@ from rig.live.state import Reading, Snapshot, Value
 from rig.live.view import View
 from rig.log.convert import write_recording
 
+pytestmark = pytest.mark.integration
+
 MODEL = SHIPPED / "simulated_grasper.model.toml"
 
 

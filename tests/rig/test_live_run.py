@@ -12,6 +12,8 @@ from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.options import ShowOptions
 from rig.live.run import show
 
+pytestmark = pytest.mark.integration
+
 GRIP = "distal_torque_n_m"
 
 

@@ -15,6 +15,8 @@ from rig.live.until import until
 from rig.protocols.protocol import load_protocol
 from tests.rig.simulated import is_armed, short_protocol, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 
 def test_a_plan_is_played_and_every_sample_shown_once():
     config = simulated()

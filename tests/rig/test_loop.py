@@ -18,6 +18,8 @@ from rig.protocols.protocol import load_protocol
 from rig.simulation.hidden import NAMES, UnknownHiddenEffectError, chosen
 from tests.rig.simulated import short_protocol, simulated
 
+pytestmark = pytest.mark.long
+
 NEXT = {
     "name": "small",
     "protocol": {

@@ -6,6 +6,8 @@ import pytest
 from rig.studies.oneill import fits
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.integration
+
 
 def test_fits_find_the_line():
     random = np.random.default_rng(0)

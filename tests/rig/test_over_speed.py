@@ -15,6 +15,8 @@ from rig.machines.reading import Reading
 from rig.machines.reference import ReferenceMachine
 from tests.rig.simulated import simulated, transport
 
+pytestmark = pytest.mark.integration
+
 MAX_STEP = 100
 LIMITS = dataclasses.replace(Limits.widest(), max_motor_step=MAX_STEP)
 TICKS = 400

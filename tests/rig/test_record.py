@@ -18,6 +18,8 @@ from rig.log.streams import COUNTS, SAMPLE
 from rig.recording.campaign import open_campaign_folder, record_campaign
 from tests.rig.simulated import Wrapped, short_protocol, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 
 def record(folder, config=None, protocol=None, resume=False, link=None, **options):
     config = config or simulated()

@@ -14,6 +14,8 @@ from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
 from drivers.transport.faulty import Fault
 
+pytestmark = pytest.mark.integration
+
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
 def test_a_decoder_refuses_or_reads_right_whatever_comes(target: fuzz.Target) -> None:

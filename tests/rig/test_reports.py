@@ -25,6 +25,8 @@ from rig.studies.oneill.page import page
 from rig.studies.oneill.study import Source, run_study
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.integration
+
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 
 

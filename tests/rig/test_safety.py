@@ -18,6 +18,8 @@ from rig.machines.reference import ReferenceMachine
 from rig.machines.safety import board_limits, check_samples
 from tests.rig.simulated import Wrapped, is_armed, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 HOLD = np.full(3000, -1.0)
 CLOSE = np.concatenate([np.linspace(-1.0, 0.0, 1500), np.zeros(1500)])
 LOAD = np.full(3000, 0.6)

@@ -15,6 +15,8 @@ from rig.configuration.config import Config, load_config
 from rig.doctor.selftest import selftest
 from tests.rig.simulated import Wrapped, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 
 @pytest.mark.bench
 def test_the_bench_passes_its_acceptance_test() -> None:

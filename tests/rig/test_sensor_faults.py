@@ -21,6 +21,8 @@ from drivers.teensy.reference import REFERENCE
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
 
+pytestmark = pytest.mark.integration
+
 TICK_FUNCTION = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p
 )

@@ -20,6 +20,8 @@ from rig.errors import ExitCode, SafetyTripError, exit_code_of
 from rig.machines.reading import reading_of, with_setpoints
 from tests.rig.simulated import Wrapped, is_armed, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 HOLD = np.full(600, -1.0)
 LOAD = np.full(600, 0.3)
 

@@ -7,6 +7,8 @@ from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.configuration.config import load_config
 
+pytestmark = pytest.mark.integration
+
 
 def test_a_session_states_the_residual_of_its_clock() -> None:
     config = load_config()

@@ -20,6 +20,8 @@ from rig.simulation.bench import BenchInputError, SimulatedBench
 from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.parameters import REFERENCE_GAINS
 
+pytestmark = pytest.mark.integration
+
 GAINS = np.array(REFERENCE_GAINS)
 TICKS = 600
 TARGET = np.round(683 * (1 + np.cos(2 * np.pi * 0.5e-3 * np.arange(TICKS)))).astype(np.int32)

@@ -13,6 +13,8 @@ from rig.simulation.bench import SimulatedBench
 from rig.simulation.compare import CHANNELS, compare, draw_figure
 from rig.simulation.play import play
 
+pytestmark = pytest.mark.integration
+
 
 def simulated_run() -> Recording:
     target = trajectory.sine(5.0, -np.pi / 3, np.pi / 6, 0.3)

@@ -11,16 +11,17 @@ from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import (
-    KINDS,
     NAMES,
     HiddenEffect,
-    Kind,
     UnknownHiddenEffectError,
     draw,
     table,
 )
+from rig.simulation.hidden_kinds import KINDS, Kind
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
+
+pytestmark = pytest.mark.integration
 
 OPEN_RAD = -1366 * 2 * np.pi / 8192
 Columns = dict[str, NDArray[np.float64]]

@@ -14,6 +14,8 @@ from rig.simulation.hidden import HiddenEffect
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.play import play
 
+pytestmark = pytest.mark.integration
+
 FREE = PlantParameters(
     motor_friction_n_m=0.0,
     motor_viscous_n_m_s_rad=0.0,

@@ -10,6 +10,8 @@ from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import REFERENCE_GAINS, SensorParameters
 from rig.simulation.play import play
 
+pytestmark = pytest.mark.integration
+
 GAINS = np.array(REFERENCE_GAINS)
 QUIET = SensorParameters(
     proximal_noise_n_m=0.0,

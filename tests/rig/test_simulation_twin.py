@@ -16,6 +16,8 @@ from rig.simulation.parameters import SensorParameters, vary
 from rig.simulation.twin import build_twin, twins
 from tests.rig import declared_models as declared
 
+pytestmark = pytest.mark.integration
+
 PLANT = vary(DECLARED_PLANT, 3)
 SENSORS = vary(SensorParameters(), 3)
 NOISE_FACTOR = 1.1

@@ -7,6 +7,8 @@ import pytest
 
 from rig.cli.main import app
 
+pytestmark = pytest.mark.integration
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -19,6 +19,8 @@ from rig.configuration.config import load_config
 from rig.errors import ExitCode
 from rig.simulation.firmware_process import PROGRAM
 
+pytestmark = pytest.mark.integration
+
 SESSION = """
 import sys
 import numpy as np

@@ -13,7 +13,9 @@ from rig.studies.delsol.diagnosis import PULLS, Named
 from rig.studies.delsol.page import lead
 from rig.studies.delsol.study import DelSolStudy
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytestmark = pytest.mark.long
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path):

@@ -10,6 +10,8 @@ from rig.studies.instruments import page as shown
 from rig.studies.instruments.study import run_instruments
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 TARGET = "proximal_torque_n_m"
 
 

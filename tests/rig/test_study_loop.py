@@ -13,6 +13,8 @@ from rig.cli.main import main
 from rig.errors import DataError
 from rig.studies.loop import study as loop
 
+pytestmark = pytest.mark.long
+
 STICKING = effect("friction.position.sticking")
 FEW = ("friction.position", "friction.viscous", "inertia.missing", "spring.position")
 

@@ -18,6 +18,8 @@ from rig.studies.oneill import study
 from rig.studies.oneill.study import Result, Source, open_reference, run_study
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def result() -> Result:

@@ -8,6 +8,8 @@ from rig.studies.oneill import page as shown
 from rig.studies.oneill.kinds import FILTERS, recipes, run_kinds
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def rows():

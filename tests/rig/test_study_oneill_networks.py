@@ -9,10 +9,12 @@ import typer
 from typer.testing import CliRunner
 
 from estimation.campaign import Campaign
+from estimation.errors import MissingExtraError
+from estimation.networks import training
 from estimation.networks.training import Settings, has_torch, train
 from estimation.scores import rmse
 from rig.cli.study import study_app
-from rig.errors import DataError, UsageError
+from rig.errors import DataError
 from rig.studies.oneill import networks as study
 from rig.studies.oneill import networks_page as shown
 from rig.studies.oneill import study as linear
@@ -24,9 +26,9 @@ from rig.studies.oneill.study import Source, run_study
 from rig.studies.oneill.tables import tables as paper_tables
 from tests.estimation.synthetic import campaign
 
-torch_only = pytest.mark.skipif(
-    not has_torch(), reason="torch is not installed: pip install 'rig[learn]'"
-)
+pytestmark = pytest.mark.long
+
+torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 QUICK = Settings(iterations=4)
 
 
@@ -95,7 +97,7 @@ def test_data_of_experiment_3_is_missed_out_loud(tmp_path):
 @pytest.fixture(scope="module")
 def deep(table, tmp_path_factory) -> NetworkStudy:
     if not has_torch():
-        pytest.skip("torch is not installed: pip install 'rig[learn]'")
+        pytest.skip("torch is not installed (extra learn)")
     folder = tmp_path_factory.mktemp("state")
     whole = study.jobs
 
@@ -159,8 +161,8 @@ def test_the_papers_tables_are_row_by_row_next_to_the_printed_ones(deep):
 
 
 def test_without_torch_it_is_said_what_to_install(table, tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "has_torch", lambda: False)
-    with pytest.raises(UsageError, match="torch"):
+    monkeypatch.setattr(training, "has_torch", lambda: False)
+    with pytest.raises(MissingExtraError, match="torch"):
         run_networks({"neutral": table}, tmp_path)
 
 

@@ -14,6 +14,8 @@ from rig.studies.oneill.state_rows import StateJob, ablated
 from rig.studies.oneill.states import run_states
 from tests.estimation.synthetic import campaign
 
+pytestmark = pytest.mark.long
+
 EFFECT = "load of the last 0.5 s"
 
 

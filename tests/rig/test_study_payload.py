@@ -17,7 +17,9 @@ from rig.cli.main import main
 from rig.cli.study import study_app
 from rig.errors import DataError
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytestmark = pytest.mark.long
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
 @pytest.mark.measured

@@ -20,7 +20,9 @@ from rig.errors import DataError
 from rig.importers.dvrk_psm import MOTOR_TO_JOINT
 from rig.studies.pique import study as pique
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytestmark = pytest.mark.long
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 RATE_HZ = 100.0
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 from rig.studies.seeds import kept_outcomes
+
+pytestmark = pytest.mark.integration
 
 
 @dataclass(frozen=True)

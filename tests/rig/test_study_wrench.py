@@ -9,12 +9,14 @@ from typer.testing import CliRunner
 from rig.cli.main import main
 from rig.cli.study import study_app
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
 from rig.arm.simulated import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
 from rig.studies.pique.wrench import BODY, TWISTED, ati, in_tip_frame
+
+pytestmark = pytest.mark.long
 
 
 def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):

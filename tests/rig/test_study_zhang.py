@@ -20,10 +20,10 @@ from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies.zhang.study import PAPER, run_zhang
 
-pytest.importorskip("pinocchio", reason="Pinocchio is not installed (pip install 'rig[arm]')")
-torch_only = pytest.mark.skipif(
-    not has_torch(), reason="torch is not installed: pip install 'rig[learn]'"
-)
+pytestmark = pytest.mark.long
+
+pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
+torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed (extra learn)")
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,8 @@ from rig.studies.zhao.methods import Lacking, axes_of, lacking
 from rig.studies.zhao.page import markdown
 from rig.studies.zhao.paper import DOFS, PAPER_ERRORS_N
 
+pytestmark = pytest.mark.long
+
 IDEAL = AxisParameters(
     coulomb_n_m=0.0, load_friction_ratio=0.0, viscous_n_m_s_rad=0.0, current_noise_a=0.0
 )

@@ -23,6 +23,8 @@ from rig.recording.watch import watch_runs
 from tests.estimation import synthetic
 from tests.rig.simulated import short_protocol, simulated, transport
 
+pytestmark = pytest.mark.integration
+
 SHORT = short_protocol(5, duration_s=3.0)
 
 

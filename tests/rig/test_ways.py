@@ -15,6 +15,8 @@ from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.log.reader import LogFile, read_log
 
+pytestmark = pytest.mark.integration
+
 WAYS = {
     "fakes": ("simulated", "firmware = false"),
     "library": ("simulated", "firmware = true"),

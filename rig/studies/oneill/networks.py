@@ -18,10 +18,9 @@ import numpy as np
 
 from estimation.networks import network as net
 from estimation.networks.network import Network
-from estimation.networks.training import Settings, has_torch, train
+from estimation.networks.training import Settings, require_torch, train
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
-from rig.errors import UsageError
 from rig.output.provenance import Provenance
 from rig.studies.oneill.closing_table import CAUSAL, ClosingTable, held_out_masks, mapped
 from rig.studies.oneill.paper import DISTAL, GRIP_ARM_M, JAW, PROXIMAL
@@ -337,14 +336,10 @@ def run_networks(
         on_network: Called with the number of networks trained and their total.
 
     Raises:
-        UsageError: torch is missing.
+        MissingExtraError: torch is missing.
         NetworkError: A kept network is damaged.
     """
-    if not has_torch():
-        raise UsageError(
-            "Networks cannot be trained: torch is not installed.",
-            fix="Install it: pip install 'rig[learn]'.",
-        )
+    require_torch()
     settings = settings or Settings()
     trainer = Trainer(tables, state, settings, every, seed)
     planned = [job for job in jobs(tuple(tables)) if trainer.masks(job)]

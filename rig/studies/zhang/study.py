@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from estimation.arm.kinematics import pinocchio
-from estimation.networks.training import has_torch
+from estimation.networks.training import require_torch
 from estimation.recording import FloatArray
-from rig.errors import UsageError
 from rig.output.provenance import Provenance
 from rig.studies.seeds import kept_outcomes
 from rig.studies.zhang.free import NETWORKS, Cells
@@ -120,15 +119,10 @@ def run_zhang(
         on_seed: Called after each seed, also after one that was kept.
 
     Raises:
-        UsageError: torch is missing.
-        PinocchioMissingError: Pinocchio is missing.
+        MissingExtraError: torch or Pinocchio is missing.
         OSError: The folder cannot be written.
     """
-    if not has_torch():
-        raise UsageError(
-            "The paper's networks cannot be trained: torch is not installed.",
-            fix="Install it: pip install 'rig[learn]'.",
-        )
+    require_torch()
     pinocchio()
     outcomes = kept_outcomes(
         one_seed, _read, seeds, state, SCHEMA, workers=workers, start=_one_thread, on_seed=on_seed

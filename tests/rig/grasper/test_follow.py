@@ -25,6 +25,8 @@ from rig.grasper.master import master_of
 from rig.log.reader import read_log
 from tests.rig.simulated import is_armed
 
+pytestmark = pytest.mark.integration
+
 CHIEF = master_of(load_config(Path("grasper")))
 HERE = (0.1, 0.0, -0.05)
 

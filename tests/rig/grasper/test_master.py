@@ -12,7 +12,7 @@ from rig.grasper.master import Master, master_of
 
 
 def configured(**master):
-    return load_config(Path("grasper")).changed(master=master)
+    return load_config(Path("grasper")).changed(machine={"master": master})
 
 
 def test_zero_and_turn_of_each_potentiometer_are_the_configurations():
@@ -36,6 +36,6 @@ def test_a_potentiometer_at_its_rail_commands_nothing(counts):
 def test_a_potentiometer_that_shows_nothing_is_refused(turn, tmp_path):
     path = tmp_path / "rig.toml"
     shipped = (SHIPPED / "grasper.toml").read_text()
-    path.write_text(f"{shipped}\n[master]\nrad_per_count = [1e-3, {turn}, 1e-3]\n")
+    path.write_text(f"{shipped}\n[machine.master]\nrad_per_count = [1e-3, {turn}, 1e-3]\n")
     with pytest.raises(UsageError, match="rad_per_count"):
         load_config(path)

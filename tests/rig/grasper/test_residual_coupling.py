@@ -8,6 +8,8 @@ import pytest
 from rig.cli.main import main
 from rig.grasper.wrist_plant import Wrist, play_wrist
 
+pytestmark = pytest.mark.integration
+
 
 def diagnosed(folder, *, pulley_ratio, seed=3):
     words = [

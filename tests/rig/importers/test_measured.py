@@ -9,7 +9,7 @@ from rig.importers.dvrk_psm import IMPORTER as PSM
 from rig.importers.jaw_steps import jaw_zeros
 from rig.importers.mrdlab import IMPORTER
 
-pytestmark = pytest.mark.measured
+pytestmark = [pytest.mark.long, pytest.mark.measured]
 
 
 @pytest.fixture(scope="module")

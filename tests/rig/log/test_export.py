@@ -90,10 +90,10 @@ def test_all_topics_go_to_a_folder(log, tmp_path):
 
 def test_a_file_that_is_there_is_kept_unless_forced(log, tmp_path):
     target = tmp_path / "run.rig-counts.csv"
-    target.write_text("precious,table\n")
+    target.write_text("precious,row\n1,2\n")
     with pytest.raises(ExportExistsError, match="--force"):
         export_log(log, ExportFormat.CSV)
-    assert target.read_text() == "precious,table\n"
+    assert target.read_text() == "precious,row\n1,2\n"
     assert not (tmp_path / "run.rig-sample.csv").exists()
     export_log(log, ExportFormat.CSV, force=True)
     assert target.read_text().startswith("log_time_ns,motor,spindle")

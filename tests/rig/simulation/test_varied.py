@@ -11,6 +11,8 @@ from rig.simulation.varied import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
 from rig.simulation.varied.plant import draw_plant
 from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 
+pytestmark = pytest.mark.integration
+
 FIRST = DEVELOP.start
 
 

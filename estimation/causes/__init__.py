@@ -1,0 +1,1 @@
+"""Physical causes of the residual of declared equations: hypotheses and their probabilities."""

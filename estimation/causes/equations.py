@@ -1,0 +1,282 @@
+"""The declared equations of a machine on its runs: fitted terms, columns, and which samples count.
+
+Every channel goes through the zero-phase filter of the equations' models and is kept at a few times
+its cutoff. Effects with memory are worked out on that series; everything is regressed on a coarser
+grid that all equations of a run share.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from estimation.campaign import Campaign
+from estimation.derived import (
+    CAMPAIGN_TIME,
+    GEAR_RATIO,
+    GEARBOX,
+    measured_channels,
+    origin_of,
+    zero_phase_channels,
+)
+from estimation.effects import Proportional
+from estimation.errors import EstimationError
+from estimation.fitting import OFFSET, fit
+from estimation.model import Model, Term
+from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.rest import SLOWEST_RAD_S, in_motion
+
+SERIES_PER_CUTOFF = 5.0
+"""Samples kept for each period of the filter's cutoff, for effects with memory."""
+
+GRID_PER_CUTOFF = 1.7
+"""Samples regressed on for each period of the cutoff: neighbours nearer than that are alike."""
+
+SHAPE_STEP = 0.02
+"""Relative step of the derivative of a declared column by its shape."""
+
+ANGLES = ("_angle_rad", "_position_m")
+RATES = {
+    "_angle_rad": ("_velocity_rad_s", "_acceleration_rad_s2"),
+    "_position_m": ("_velocity_m_s", "_acceleration_m_s2"),
+}
+
+
+class LayoutError(EstimationError):
+    """The runs do not hold what the declared equations need."""
+
+
+@dataclass(frozen=True)
+class RunSignals:
+    """The filtered channels of one run.
+
+    Attributes:
+        name: Name of the run.
+        channels: Channel to values, each of shape (n,), SI units; further signals may be added.
+        rate_hz: Rate of these values.
+        grid: Places regressed on, indices into n.
+        used: Equation to the samples it counts, indices into `grid`.
+        conditions: What was held constant.
+    """
+
+    name: str
+    channels: dict[str, FloatArray]
+    rate_hz: float
+    grid: NDArray[np.intp]
+    used: Mapping[str, NDArray[np.intp]]
+    conditions: Mapping[str, float | str]
+
+    @cached_property
+    def memo(self) -> dict[object, FloatArray | None]:
+        """Columns already worked out."""
+        return {}
+
+    def on_grid(self, channel: str) -> FloatArray:
+        """Return a channel at the places regressed on, shape (len(grid),)."""
+        key = ("grid", channel)
+        found = self.memo.get(key)
+        if found is None:
+            found = self.memo[key] = self.channels[channel][self.grid]
+        return found
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One declared equation, fitted on the training runs.
+
+    Attributes:
+        name: Its id, such as `motor`.
+        model: The fitted model.
+        channels: Channel to the weight of the term that is proportional to it.
+        speed: Channel of the speed its friction depends on; empty without friction.
+        width: Speed over which the declared friction changes its sign; 0 without friction.
+    """
+
+    name: str
+    model: Model
+    channels: Mapping[str, float]
+    speed: str
+    width: float
+
+    @property
+    def target(self) -> str:
+        """Channel on the left-hand side."""
+        return self.model.target
+
+    @property
+    def of_angle(self) -> bool:
+        """Whether the left-hand side is an angle or a length: a deflection, not a torque."""
+        return self.model.unit in ("rad", "m")
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The terms, without an offset: offsets of runs are nuisance parameters."""
+        return tuple(t for t in self.model.terms if t.effect.id != OFFSET)
+
+    def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the declared columns, signed, and their derivatives by the shapes, (n, k)."""
+        parts = []
+        for term in self.terms:
+            shape = term.numbers(term.effect.shape)
+            weights = np.array(term.numbers(term.effect.amplitudes))
+            parts.append(term.sign * term.columns(channels, shape))
+            for k, value in enumerate(shape):
+                step = SHAPE_STEP * (abs(value) or 1.0)
+                ends = [
+                    term.columns(channels, [*shape[:k], value + s * step, *shape[k + 1 :]])
+                    for s in (1, -1)
+                ]
+                scale = weights if np.any(weights) else np.ones(len(weights))
+                parts.append(term.sign * ((ends[0] - ends[1]) @ scale)[:, None])
+        return np.hstack(parts)
+
+    def estimate(self, channels: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the right-hand side without offsets, shape (n,)."""
+        return np.asarray(
+            sum(
+                term.columns(channels, term.numbers(term.effect.shape)) @ np.array(term.weights)
+                for term in self.terms
+            )
+        )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Equations and runs.
+
+    Attributes:
+        equations: Name to equation.
+        runs: The runs, in the order they were recorded.
+        measured: Channels that every run has.
+        independent: Pairs of an effort and an equation that has it from other sensors than its own.
+    """
+
+    equations: Mapping[str, Equation]
+    runs: Sequence[RunSignals]
+    measured: tuple[str, ...]
+    independent: set[tuple[str, str]] = field(default_factory=set)
+
+    def select(self, names: Sequence[str]) -> "Layout":
+        """Return the same equations on some of the runs."""
+        kept = set(names)
+        return replace(self, runs=[run for run in self.runs if run.name in kept])
+
+
+def lay_out(
+    models: Sequence[Model], recordings: Sequence[Recording], train: Sequence[str]
+) -> Layout:
+    """Fit declared equations on the training runs and lay out every run.
+
+    Args:
+        models: Declared models, one an equation.
+        recordings: All runs.
+        train: Names of the runs that may be fitted on.
+
+    Raises:
+        LayoutError: A run has no sample to regress on.
+        FitError: An equation cannot be identified.
+    """
+    timed = _on_one_clock(recordings)
+    campaign = Campaign.of([r for r in timed if r.name in set(train)])
+    measured = tuple(n for n in shared_columns(timed) if n != CAMPAIGN_TIME)
+    equations = {}
+    for model in models:
+        if set(measured_channels([*model.channels, model.target])) <= {*measured, "time_s"}:
+            equations[model.balance] = _equation(fit(model, campaign, bootstrap=0, every=None))
+    if not equations:
+        raise LayoutError(
+            "No declared equation can be written with these channels.",
+            f"The runs have {', '.join(measured)}.",
+            "Declare an equation of channels that were recorded.",
+        )
+    return Layout(equations, [_signals(r, equations, measured) for r in timed], measured)
+
+
+def sensitivity(name: str, measured: str) -> tuple[float, int] | None:
+    """Return how a channel follows an error of a measured one: (gain, times differentiated).
+
+    Args:
+        name: Measured or derived channel.
+        measured: Measured channel whose reading is wrong.
+
+    Returns:
+        None where the channel does not read it.
+    """
+    if name == GEARBOX:
+        gains = {"motor_angle_rad": 1.0 / GEAR_RATIO, "spindle_angle_rad": -1.0}
+        return (gains[measured], 0) if measured in gains else None
+    source, times = origin_of(name)
+    return (1.0, times) if source == measured else None
+
+
+def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the runs with the campaign's time; where no start is known they follow one another."""
+    known = Campaign.of(recordings).timed()
+    timed = list(known.evidence)
+    if all(CAMPAIGN_TIME in r for r in timed):
+        return sorted(timed, key=lambda r: float(r[CAMPAIGN_TIME][0]))
+    out, start_s = [], 0.0
+    for recording in sorted(recordings, key=lambda r: r.name):
+        own_s = recording.time_s - recording.time_s[0]
+        out.append(recording.with_columns(**{CAMPAIGN_TIME: start_s + own_s}))
+        start_s += float(own_s[-1])
+    return out
+
+
+def _equation(model: Model) -> Equation:
+    channels: dict[str, float] = {}
+    speed, width = "", 0.0
+    for term in model.terms:
+        if isinstance(term.effect, Proportional) and term.effect.id != OFFSET:
+            (channel,) = term.channels.values()
+            channels[channel] = channels.get(channel, 0.0) + float(term.weights[0])
+        if term.effect.id == "friction.coulomb":
+            speed, width = term.channels["speed"], term.values["width"].value
+    return Equation(model.balance, model, channels, speed, width)
+
+
+def _signals(
+    recording: Recording, equations: Mapping[str, Equation], measured: Sequence[str]
+) -> RunSignals:
+    models = [equation.model for equation in equations.values()]
+    moved = [
+        angle.removesuffix(kind) + rate
+        for angle in measured
+        for kind, rates in RATES.items()
+        if angle.endswith(kind)
+        for rate in rates
+    ]
+    wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
+    low_pass = models[0].low_pass
+    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass)
+    rate_hz = recording.sample_rate_hz
+    step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
+    edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
+    spoilt = ndimage.maximum_filter1d((~filtered.valid).astype(np.uint8), 2 * edge + 1) > 0
+    spoilt[:edge] = True
+    spoilt[max(len(spoilt) - edge, 0) :] = True
+    channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
+    channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
+    channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
+    valid, rate_hz = ~spoilt[::step], rate_hz / step
+    coarse = max(1, round(rate_hz / (GRID_PER_CUTOFF * low_pass.cutoff_hz)))
+    grid = np.arange(0, len(valid), coarse)
+    grid = grid[valid[grid]]
+    used = {}
+    for equation in equations.values():
+        moving = np.ones(len(valid), bool)
+        if equation.speed and equation.model.counted != "all":
+            slowest = SLOWEST_RAD_S.get(equation.speed, 0.0)
+            moving = in_motion(channels[equation.speed], valid, rate_hz, slowest)
+        used[equation.name] = np.flatnonzero(moving[grid])
+        if len(used[equation.name]) < 20:
+            raise LayoutError(
+                f"Run {recording.name!r} has {len(used[equation.name])} samples for the equation"
+                f" {equation.name}.",
+                "The others are flagged, at rest, or too near to the ends for the filter.",
+                "Record it again, or exclude it.",
+            )
+    return RunSignals(recording.name, channels, rate_hz, grid, used, dict(recording.conditions))

@@ -1,0 +1,181 @@
+"""Causes of unknown form: smooth functions of one or two variables and the direction of motion."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.instruments import signal
+from estimation.causes.places import Place, direction_width
+from estimation.derived import CAMPAIGN_TIME
+from estimation.recording import FloatArray
+
+KNOTS = 6
+"""Knots of a variable's hat functions."""
+
+PLAY = 0.06
+"""Half width of the play operator that stands for history, share of the travel."""
+
+GROWTH_S, FADE_S = 0.1, 0.3
+"""Dwell: the logarithm of the last rest over the first time, fading in motion by the second."""
+
+LOOSE_PLACES = ("loss", "deflection", "actuator")
+
+
+@dataclass(frozen=True)
+class Function:
+    """A smooth function of variables, acting at a place.
+
+    Attributes:
+        place: Where it acts.
+        variables: Names of its variables, as a verdict lists them.
+        ranges: Range of each variable that the knots cover.
+        width: Speed over which friction changes its sign.
+    """
+
+    place: Place
+    variables: tuple[str, ...]
+    ranges: tuple[tuple[float, float], ...]
+    width: float
+
+    family = "unknown"
+
+    def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:
+        """Return the tensor product of the variables' bases in every equation it enters."""
+        made = {}
+        for entry in self.place.enters:
+            product = np.ones((len(run.grid), 1))
+            for variable, (low, high) in zip(self.variables, self.ranges, strict=True):
+                values = variable_of(run, self.place, variable, entry.equation, self.width)
+                own = _basis(variable, values, low, high)
+                product = (product[:, :, None] * own[:, None, :]).reshape(len(own), -1)
+            made[entry.equation] = entry.gain * product[run.used[entry.equation]]
+        return made
+
+
+def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
+    """Yield every smooth function that competes at a place."""
+    if place.kind not in LOOSE_PLACES or any(e.order for e in place.enters):
+        return
+    width = direction_width(layout, place)
+    known = variables_at(layout, place)
+    chosen: list[tuple[str, ...]] = [(v,) for v in known]
+    chosen += list(itertools.combinations(known, 2))
+    if "velocity_sign" in known:
+        rest = [v for v in known if v not in ("velocity_sign", "velocity", "time")]
+        chosen += [
+            ("velocity_sign", *pair) for pair in itertools.combinations(rest, 2) if "load" in pair
+        ]
+    for variables in chosen:
+        ranges = tuple(_variable_range(layout, place, v, width) for v in variables)
+        yield Function(place, variables, ranges, width)
+
+
+def variables_at(layout: Layout, place: Place) -> list[str]:
+    """Return the variables a cause at a place may depend on, simplest first."""
+    roles = place.roles
+    found = []
+    if "speed" in roles and direction_width(layout, place):
+        found += ["velocity_sign", "velocity"]
+    if "position" in roles:
+        found.append("position")
+    if "load" in roles:
+        found.append("load")
+    if "current" in roles:
+        found.append("current")
+    if "acceleration" in roles and place.kind == "loss":
+        found.append("acceleration")
+    if "travel" in roles:
+        found += ["history", "dwell"]
+    found.append("time")
+    return found
+
+
+def reported(place: Place, variable: str) -> str:
+    """Return the name under which a variable of a place is reported."""
+    if variable != "position":
+        return variable
+    angle = place.roles["position"][0]
+    return {"jaw_angle_rad": "jaw_angle", "motor_angle_rad": "motor_angle"}.get(
+        angle, "spindle_angle"
+    )
+
+
+def variable_of(
+    run: RunSignals, place: Place, variable: str, equation: str, width: float
+) -> FloatArray:
+    """Return a variable's values on the run's grid, shape (n,)."""
+    role = {"velocity_sign": "speed", "velocity": "speed", "history": "travel", "dwell": "speed"}
+    if variable == "time":
+        return run.on_grid(CAMPAIGN_TIME)
+    name = signal(run, place.roles[role.get(variable, variable)][0], equation)
+    key = (variable, name, width if variable == "velocity_sign" else 0.0)
+    found = run.memo.get(key)
+    if found is None:
+        found = run.memo[key] = _worked_out(run, variable, name, width)
+    return found
+
+
+def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
+    whole = run.channels[name]
+    if variable == "velocity_sign":
+        return np.tanh(run.on_grid(name) / width)
+    if variable == "history":
+        half = PLAY * float(np.ptp(whole)) or 1.0
+        return (whole - _play(whole, half))[run.grid]
+    if variable == "dwell":
+        usual = float(np.percentile(np.abs(whole), 95))
+        resting = (np.abs(whole) < max(width, 0.05 * usual)).astype(np.float64)
+        return np.asarray(_rested(resting, 1.0 / run.rate_hz)[run.grid])
+    return run.on_grid(name)
+
+
+def _variable_range(
+    layout: Layout, place: Place, variable: str, width: float
+) -> tuple[float, float]:
+    inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
+    low = min(float(np.percentile(x, 1)) for x in inside)
+    high = max(float(np.percentile(x, 99)) for x in inside)
+    return (low, high) if high > low else (low, low + 1.0)
+
+
+def _basis(variable: str, values: FloatArray, low: float, high: float) -> FloatArray:
+    if variable == "velocity_sign":
+        return np.column_stack([np.ones(len(values)), values])
+    knots = np.linspace(low, high, KNOTS)
+    inside = np.clip(values, low, high)
+    return np.column_stack([np.interp(inside, knots, row) for row in np.eye(KNOTS)])
+
+
+@numba.njit(cache=True)
+def _play(x: FloatArray, half: float) -> FloatArray:
+    """Return the play operator: it follows when pulled by more than half its width."""
+    out = np.empty(len(x))
+    at = x[0]
+    for i in range(len(x)):
+        at = min(max(at, x[i] - half), x[i] + half)
+        out[i] = at
+    return out
+
+
+@numba.njit(cache=True)
+def _rested(resting: FloatArray, period_s: float) -> FloatArray:
+    """Return the logarithm of the last rest's time, fading while it moves."""
+    out = np.empty(len(resting))
+    rest, since = 0.0, np.inf
+    for i in range(len(resting)):
+        if resting[i]:
+            rest = rest + period_s if since == 0.0 else period_s
+            since = 0.0
+        else:
+            since += period_s
+        out[i] = np.log1p(rest / GROWTH_S) * np.exp(-since / FADE_S)
+    return out
+
+
+def names(place: Place, variables: Sequence[str]) -> tuple[str, ...]:
+    """Return the names under which a function's variables are reported."""
+    return tuple(dict.fromkeys(reported(place, v) for v in variables))

@@ -1,0 +1,206 @@
+"""Where a cause can act, and how it then enters every equation.
+
+A place's signature follows from the declared equations: the sensitivity of each equation to an
+error of one reading, or to a torque at one shaft. A sensor's error enters every equation that reads
+the sensor; a torque beyond a compliance bends it as well.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
+from estimation.derived import CAMPAIGN_TIME, measured_channels
+
+Kind = Literal["loss", "actuator", "deflection", "torque sensor", "angle sensor"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How a cause enters one equation's residual: gain times its derivative of that order."""
+
+    equation: str
+    gain: float
+    order: int = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a cause acts.
+
+    Attributes:
+        name: What it is called: an equation, `torque at CHANNEL` or `sensor CHANNEL`.
+        kind: Which effects can act there.
+        home: Equation it is reported under.
+        enters: How it enters the equations.
+        roles: Role of an effect to the channels that can play it there.
+        sign: Sign of a loss in its home equation.
+    """
+
+    name: str
+    kind: Kind
+    home: str
+    enters: tuple[Entry, ...]
+    roles: Mapping[str, tuple[str, ...]]
+    sign: int = 1
+
+
+def places_of(layout: Layout) -> list[Place]:
+    """Return every place the declared equations know of."""
+    found = []
+    angles = _angles(layout)
+    for equation in layout.equations.values():
+        found.append(_own(layout, equation, angles))
+        if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
+            found.append(_actuator(equation, angles))
+    found += [p for n in layout.measured for p in _behind(layout, n, angles)]
+    found += [p for n in layout.measured if (p := _sensor(layout, n, angles)) is not None]
+    return found
+
+
+def direction_width(layout: Layout, place: Place) -> float:
+    """Return the speed over which friction changes its sign at a place."""
+    equation = layout.equations[place.home]
+    if equation.width:
+        return equation.width
+    return max((e.width for e in layout.equations.values()), default=0.0)
+
+
+def _angles(layout: Layout) -> list[str]:
+    """Return the angles that the equations read, the one with the largest travel first.
+
+    No other channel is ever read: another recorded channel may be a copy of a target.
+    """
+    read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
+    names = [n for n in measured_channels(read) if n.endswith(ANGLES) and n in layout.measured]
+    return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
+
+
+def _motion(angle: str) -> dict[str, tuple[str, ...]]:
+    base = next(a for a in ANGLES if angle.endswith(a))
+    speed, acceleration = RATES[base]
+    stem = angle.removesuffix(base)
+    return {
+        "speed": (stem + speed,),
+        "acceleration": (stem + acceleration,),
+        "travel": (angle,),
+    }
+
+
+def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str, ...]]:
+    return {
+        "clock": ("time_s",),
+        "elapsed": (CAMPAIGN_TIME,),
+        "campaign_clock": (CAMPAIGN_TIME,),
+        "motor_angle": tuple(layout_angles[:1]),
+        **dict.fromkeys(("position", "stop", "tilt"), (position,)),
+        # a harmonic of the only shaft there is has one name
+        "output_angle": (position,) if len(layout_angles) > 1 else (),
+    }
+
+
+def _position(angles: Sequence[str], own: str) -> str:
+    """Return the angle that the place's shaft or its output turns by."""
+    slow = [a for a in angles if a != angles[0]] or list(angles)
+    return own if own in slow else slow[0]
+
+
+def _own_angle(equation: Equation, angles: Sequence[str]) -> str:
+    for angle in angles:
+        if equation.speed in _motion(angle)["speed"]:
+            return angle
+    if equation.of_angle:
+        inside = [a for a in angles if a in equation.channels]
+        inside += [a for a in angles if sensitivity(equation.target, a) is not None]
+        return inside[-1] if inside else angles[-1]
+    return angles[0]
+
+
+def _effort(equation: Equation) -> str:
+    """Return the torque a place's load is: the equation's regressor, else its target."""
+    for name in equation.channels:
+        if name.endswith(("_n_m", "_n")):
+            return name
+    return equation.target
+
+
+def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
+    angle = _own_angle(equation, angles)
+    roles = _motion(angle) | _shared(angles, _position(angles, angle))
+    effort = _effort(equation)
+    roles |= {"load": (effort,)}
+    if equation.of_angle:
+        return Place(
+            equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
+        )
+    sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
+    return Place(
+        equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles, sign
+    )
+
+
+def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
+    term = next(t for t in equation.terms if t.effect.id == "motor.torque_constant")
+    current = term.channels["source"]
+    roles = _shared(angles, _position(angles, angles[0])) | {
+        "current": (current,),
+        "drive": (current,),
+        "reading": (current,),
+    }
+    return Place(
+        f"actuator {current}", "actuator", equation.name, (Entry(equation.name, 1.0),), roles
+    )
+
+
+def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
+    """Return the place of a torque between a compliance and a torque sensor behind it."""
+    reading = [e for e in layout.equations.values() if sensor in e.channels]
+    torque = [e for e in reading if not e.of_angle]
+    if len(torque) != 1 or len(reading) < 2:
+        return []
+    enters = tuple(Entry(e.name, e.channels[sensor]) for e in reading)
+    bent = next(e for e in reading if e.of_angle)
+    angle = bent.target if bent.target in angles else _own_angle(torque[0], angles)
+    roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
+    return [Place(f"torque at {sensor}", "loss", torque[0].name, enters, roles)]
+
+
+def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:
+    enters = []
+    for equation in layout.equations.values():
+        found = sensitivity(equation.target, channel)
+        if found is not None:
+            enters.append(Entry(equation.name, found[0], found[1]))
+        for name, weight in equation.channels.items():
+            found = sensitivity(name, channel)
+            if found is not None:
+                enters.append(Entry(equation.name, -weight * found[0], found[1]))
+    if not enters:
+        return None
+    angle = channel.endswith(ANGLES)
+    if not angle and not channel.endswith(("_n_m", "_n")):
+        return None  # an error of the current's reading is a change of the actuator's gain
+
+    def suits(entry: Entry) -> tuple[bool, bool, bool]:
+        of_angle = layout.equations[entry.equation].of_angle
+        return entry.order == 0, of_angle == angle, entry.gain > 0
+
+    home = max(enters, key=suits).equation
+    others = tuple(n for n in (*angles, *_currents(layout)) if n != channel)
+    roles = {
+        "reading": (channel,),
+        "creeping": (channel,),
+        "encoder": (channel,),
+        "clock": ("time_s",),
+        "elapsed": (CAMPAIGN_TIME,),
+        "campaign_clock": (CAMPAIGN_TIME,),
+        "other_reading": others,
+    }
+    kind: Kind = "angle sensor" if angle else "torque sensor"
+    return Place(f"sensor {channel}", kind, home, tuple(enters), roles)
+
+
+def _currents(layout: Layout) -> list[str]:
+    return [n for e in layout.equations.values() for n in e.channels if n.endswith("_a")]

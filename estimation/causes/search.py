@@ -1,0 +1,342 @@
+"""The search over hypotheses: sets of causes, scored together, extended one cause at a time."""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.causes.equations import Layout
+from estimation.causes.folds import Folds, folds_of
+from estimation.causes.functions import Function, functions_at
+from estimation.causes.joint import Columns, Joint
+from estimation.causes.numbers import DEFAULT, Numbers
+from estimation.causes.places import places_of
+from estimation.causes.sources import RELATIVE, Source, sources_at
+from estimation.recording import FloatArray
+
+AT_ONCE = 3000
+"""Candidates times squared columns in one block: keeps its memory small."""
+
+MOST_CAUSES = 3
+REFINED = 8
+"""Families whose shapes are refined after the grid."""
+
+PARTIAL = 24
+"""Families tried on some of the runs alone."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A cause laid out on the runs.
+
+    Attributes:
+        cause: The named effect or smooth function.
+        columns: Its columns of every run.
+        acts: Runs in which it acts; in all when None.
+        choices: Points of the grid that share its family's prior probability at this place.
+    """
+
+    cause: Source | Function
+    columns: Sequence[Columns]
+    acts: tuple[bool, ...] | None = None
+    choices: int = 1
+
+    @property
+    def name(self) -> tuple[str, str, tuple[str, ...]]:
+        """What is claimed: place, family, and the variables of a function."""
+        variables = self.cause.variables if isinstance(self.cause, Function) else ()
+        return self.cause.place.name, self.cause.family, variables
+
+    @property
+    def is_function(self) -> bool:
+        """Whether its form is unknown."""
+        return isinstance(self.cause, Function)
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(next(iter(self.columns[0].values())).shape[1])
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate with its score given a base.
+
+    Attributes:
+        candidate: The candidate.
+        score: Mean of the families of folds, less the price of what was chosen.
+        by_family: Score of each family of folds.
+        amplitudes: Its amplitudes on all runs, in the scale of its columns.
+    """
+
+    candidate: Candidate
+    score: float
+    by_family: FloatArray
+    amplitudes: FloatArray
+
+
+@dataclass(frozen=True)
+class Found:
+    """The answer of the search.
+
+    Attributes:
+        causes: The leading hypothesis, in the order found; empty when nothing is missing.
+        conditional: For each cause, every candidate in its place given the others, best first.
+        joint: The regression of the training runs without causes.
+        clean_score: The best score when nothing was claimed.
+    """
+
+    causes: Sequence[Scored]
+    conditional: Sequence[Sequence[Scored]]
+    joint: Joint
+    clean_score: float
+
+
+def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
+    """Find the set of causes that explains training runs best.
+
+    Args:
+        train: The declared equations on the training runs, instruments added.
+        numbers: What decides.
+    """
+    joint, folds = Joint(train, numbers), folds_of(train)
+    pool = candidates(train, joint)
+    first = _ranked(joint, pool, folds, numbers)
+    if not first or first[0].score < numbers.least_score:
+        return Found([], [], joint, first[0].score if first else 0.0)
+    chains = [_chain(joint, start, pool, folds, numbers) for start in _starts(first)]
+    causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
+    conditional = []
+    for k, cause in enumerate(causes):
+        others = [c for c in causes if c is not cause]
+        conditional.append(_ranked(_with(joint, others), pool, folds, numbers))
+        causes[k] = conditional[-1][0]
+    return Found(causes, conditional, joint, first[0].score)
+
+
+def _starts(ranked: Sequence[Scored]) -> list[Scored]:
+    """Return where a chain of causes may begin: the best, and the best of the other kind."""
+    other = next(
+        (s for s in ranked if s.candidate.is_function != ranked[0].candidate.is_function), None
+    )
+    worth = other is not None and other.score > 0.5 * ranked[0].score
+    return [ranked[0], other] if other is not None and worth else [ranked[0]]
+
+
+def _chain(
+    joint: Joint, start: Scored, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
+) -> list[Scored]:
+    """Return a set of causes, extended one at a time while another one is worth its price."""
+    causes = [start]
+    least = max(numbers.least_score, numbers.cause_cost / numbers.sharpness)
+    while len(causes) < MOST_CAUSES:
+        ranked = _ranked(_with(joint, causes), pool, folds, numbers)
+        if not ranked or ranked[0].score < least:
+            break
+        causes.append(ranked[0])
+    return causes
+
+
+def candidates(train: Layout, joint: Joint) -> list[Candidate]:
+    """Return every candidate cause, laid out."""
+    out = []
+    for place in places_of(train):
+        named: Iterable[Source | Function] = sources_at(train, place)
+        for cause in itertools.chain(named, functions_at(train, place)):
+            laid = _laid(train, joint, cause)
+            if laid is not None:
+                out.append(laid)
+    count = Counter(_form(c) for c in out)
+    return [replace(c, choices=count[_form(c)]) for c in out]
+
+
+def _form(candidate: Candidate) -> tuple[str, str]:
+    """Return the key of one prior probability: a form of an effect, or all smooth functions."""
+    cause = candidate.cause
+    return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id
+
+
+def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
+    """Return the best candidate of each name, best first."""
+    best: dict[object, Scored] = {}
+    for one in scored:
+        known = best.get(one.candidate.name)
+        if known is None or one.score > known.score:
+            best[one.candidate.name] = one
+    return sorted(best.values(), key=lambda s: -s.score)
+
+
+def evaluate(
+    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
+) -> list[Scored]:
+    """Return the score of each candidate given the base; those of a wrong sign are left out."""
+    before = joint.base_errors(folds)
+    by_width: dict[int, list[Candidate]] = {}
+    for candidate in pool:
+        by_width.setdefault(candidate.width, []).append(candidate)
+    out = []
+    for width, group in by_width.items():
+        size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
+        for start in range(0, len(group), size):
+            part = group[start : start + size]
+            out += _evaluated(joint, part, folds, before, numbers)
+    return out
+
+
+def _evaluated(
+    joint: Joint,
+    part: list[Candidate],
+    folds: Folds,
+    before: Sequence[Mapping[tuple[str, str], FloatArray]],
+    numbers: Numbers,
+) -> list[Scored]:
+    precision = np.vstack([_precision(joint, c, numbers) for c in part])
+    outcome = joint.evaluate(joint.block([c.columns for c in part]), folds, precision)
+    scores = joint.score(before, outcome.errors)
+    out = []
+    for k, candidate in enumerate(part):
+        amplitudes = outcome.amplitudes[k]
+        if _sign_is_wrong(candidate, amplitudes):
+            continue
+        # a level of a condition counts at most what the runs show: where the base alone
+        # extrapolates badly anything seems to help
+        score = float(np.minimum(scores[:, k], scores[0, k]).mean()) - _price(candidate, numbers)
+        out.append(Scored(candidate, score, scores[:, k], amplitudes))
+    return out
+
+
+def _precision(joint: Joint, candidate: Candidate, numbers: Numbers) -> FloatArray:
+    """Return the prior precision of each amplitude.
+
+    A named effect, scaled to norm one, is not larger than half of all signals; a smooth function's
+    knots have a standard deviation of so many declared errors.
+    """
+    everything = np.full(candidate.width, 4.0 / joint.power)
+    if not candidate.is_function:
+        return everything
+    enters = candidate.cause.place.enters
+    knot = np.mean([e.gain**2 / joint.error[e.equation, "within"] for e in enters])
+    return np.asarray(everything + knot / numbers.knot_sd**2)
+
+
+def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
+    cause = candidate.cause
+    if isinstance(cause, Function) or len(cause.parts) > 1:
+        return False
+    bound = cause.effect.amplitudes[cause.parts[0]]
+    return bool(amplitudes[0] < 0.0 <= bound.lower)
+
+
+def _price(candidate: Candidate, numbers: Numbers) -> float:
+    """Return the price of what was chosen: the logarithm of how many choices there were.
+
+    A family's prior probability at a place is shared by the points of its grid, that of an unknown
+    form by the sets of variables, and that of acting in some of the runs by all choices of them.
+    """
+    price = float(np.log(candidate.choices))
+    if candidate.is_function:
+        price += numbers.function_cost
+    if candidate.acts is not None:
+        count, acting = len(candidate.acts), sum(candidate.acts)
+        price += float(np.log(count + 1.0)) + sum(
+            float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
+        )
+    return price / numbers.sharpness
+
+
+def _ranked(
+    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
+) -> list[Scored]:
+    """Return the best of each name: on the grid, refined, and on some of the runs."""
+    best = best_of_each(evaluate(joint, pool, folds, numbers))
+    if not best:
+        return []
+    near = [c for s in best[:REFINED] for c in _neighbours(joint, s.candidate)]
+    finer = evaluate(joint, near, folds, numbers) if near else []
+    best = best_of_each([*best, *finer])
+    some = _on_some_runs(joint, best[:PARTIAL], folds, numbers)
+    return best_of_each([*best, *some])
+
+
+def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
+    """Return a named effect at shapes between the points of the grid."""
+    cause = candidate.cause
+    if isinstance(cause, Function):
+        return []
+    out = []
+    for k, parameter in enumerate(cause.effect.shape):
+        values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+        if parameter.name in ("width", "settled", "order") or values is None or len(values) < 2:
+            continue
+        ratio = values[1] / values[0]
+        for step in (-0.5, -0.25, 0.25, 0.5):
+            moved = (
+                cause.shape[k] + step * (values[1] - values[0])
+                if parameter.linear
+                else cause.shape[k] * ratio**step
+            )
+            shape = (*cause.shape[:k], float(moved), *cause.shape[k + 1 :])
+            laid = _laid(joint.layout, joint, replace(cause, shape=shape))
+            if laid is not None:
+                out.append(replace(laid, choices=candidate.choices))
+    return out
+
+
+def _on_some_runs(
+    joint: Joint,
+    best: Sequence[Scored],
+    folds: Folds,
+    numbers: Numbers,
+) -> list[Scored]:
+    """Return candidates that act in the runs whose own amplitude is unlike zero.
+
+    Runs are ordered by the amplitude that each of them asks for; every cut of that order and every
+    cut of the order of recording is a choice of runs.
+    """
+    count = len(joint.runs)
+    if count < 6:
+        return []
+    tried = []
+    for scored in best:
+        if scored.candidate.is_function:
+            continue
+        for acts in _cuts(count):
+            laid = _laid(joint.layout, joint, scored.candidate.cause, acts)
+            if laid is not None:
+                tried.append(replace(laid, choices=scored.candidate.choices))
+    return evaluate(joint, tried, folds, numbers)
+
+
+def _cuts(count: int) -> list[tuple[bool, ...]]:
+    order = range(count)
+    early = [tuple(k < cut for k in order) for cut in range(2, count - 1)]
+    return early + [tuple(not x for x in one) for one in early]
+
+
+def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
+    for cause in causes:
+        joint = joint.with_cause(cause.candidate.columns)
+    return joint
+
+
+def _laid(
+    layout: Layout, joint: Joint, cause: Source | Function, acts: tuple[bool, ...] | None = None
+) -> Candidate | None:
+    """Return a cause laid out on the runs in which it acts; None where it is not finite."""
+    columns = []
+    for k, run in enumerate(layout.runs):
+        own = cause.columns(run)
+        if own is None:
+            return None
+        if acts is not None and not acts[k]:
+            own = {name: np.zeros_like(values) for name, values in own.items()}
+        columns.append(own)
+    laid = joint.laid(columns, unit=isinstance(cause, Source))
+    if acts is not None:  # what starts between runs also shifts their means, by its own offset
+        laid = [
+            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
+            for own in laid
+        ]
+    return Candidate(cause, laid, acts)

@@ -1,0 +1,315 @@
+"""Candidate causes: an effect of the catalogue at a place, at the points of a grid of its shapes.
+
+Grids follow the data: a speed is searched over the speeds there are, a travel over the travel. An
+effect that is not distinguishable from a simpler one over that range is left out.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.causes.equations import ANGLES, Layout, RunSignals
+from estimation.causes.instruments import signal
+from estimation.causes.places import Place, direction_width
+from estimation.effects import Effect, Parameter, catalogue
+from estimation.model import BALANCES
+from estimation.recording import FloatArray
+
+DECLARED_ONLY = (
+    "arm.",
+    "compliance.",
+    "motor.torque_constant",
+    "sensor.offset",
+    "transmission.ratio",
+    "transmission.damping",
+    "friction.coulomb",
+    "friction.viscous",
+)
+ACTUATOR = ("motor.", "ripple.current")
+DEFLECTION = (
+    "transmission.",
+    "hysteresis.bouc_wen.twist",
+    "hysteresis.presliding",
+    "ripple.output",
+    "eccentric.load",
+)
+TORQUE_SENSOR = (
+    "sensor.gain_nonlinear",
+    "sensor.drift",
+    "sensor.creep",
+    "sensor.lag",
+    "sensor.delay",
+    "sensor.crosstalk",
+    "change.step.offset",
+)
+ANGLE_SENSOR = ("sensor.encoder_inl", "sensor.delay", "sensor.lag")
+
+FILTERS = (
+    "sensor.delay",
+    "sensor.lag",
+    "sensor.creep",
+    "motor.electrical",
+    "transmission.relaxation",
+)
+"""Effects that pass a reading through a linear filter, as smoothing its noise does."""
+
+LEAST_PERIODS = 1.5
+"""Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """An effect at one place and shape.
+
+    Attributes:
+        place: Where it acts.
+        effect: The effect.
+        channels: Role to the channel that plays it, before instruments.
+        shape: Values of its shape parameters.
+        parts: Which of its columns take part, so that simpler forms compete too.
+    """
+
+    place: Place
+    effect: Effect
+    channels: tuple[tuple[str, str], ...]
+    shape: tuple[float, ...]
+    parts: tuple[int, ...]
+
+    @property
+    def family(self) -> str:
+        """What a verdict calls it."""
+        return self.effect.family
+
+    @property
+    def side(self) -> int:
+        """Sign of an actuator's loss: its amplitudes are bounded as losses."""
+        if self.place.kind != "actuator":
+            return 1
+        return next(iter(self.effect.balances.values()), 1)
+
+    def signal(self, run: RunSignals, equation: str) -> FloatArray | None:
+        """Return the source's columns in one equation at the run's grid, (n, parts).
+
+        None where a column is not finite.
+        """
+        names = tuple(signal(run, channel, equation) for _, channel in self.channels)
+        key = (self.effect.id, self.shape, names)
+        if key not in run.memo:
+            run.memo[key] = _worked_out(self.effect, self.channels, names, self.shape, run)
+        found = run.memo[key]
+        return None if found is None else found[:, list(self.parts)]
+
+    def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
+        """Return the source's columns in every equation it enters, at the samples each counts."""
+        made: dict[str, FloatArray] = {}
+        for entry in self.place.enters:
+            found = self.signal(run, entry.equation)
+            if found is None:
+                return None
+            column = entry.gain * self.side * _derived(found, run, entry.order)
+            used = column[run.used[entry.equation]]
+            made[entry.equation] = made[entry.equation] + used if entry.equation in made else used
+        return made
+
+
+def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
+    """Yield every candidate at a place."""
+    repeats = repeats_one_reference(layout)
+    for effect in catalogue().values():
+        if not _acts(effect, place) or (repeats and _of_run_time(effect)):
+            continue
+        options = [[(role, c) for c in place.roles.get(role, ())] for role in effect.roles]
+        for channels in itertools.product(*options):
+            if any(c not in layout.runs[0].channels for _, c in channels):
+                continue
+            if effect.id.startswith(FILTERS) and _reads_own_noise(layout, place, channels):
+                continue
+            for shape in _grid(layout, place, effect, dict(channels)):
+                for parts in _parts(effect):
+                    yield Source(place, effect, tuple(channels), shape, parts)
+
+
+def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
+    """Whether an effort is read that some equation has from its own sensors alone.
+
+    A filter of such a reading explains that sensor's noise: a second sensor is needed.
+    """
+    efforts = [c for _, c in channels if c in layout.measured and not c.endswith(ANGLES)]
+    return any(
+        (c, entry.equation) not in layout.independent for c in efforts for entry in place.enters
+    )
+
+
+def repeats_one_reference(layout: Layout) -> bool:
+    """Whether all runs repeat one motion, so that time within a run is the motion's phase."""
+    angle = next((n for n in layout.measured if n.endswith(("_angle_rad", "_position_m"))), "")
+    if not angle or len(layout.runs) < 2:
+        return False
+    size = min(len(r.channels[angle]) for r in layout.runs)
+    moves = [r.channels[angle][:size] - r.channels[angle][:size].mean() for r in layout.runs]
+    first = moves[0]
+    return all(
+        float(first @ m) > 0.99 * math.sqrt(float(first @ first) * float(m @ m)) for m in moves[1:]
+    )
+
+
+def _acts(effect: Effect, place: Place) -> bool:
+    if effect.id.startswith(DECLARED_ONLY) and effect.family in (
+        "friction.coulomb",
+        "friction.viscous",
+    ):
+        return False
+    if effect.id.startswith(tuple(d for d in DECLARED_ONLY if not d.startswith("friction."))):
+        return False
+    if effect.at_rest or effect.id.startswith("coupling."):
+        return False
+    if not set(effect.roles) <= set(place.roles):
+        return False
+    kind = place.home.partition(".")[0]
+    if effect.family == "friction.capstan" and kind in BALANCES and kind not in effect.balances:
+        return False  # a cable that is wrapped, not a shaft in its bearings
+    match place.kind:
+        case "actuator":
+            return effect.id.startswith((*ACTUATOR, "sensor.delay"))
+        case "deflection":
+            return effect.id.startswith(DEFLECTION) and not effect.id.endswith(".lugre")
+        case "torque sensor":
+            return effect.id.startswith(TORQUE_SENSOR)
+        case "angle sensor":
+            return effect.id.startswith(ANGLE_SENSOR)
+        case "loss":
+            return not effect.id.startswith(
+                (
+                    *ACTUATOR,
+                    "sensor.",
+                    "transmission.",
+                    "hysteresis.bouc_wen.twist",
+                    "change.step.offset",
+                    "inertia.",
+                )
+            )
+
+
+def _of_run_time(effect: Effect) -> bool:
+    return "clock" in effect.roles and effect.id.startswith(
+        ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
+    )
+
+
+def _parts(effect: Effect) -> list[tuple[int, ...]]:
+    """Return the sets of columns that compete: all, and of a polynomial every part of it."""
+    count = len(effect.amplitudes)
+    everything = tuple(range(count))
+    polynomial = effect.id.startswith(("sensor.gain_nonlinear", "friction.position"))
+    if not polynomial:
+        return [everything]
+    return [p for k in range(1, count + 1) for p in itertools.combinations(everything, k)]
+
+
+def _grid(
+    layout: Layout, place: Place, effect: Effect, channels: Mapping[str, str]
+) -> list[tuple[float, ...]]:
+    axes = [_axis(layout, place, effect, p, channels) for p in effect.shape]
+    return list(itertools.product(*axes))
+
+
+def _axis(
+    layout: Layout, place: Place, effect: Effect, parameter: Parameter, channels: Mapping[str, str]
+) -> list[float]:
+    """Return the values of one shape parameter to try, over the range that the data cover."""
+    if parameter.name == "width" and "speed" in effect.roles:
+        return [direction_width(layout, place)]
+    if parameter.name == "middle":
+        return [0.0]  # play is crossed where the load changes its side
+    if parameter.name == "order":
+        role = next(r for r in ("motor_angle", "output_angle", "encoder") if r in channels)
+        return _orders(layout, effect, channels[role])
+    relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+    if parameter.unit in channels and relative is not None:
+        low, high = _range(layout, channels[parameter.unit])
+        if parameter.linear:
+            return [low + x * (high - low) for x in relative]
+        scale = high if low == 0.0 else high - low
+        return [float(scale * x) for x in relative]
+    if relative is not None:
+        return [float(x) for x in relative]
+    return [float(x) for x in parameter.grid()[:: max(1, parameter.points // 5)]]
+
+
+RELATIVE: Mapping[object, Sequence[float]] = {
+    "fall": tuple(np.geomspace(0.03, 0.7, 7)),
+    "reach": tuple(np.geomspace(0.002, 0.3, 9)),
+    "knee": tuple(np.geomspace(0.1, 1.0, 5)),
+    "width": tuple(np.geomspace(0.005, 0.05, 3)),
+    "time": (0.15, 0.5, 1.5),
+    "time_constant": (0.15, 0.5, 1.5),
+    ("sensor.lag", "time_constant"): tuple(np.geomspace(1e-4, 1e-2, 5)),
+    ("motor.electrical", "time_constant"): tuple(np.geomspace(1e-4, 5e-3, 4)),
+    ("transmission.relaxation", "time"): tuple(np.geomspace(0.01, 0.7, 6)),
+    ("transmission.relaxation.prony", "time"): (0.01, 0.05),
+    ("friction.dwell", "time"): (0.03, 0.2),
+    ("friction.dwell", "way"): (0.05, 0.5),
+    "delay": (2e-4, 6e-4, 2e-3),
+    "since": tuple(np.linspace(0.08, 0.92, 12)),
+    "onset": (0.3, 0.42, 0.54, 0.66, 0.78, 0.9),
+    ("spring.end_stop.opening", "onset"): (0.1, 0.22, 0.34, 0.46, 0.58, 0.7),
+    "settled": (0.0, 1.0),
+    "rise": (0.5, 2.0),
+    "exponent": (0.5, 1.5, 2.0),
+    "sharpness": (2.0,),
+    "wrap": (0.2, 1.0),
+}
+"""Shape parameter to the values tried, shares of the range of the channel that its unit names."""
+
+
+def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
+    """Return whole orders, as finely as the travel resolves them.
+
+    A harmonic repeats with the shaft that makes it, so its order there is a whole number.
+    """
+    travel = max(float(np.ptp(r.channels[angle])) for r in layout.runs)
+    resolved = 2 * math.pi / travel
+    first = max(1, math.ceil(LEAST_PERIODS * resolved))
+    if effect.id == "eccentric.load":
+        first = 1  # the load multiplies it, so a part of a period shows
+    last = max(40, round(60 * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
+    return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
+
+
+def _range(layout: Layout, channel: str) -> tuple[float, float]:
+    """Return the range of a channel: of a speed or a clock from zero to its usual most."""
+    inside = [run.on_grid(channel) for run in layout.runs]
+    if "velocity" in channel:
+        return 0.0, float(np.median([np.percentile(np.abs(x), 95) for x in inside]))
+    if channel == "time_s":
+        return 0.0, float(np.median([x.max() for x in inside]))
+    low = min(float(np.percentile(x, 0.5)) for x in inside)
+    high = max(float(np.percentile(x, 99.5)) for x in inside)
+    return low, high
+
+
+def _worked_out(
+    effect: Effect,
+    channels: Sequence[tuple[str, str]],
+    names: Sequence[str],
+    shape: Sequence[float],
+    run: RunSignals,
+) -> FloatArray | None:
+    roles = [role for role, _ in channels]
+    if effect.start():
+        whole = {r: run.channels[n] for r, n in zip(roles, names, strict=True)}
+        columns = effect.columns(whole, shape)[run.grid]
+    else:
+        there = {r: run.on_grid(n) for r, n in zip(roles, names, strict=True)}
+        columns = effect.columns(there, shape)
+    return columns if np.isfinite(columns).all() else None
+
+
+def _derived(columns: FloatArray, run: RunSignals, order: int) -> FloatArray:
+    """Return the time derivative of columns on the grid, of order 0 to 2."""
+    for _ in range(order):
+        columns = np.gradient(columns, run.grid / run.rate_hz, axis=0)
+    return columns

@@ -1,0 +1,82 @@
+"""The tables of a configuration that depend on the machine, each machine's by an entry point."""
+
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+
+from pydantic import Field
+
+from rig.configuration.sections import MACHINE_SETTINGS, Angle, Current, Section, Torque
+from rig.errors import UsageError
+
+
+class LimitsSection(Section):
+    """Limits checked at every sample, on the absolute value; a crossing ends in the safe state.
+
+    Every key is the name of a channel; which there are depends on `[logger] profile`.
+    """
+
+
+class DriftSection(Section):
+    """Largest change of a sensor's zero over a run that passes; without a limit none is judged."""
+
+
+class OwnSection(Section):
+    """What else a machine is configured by, the table `[machine]`; empty where nothing is."""
+
+
+@dataclass(frozen=True)
+class MachineSettings:
+    """What a configuration may hold for one kind of machine.
+
+    Attributes:
+        limits: The table `[limits]`.
+        drift: The table `[drift]`.
+        drivers: Values of `[logger] driver` that can move and sample it.
+        own: The table `[machine]`.
+    """
+
+    limits: type[LimitsSection]
+    drift: type[DriftSection]
+    drivers: tuple[str, ...]
+    own: type[OwnSection] = OwnSection
+
+
+def settings_of(profile: str) -> MachineSettings:
+    """Settings of the machine that is installed under a name.
+
+    Raises:
+        UsageError: None is, or it cannot be loaded.
+    """
+    try:
+        (entry,) = entry_points(group=MACHINE_SETTINGS, name=profile)
+        loaded = entry.load()
+    except (ValueError, ImportError, AttributeError) as error:
+        raise UsageError(
+            f"The settings of [logger] profile = {profile!r} cannot be loaded.",
+            f"{error}.",
+            "Install the package of that machine again, or name another profile.",
+        ) from error
+    if not isinstance(loaded, MachineSettings):
+        raise UsageError(f"{entry.value} is a {type(loaded).__name__}, not MachineSettings.")
+    return loaded
+
+
+class ReferenceLimits(LimitsSection):
+    """Limits of the reference rig."""
+
+    proximal_torque_n_m: Torque
+    distal_torque_n_m: Torque
+    motor_current_a: Current
+    load_command_a: float = Field(ge=0, le=60)
+    spindle_angle_rad: Angle
+
+
+class ReferenceDrift(DriftSection):
+    """Sensors of the reference rig whose zero drifts."""
+
+    proximal_torque_n_m: Torque | None = None
+    distal_torque_n_m: Torque | None = None
+    motor_current_a: Current | None = None
+
+
+REFERENCE = MachineSettings(ReferenceLimits, ReferenceDrift, ("teensy", "teensy-can", "epos4"))

@@ -1,0 +1,167 @@
+"""Tables of a configuration that every machine has, and the types of their numbers."""
+
+from importlib.metadata import entry_points
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from estimation.recording import Instrument
+
+MACHINE_SETTINGS = "rig.machine_settings"
+"""Entry point group: `[logger] profile` to the `MachineSettings` of that machine."""
+
+
+def profiles() -> list[str]:
+    """Names of the machines that are installed, sorted."""
+    return sorted(entry.name for entry in entry_points(group=MACHINE_SETTINGS))
+
+
+def _installed(profile: str) -> str:
+    if profile not in profiles():
+        known = ", ".join(profiles()) or "none"
+        raise ValueError(f"no machine {profile!r} is installed, only {known}")
+    return profile
+
+
+Profile = Annotated[str, AfterValidator(_installed)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Torque = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+Current = Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
+Angle = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Force = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+
+
+class Section(BaseModel):
+    """A table of a configuration: every key checked, no value changed later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class LoggerSection(Section):
+    """The board or drive that moves and samples the rig, and its URL.
+
+    Attributes:
+        driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
+            on CANopen whose position loop runs in this computer.
+        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
+            `can:...`.
+        options: The driver's own options.
+        bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
+            with from the factory if none.
+        profile: What the board samples and moves: a name in the entry point group
+            `rig.machine_settings`, such as the reference rig or the 3-DOF grasper.
+    """
+
+    driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
+    url: str
+    profile: Profile = "reference"
+    options: dict[str, Any] = Field(default_factory=dict)
+    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
+
+
+class DeviceSection(Section):
+    """A further device whose channels are recorded with the logger's.
+
+    Attributes:
+        driver: Name of its driver; `rig devices` lists them.
+        url: URL; `sim://` for its fake.
+        options: The driver's own options.
+        bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
+            from the factory if none.
+    """
+
+    driver: str
+    url: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
+
+
+class ControllerSection(Section):
+    """Gains of the logger's position controller, in its own ticks: see `drivers.teensy.control`."""
+
+    kp: Number
+    ki: Number
+    kd: Number
+    velocity_filter: float = Field(gt=0, le=1)
+    limit: Positive = 10000.0
+
+    def gains(self) -> list[float]:
+        """Return the gains in the order the controller takes them."""
+        return [self.kp, self.ki, self.kd, self.velocity_filter, self.limit]
+
+
+class SafetySection(Section):
+    """Monitors in addition to the limits, on the board and again on this computer; always on.
+
+    A time or a heat of 0 switches its watch off.
+
+    Attributes:
+        safe_state: State of the drive motor after a trip: `release`, no current; or
+            `hold`, stay where it stands with a low command, where encoder and current are sound.
+        hold_command_ratio: Largest command while holding, of full scale.
+        continuous_current_a: Motor current that warms the motor no further.
+        heat_a2_s: Heat above it the motor can take: integral of current squared less that squared.
+        stall_current_a: Current above which a motor that stands still is stalled.
+        stall_motor_angle_rad: Motor shaft angle within which it stands still.
+        stall_s: How long it may be stalled.
+        motor_speed_rad_s: Fastest motor shaft. The shipped protocols need up to 260.
+        jaw_closed_rad: Jaw angle, closing-positive, beyond which it must not close; if unset it
+            follows from the spindle's limit and [plausibility].
+        jaw_open_rad: Jaw angle below which it must not open; likewise.
+        saturated_s: How long a torque or current sensor may be at the end of its range.
+        stale_s: How long its reading may not change at all.
+        watchdog_s: How long this computer may be silent.
+    """
+
+    safe_state: Literal["release", "hold"] = "release"
+    hold_command_ratio: float = Field(default=0.05, ge=0, le=0.5)
+    continuous_current_a: Current = 0.5
+    heat_a2_s: float = Field(default=0.5, ge=0, le=2000)
+    stall_current_a: Current = 0.55
+    stall_motor_angle_rad: float = Field(default=0.5, ge=0, le=100)
+    stall_s: float = Field(default=1.0, ge=0, le=600)
+    motor_speed_rad_s: float = Field(default=400.0, gt=0, le=20000)
+    jaw_closed_rad: Number | None = None
+    jaw_open_rad: Number | None = None
+    saturated_s: float = Field(default=0.02, ge=0, le=60)
+    stale_s: float = Field(default=0.5, ge=0, le=60)
+    watchdog_s: float = Field(default=0.25, ge=0.005, le=1)
+
+
+class InstrumentSection(Section):
+    """Identity of the instrument on the rig."""
+
+    model: str | None = None
+    serial: str | None = None
+    lot: str | None = None
+    side: str | None = None
+    uses: int | None = Field(default=None, ge=0)
+
+    def identity(self) -> Instrument:
+        """Return the identity as a recording keeps it."""
+        return Instrument(**self.model_dump())
+
+
+class SimulationSection(Section):
+    """The simulated rig behind a `sim://` logger.
+
+    Attributes:
+        seed: Seed of noise, offsets and drift.
+        spread: Relative spread of the plant's parameters drawn by the seed.
+        hidden: Hidden effect to strength; effects that no declared model contains.
+        draw_hidden: Seed that draws one more hidden effect without showing its name.
+        firmware: Put the compiled firmware core in the loop where it is built.
+        plant: `measured`, with losses that no declared model holds, or `declared`, without them.
+        grasper: Prototype of the simulated grasper, where the profile is the grasper's.
+    """
+
+    seed: int = 0
+    spread: float = Field(default=0.0, ge=0, lt=0.5)
+    hidden: dict[str, Number] = Field(default_factory=dict)
+    draw_hidden: int | None = None
+    firmware: bool = True
+    plant: Literal["measured", "declared"] = "measured"
+    grasper: Literal["third", "journal", "ball"] = "third"

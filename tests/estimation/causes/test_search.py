@@ -1,0 +1,142 @@
+"""What the search over causes finds, and what it never reads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimation.causes.equations import lay_out
+from estimation.causes.folds import folds_of
+from estimation.causes.instruments import add_instruments
+from estimation.causes.numbers import DEFAULT
+from estimation.causes.places import places_of
+from estimation.causes.search import search
+from estimation.causes.sources import sources_at
+from estimation.causes.verdict import diagnose, family_probabilities
+from estimation.diagnosis.split import split
+from estimation.recording import FloatArray, Recording
+from tests.estimation.causes.synthetic import motor, recordings
+
+
+def _asymmetric(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
+    return 4e-4 * np.abs(speed)
+
+
+def _rippled(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
+    return 0.01 * np.sin(3 * angle)
+
+
+def _found(runs: list[Recording]) -> list[tuple[str, str, tuple[str, ...]]]:
+    sealed = split(runs)
+    layout = lay_out([motor()], runs, sealed.discover)
+    add_instruments(layout)
+    found = search(layout.select(sealed.discover))
+    return [c.candidate.name for c in found.causes]
+
+
+def test_an_asymmetric_loss_is_identified_and_lowers_the_error_on_test_runs() -> None:
+    runs = recordings(_asymmetric)
+    answer = diagnose(runs, [motor()], split(runs))
+    assert [f.family for f in answer.findings] == ["friction.viscous_asymmetry"]
+    (finding,) = answer.findings
+    assert finding.verdict == "identified"
+    assert finding.rmse_after < 0.5 * finding.rmse_before
+    assert answer.errors["motor"].after < answer.errors["motor"].before
+
+
+def test_nothing_is_found_where_nothing_is_missing() -> None:
+    runs = recordings()
+    assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
+
+
+def test_an_effect_of_the_later_runs_is_found_with_its_runs() -> None:
+    runs = recordings(_rippled, acts_from=6)
+    answer = diagnose(runs, [motor()], split(runs))
+    assert answer.findings[0].family == "ripple.motor"
+    affected = set(answer.findings[0].runs_affected)
+    assert affected <= {f"{k:02d}" for k in range(5, 12)}
+    assert {f"{k:02d}" for k in range(8, 12)} <= affected
+
+
+def test_the_test_runs_do_not_reach_the_choice() -> None:
+    runs = recordings(_rippled)
+    held_out = set(split(runs).confirm)
+    random = np.random.default_rng(5)
+    spoilt = [
+        replace(
+            r,
+            columns={n: random.normal(0, np.std(v), len(v)) for n, v in r.columns.items()},
+        )
+        if r.name in held_out
+        else r
+        for r in runs
+    ]
+    assert _found(spoilt) == _found(runs)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    name=st.sampled_from(
+        ["bearing_angle_rad", "hidden_n_m", "other_a", "room_k", "extra_position_m"]
+    ),
+    delay=st.integers(0, 40),
+    scale=st.floats(-5, 5).filter(lambda x: abs(x) > 0.1),
+    integrated=st.booleans(),
+    noise=st.floats(0, 0.1),
+)
+def test_no_candidate_reads_a_channel_that_no_equation_declares(
+    name: str, delay: int, scale: float, integrated: bool, noise: float
+) -> None:
+    random = np.random.default_rng(delay)
+    runs = []
+    for run in recordings(runs=6):
+        target = np.roll(run["proximal_torque_n_m"], delay)
+        copy = scale * (np.cumsum(target) / 250 if integrated else target)
+        runs.append(run.with_columns(**{name: copy + random.normal(0, noise, len(copy))}))
+    layout = lay_out([motor()], runs, [r.name for r in runs])
+    add_instruments(layout)
+    read = {
+        channel
+        for place in places_of(layout)
+        for source in sources_at(layout, place)
+        for _, channel in source.channels
+    }
+    assert name not in read
+
+
+def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> None:
+    runs = recordings(runs=6)
+    layout = lay_out([motor()], runs, [r.name for r in runs])
+    add_instruments(layout)
+    run = layout.runs[0]
+    columns = [(s, s.columns(run)) for p in places_of(layout) for s in sources_at(layout, p)]
+    noise = np.random.default_rng(1).normal(0, 1.0, len(run.channels["time_s"]))
+    run.channels["proximal_torque_n_m"] = run.channels["proximal_torque_n_m"] + noise
+    run.memo.clear()
+    add_instruments(layout)
+    for source, before in columns:
+        after = source.columns(run)
+        assert (before is None) == (after is None)
+        if before is not None and after is not None:
+            np.testing.assert_allclose(after["motor"], before["motor"], rtol=1e-9, atol=1e-12)
+
+
+def test_each_family_of_folds_leaves_every_run_out_once() -> None:
+    runs = recordings(runs=9)
+    layout = lay_out([motor()], runs, [r.name for r in runs])
+    families = folds_of(layout)
+    assert len(families) >= 2
+    for family in families:
+        assert sorted(k for fold in family for k in fold) == list(range(9))
+
+
+def test_probabilities_of_families_sum_to_one() -> None:
+    runs = recordings(_rippled)
+    sealed = split(runs)
+    layout = lay_out([motor()], runs, sealed.discover)
+    add_instruments(layout)
+    found = search(layout.select(sealed.discover))
+    for ranked in found.conditional:
+        assert sum(p.share for p in family_probabilities(ranked, DEFAULT)) == pytest.approx(1.0)
