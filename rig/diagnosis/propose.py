@@ -61,7 +61,7 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
     """Write the next experiment as a protocol file; return what to tell a person."""
     proposed = diagnosis.next_experiment
     if proposed is None:
-        return "No next experiment: there are no rivals to tell apart."
+        return "No next experiment: there are no competing hypotheses to distinguish."
     if proposed["protocol"] is None:
         return f"No protocol for the next experiment; by hand: {proposed['description']}."
     write_text_atomic(path, protocol_toml(Protocol.model_validate(proposed["protocol"])))

@@ -1,4 +1,4 @@
-"""What a diagnosis says in words: claims, sizes, rivals, and what to record next."""
+"""A diagnosis in words: claims, sizes, competing hypotheses, and what to record next."""
 
 import math
 import sys
@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.effects import catalogue
 
-NO_NEXT = "None is proposed: there are no rivals to tell apart."
+NO_NEXT = "None is proposed: there are no competing hypotheses to distinguish."
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what may be said, one sentence a finding."""
+    """Return the result, one sentence a finding."""
     if not diagnosis.findings:
         runs = len(diagnosis.sealed.confirm)
         lines = [
-            f"Nothing is missing above the floor in {', '.join(diagnosis.errors)}: no effect or map"
-            f" passes every gate and holds on the {runs} confirm runs."
+            f"No unmodelled effect found in {', '.join(diagnosis.errors)}: no candidate met the"
+            f" acceptance criteria and was confirmed on the {runs} held-out test runs."
         ]
     else:
-        which = "runs seen before" if diagnosis.exploratory else "runs not touched"
+        which = "test runs used before" if diagnosis.exploratory else "held-out test runs"
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
         lines = [
             _sentence(f, diagnosis.unit[f.balance], which) + _where(f, runs)
@@ -31,14 +31,14 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _sentence(finding: Finding, unit: str, which: str) -> str:
     scale, shown = display(unit)
     fall = (
-        f"error on {finding.runs_total} {which} falls from"
-        f" {scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {shown}"
-        f" ({finding.runs_improved} of {finding.runs_total} runs better)"
+        f"error on {finding.runs_total} {which}"
+        f" {scale * finding.rmse_before:.3g} -> {scale * finding.rmse_after:.3g} {shown}"
+        f" (lower in {finding.runs_improved} of {finding.runs_total} runs)"
     )
-    also = f" The same shows in {', '.join(finding.also_in)}." if finding.also_in else ""
+    also = f" It also shows in {', '.join(finding.also_in)}." if finding.also_in else ""
     form = (
-        f" What its equation leaves of its own cause is told by {finding.form} (SI units); the"
-        " error counts it."
+        f" A correction term {finding.form} (SI units) improves this effect's equation further; it"
+        " is included in the reported error."
         if finding.form
         else ""
     )
@@ -46,11 +46,11 @@ def _sentence(finding: Finding, unit: str, which: str) -> str:
 
 
 def _where(finding: Finding, runs: int) -> str:
-    """Return which runs a finding shows in, where a third of them and more do not show it."""
+    """Return the runs a finding affects, where a third of them and more are not affected."""
     shown = finding.runs_affected
     if not 0 < 3 * len(shown) <= 2 * runs:
         return ""
-    return f" It shows in {len(shown)} of {runs} runs: {', '.join(shown)}."
+    return f" It affects {len(shown)} of {runs} runs: {', '.join(shown)}."
 
 
 def _formula(finding: Finding, unit: str) -> str:
@@ -59,12 +59,10 @@ def _formula(finding: Finding, unit: str) -> str:
         return ""
     best = finding.formulas[0]
     scale, shown = display(unit)
-    left = (
-        "" if best.rmse_after is None else f", which leaves {scale * best.rmse_after:.3g} {shown}"
-    )
+    left = "" if best.rmse_after is None else f", error {scale * best.rmse_after:.3g} {shown}"
     more = len(finding.formulas) - 1
-    others = f"; {more} more do about as well" if more else ""
-    return f" As a formula: {best.text} (SI units){left}{others}."
+    others = f"; {more} more fit about equally well" if more else ""
+    return f" Formula: {best.text} (SI units){left}{others}."
 
 
 def _claim(finding: Finding) -> str:
@@ -73,10 +71,12 @@ def _claim(finding: Finding) -> str:
         return _named(finding)
     if finding.verdict == "one_of":
         others = ", ".join(finding.alternatives) or "another effect"
-        return f"{_named(finding)}, or {others}: these runs do not tell"
+        return (
+            f"{_named(finding)}; {others} fits equally well, and these runs cannot distinguish them"
+        )
     if finding.verdict == "depends_on":
-        return f"an effect of unknown form is missing; it depends on {words}"
-    return "something is missing, and these runs do not tell what"
+        return f"unmodelled effect of unknown form; it depends on {words}"
+    return "the model is incomplete, and the cause cannot be identified from these runs"
 
 
 def _named(finding: Finding) -> str:
@@ -84,8 +84,8 @@ def _named(finding: Finding) -> str:
     if finding.confidence is not None:
         sizes.append(f"confidence {finding.confidence:.0%}")
     plain = meaning(finding.family)
-    size = f" ({', '.join(sizes)})" if sizes else ""
-    return f"{finding.family} is missing{plain and f', {plain}'}{size}"
+    size = f", {', '.join(sizes)}" if sizes else ""
+    return f"unmodelled effect identified: {plain or finding.family} [{finding.family}]{size}"
 
 
 def meaning(family: str) -> str:
@@ -120,7 +120,7 @@ def display(unit: str) -> tuple[float, str]:
 
 
 def other_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what else each finding could be, and what would tell."""
+    """Return the competing hypotheses of each finding, and what distinguishes them."""
     return [
         f"{finding.balance}, {finding.family}: {_others(finding)}" for finding in diagnosis.findings
     ]
@@ -129,19 +129,19 @@ def other_sentences(diagnosis: Diagnosis) -> list[str]:
 def _others(finding: Finding) -> str:
     known = catalogue().get(finding.family)
     if known is None:
-        return "no effect of the catalogue says it as well as a map of its variables does."
+        return "a non-parametric function of its variables fits better than any known effect."
     if finding.alternatives:
-        said = f"on these runs {', '.join(finding.alternatives)} does about as well."
+        said = f"on these runs {', '.join(finding.alternatives)} fits about equally well."
     else:
-        said = "on these runs no other effect of the catalogue does as well."
+        said = "on these runs no other effect of the catalogue fits equally well."
     if known.confused_with:
-        said += f" It is easily taken for {', '.join(known.confused_with)}"
-        said += f"; what tells them apart: {known.told_apart_by}." if known.told_apart_by else "."
+        said += f" It resembles {', '.join(known.confused_with)}"
+        said += f"; to distinguish them: {known.told_apart_by}." if known.told_apart_by else "."
     return said
 
 
 def next_sentence(diagnosis: Diagnosis) -> str:
-    """Return what to record next and why."""
+    """Return the next experiment and its reason."""
     proposed = diagnosis.next_experiment
     if proposed is None:
         return NO_NEXT
@@ -151,11 +151,10 @@ def next_sentence(diagnosis: Diagnosis) -> str:
         else (", ".join(proposed["between"]) + " from each other")
     )
     if proposed["protocol"] is None:
-        return f"To tell {rivals}: {proposed['description']}."
+        return f"To distinguish {rivals}: {proposed['description']}."
     others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())
     return (
-        f"To tell {rivals}, record {proposed['name']!r}: {proposed['description']}"
-        f" ({proposed['seconds']:.0f} s). What the worse rival cannot imitate there is"
-        f" {proposed['discrimination']:.3g} times the variance of the noise; of the other"
-        f" experiments on the menu: {others}."
+        f"To distinguish {rivals}, record {proposed['name']!r}: {proposed['description']}"
+        f" ({proposed['seconds']:.0f} s). Expected variance ratio between the hypotheses and the"
+        f" noise: {proposed['discrimination']:.3g}. Alternatives: {others}."
     )

@@ -59,8 +59,8 @@ def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
     page = (demo / "diagnosis.html").read_text()
     found = told["diagnosis"]
     assert page.count("<svg") == 2
-    assert "ripple.motor is missing, torque that is periodic in the motor angle (cogging)" in page
-    assert "runs not touched" in page
+    assert "identified: torque that is periodic in the motor angle (cogging) [ripple.motor]" in page
+    assert "held-out test runs" in page
     assert all(run in page for run in found["runs"]["confirm"])
     for part in ("Parameters of what was found", "Declared parameters: motor", "What was tried"):
         assert part in page

@@ -63,7 +63,7 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     assert written.evidence.rmse == pytest.approx(found["rmse_after"]["motor"], rel=0.5)
     assert written.evidence.made_at
     page = (report / "diagnosis.html").read_text()
-    assert "spring.position is missing" in page
+    assert "[spring.position]" in page
     assert page.count("<svg") == 2
     for part in (
         "the residual of the confirm runs before and after",
@@ -77,7 +77,7 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
         "Next experiment",
     ):
         assert part in page
-    assert "spring.position is missing" in capsys.readouterr().out
+    assert "[spring.position]" in capsys.readouterr().out
 
 
 def test_every_balance_that_is_decided_goes_into_the_model_file(campaign, tmp_path):
