@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -47,6 +48,14 @@ def library() -> Path:
     found = firmware_library()
     assert found is not None
     return found
+
+
+@pytest.fixture
+def hang_up_is_heard() -> Iterator[None]:
+    """SIGHUP as a program in a terminal has it, also where the tests run with `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture(autouse=True)

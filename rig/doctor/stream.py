@@ -12,9 +12,11 @@ WATCHED_S = 1.0
 MOST_READS = 20_000
 MOST_SILENT_READS = 100
 RATE_TOLERANCE = 0.02
-STANDING_STILL = ("motor_", "spindle_", "jaw_", "fsr_", "position_", "angle", "command_")
+STANDING_STILL = ("motor_", "spindle_", "jaw_", "fsr_", "position_", "angle")
 STANDING_STILL_UNITS = ("rad", "1")
 """Channels that rightly do not change at rest: encoders, a motor without current, an idle FSR."""
+COMMANDED = "command_"
+"""Channels of a drive alone: its current, supply and temperature come in steps above its noise."""
 
 
 def device_findings(name: str, open_it: Callable[[], Device]) -> list[Finding]:
@@ -98,7 +100,8 @@ def _channel_findings(name: str, device: Device, batches: list[Batch]) -> list[F
         what = f"Saturated in {saturated} of {flags.size} samples."
         fix = "Check wiring and amplifier; unload the sensor; check its range."
         findings.append(Finding(name, "saturation", Level.ERROR, what, fix))
-    for channel in device.channels:
+    is_drive = any(channel.name.startswith(COMMANDED) for channel in device.channels)
+    for channel in () if is_drive else device.channels:
         if channel.unit in STANDING_STILL_UNITS or channel.name.startswith(STANDING_STILL):
             continue
         values = np.concatenate([batch.columns[channel.name] for batch in batches])

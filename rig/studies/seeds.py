@@ -51,7 +51,8 @@ def kept_outcomes(
         try:
             outcomes[seed] = read(json.loads(place.read_text()))
         except (OSError, ValueError, KeyError, AttributeError, TypeError):
-            continue  # not there, or damaged: it is made again
+            place.unlink(missing_ok=True)  # damaged: it is made again
+            continue
         on_seed()
     missing = [seed for seed in places if seed not in outcomes]
     for seed, outcome in _done(one_seed, missing, workers, start):

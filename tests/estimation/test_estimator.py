@@ -122,7 +122,7 @@ def test_what_does_not_fit_together_is_refused(fitted, runs, tmp_path):
     bare = replace(runs[0], columns={TARGET: runs[0][TARGET]})
     with pytest.raises(MissingChannelError):
         network.predict(bare)
-    with pytest.raises(NetworkError, match="no run"):
+    with pytest.raises(NetworkError, match="No runs"):
         RECIPES["network"].fit(Campaign(()))
     with pytest.raises(NetworkError, match="the network distal_torque_n_m"):
         ResidualEstimator(

@@ -16,6 +16,8 @@ from tests.estimation.synthetic import campaign
 pytestmark = pytest.mark.long
 
 TARGET = "proximal_torque_n_m"
+OFF_N_M = 0.1
+"""More than the half width of the estimator's interval in a part of every run."""
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,7 @@ def worse(fitted, tmp_path_factory):
     path = tmp_path_factory.mktemp("worse") / "worse.npz"
     estimator = load(fitted)
     off = estimator.weights.copy()
-    off[0] += 0.02
+    off[0] += OFF_N_M
     replace(estimator, weights=off, origin=None).save(path)
     return path
 
@@ -92,7 +94,7 @@ def test_the_better_one_is_found_whichever_comes_first(fitted, worse, logs, caps
     assert found["rmse"][place] < found["rmse"][1 - place]
     assert len(found["sides"][place]["seen"]) == len(found["runs"])
     for run in found["runs"]:
-        assert run["mean"][1 - place] - run["mean"][place] == pytest.approx(0.02)
+        assert run["mean"][1 - place] - run["mean"][place] == pytest.approx(OFF_N_M)
         assert run["covered"][place] > run["covered"][1 - place]
 
 

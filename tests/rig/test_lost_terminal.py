@@ -10,7 +10,7 @@ import pytest
 
 from rig.log.reader import read_log
 
-pytestmark = pytest.mark.integration
+pytestmark = [pytest.mark.integration, pytest.mark.usefixtures("hang_up_is_heard")]
 
 PROTOCOL = """
 name = "long"

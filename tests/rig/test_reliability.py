@@ -102,7 +102,7 @@ def measured(
     paths = {name: folder / name.lower() for name in names}
     for name, path in paths.items():
         monkeypatch.setattr(page, name, path)
-    paths["TABLE"].write_text("the committed table")
+    paths["TABLE"].write_text("# The committed table")
     figures = {"count": 200, "most_lost_s": 0.1, "median_lost_s": 0.1}
     monkeypatch.setattr(page, "_MEASURES", {"kills": lambda _: figures, "fuzz": lambda _: {}})
     monkeypatch.setattr(page.fuzz, "STATE", folder / "fuzz.json")
@@ -116,7 +116,7 @@ def test_a_short_run_leaves_the_committed_table_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pages = measured(["kills", "--kills", "3"], tmp_path, monkeypatch)
-    assert pages["table"] == "the committed table"
+    assert pages["table"] == "# The committed table"
     assert "200 recorders killed" in str(pages["short_table"])
     assert not (tmp_path / "state").exists()
 

@@ -143,6 +143,7 @@ def test_a_value_that_is_no_number_is_beyond_every_limit():
         check_samples(config.limits, dataclasses.replace(reading, columns=columns))
 
 
+@pytest.mark.usefixtures("hang_up_is_heard")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_second_ctrl_c_does_not_break_into_the_way_out(number):
     """The second comes while the board is being disarmed, which must go on all the same."""

@@ -69,6 +69,7 @@ def test_the_rig_is_disarmed_whatever_ends_the_session(error):
     assert not is_armed(link.board)
 
 
+@pytest.mark.usefixtures("hang_up_is_heard")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_sigterm_and_a_lost_terminal_take_the_way_out_of_ctrl_c(number):
     config = simulated()

@@ -97,7 +97,7 @@ def test_a_session_that_has_the_rig_is_asked_to_end(
         code, told = stopped(board, capsys)
         session.communicate()
     assert (code, told["state"]) == (0, "disarmed")
-    assert told["rigs"][0]["holder"] == {"pid": session.pid, "was_killed": False}
+    assert told["holder"] == {"pid": session.pid, "was_killed": False}
     assert session.returncode != -signal.SIGKILL
     assert not is_armed(board)
 
@@ -111,7 +111,7 @@ def test_a_session_that_hangs_is_killed(
         code, told = stopped(board, capsys)
         session.communicate()
     assert (code, told["state"]) == (0, "disarmed")
-    assert told["rigs"][0]["holder"] == {"pid": session.pid, "was_killed": True}
+    assert told["holder"] == {"pid": session.pid, "was_killed": True}
     assert session.returncode == -signal.SIGKILL
     assert not is_armed(board)
 
@@ -125,9 +125,9 @@ def test_a_program_of_another_maker_is_named_and_left_alone(
         assert other.poll() is None
         other.communicate("")
     assert f"PID {other.pid}" in told
-    assert "cut their supply" in told
+    assert "Cut the motor supply by hand." in told
     code, result = stopped(board, capsys)
-    assert (code, result["state"], result["rigs"][0]["holder"]) == (0, "disarmed", None)
+    assert (code, result["state"], result["holder"]) == (0, "disarmed", None)
 
 
 def test_a_rig_is_held_once_under_any_of_its_names(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_what_is_missing_is_said_and_too_little_is_refused():
     assert any("lopo" in note for note in found.notes)  # no conditions either
     with pytest.raises(DataError, match="too few"):
         run_study(Source(Campaign.of(runs[:1]), "x", measured=False))
-    with pytest.raises(DataError, match="no run"):
+    with pytest.raises(DataError, match="campaign is empty"):
         run_study(Source(Campaign(()), "x", measured=False))
 
 

@@ -95,7 +95,7 @@ def test_what_is_missed_is_said_with_its_size(study):
     assert "3.30 mN m in proximal torque" in reached
     assert "2.90 mN m (6.90) in proximal torque" in reached
     assert "of 2 estimates" in intervals
-    assert told.startswith("Missed of what is aimed at: neutral: proximal torque")
+    assert told.startswith("Missed goals: neutral: proximal torque")
     assert [row[-1] for row in goals.table([late, good]).rows][1] == "nothing"
 
 
