@@ -81,7 +81,7 @@ def master_section(config: Config) -> MasterSection:
     """
     if not isinstance(config.machine, GrasperSection):
         raise UsageError(
-            f"{config.name} is a {config.logger.profile}.",
+            f"{config.name} is not a grasper: its profile is {config.logger.profile!r}.",
             "Only the 3-DOF grasper has a master.",
             'Name a configuration with [logger] profile = "grasper".',
         )

@@ -77,7 +77,8 @@ def test_the_help_names_what_is_shipped_and_the_default(capsys):
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
-        ("rig re", {"record", "replay"}),
+        ("rig rep", {"replay"}),
+        ("rig re", {"record", "reference", "replay"}),
         ("rig record --protocol d", {"diagnosis"}),
         ("rig record --config gra", {"grasper", "grasper_pty"}),
         ("rig record --config b", {"bench.toml"}),
