@@ -19,6 +19,19 @@ STANDARD_STREAMS = (0, 1, 2)
 """File descriptors of stdin, stdout and stderr."""
 
 
+_asked = False
+"""Whether a signal has requested the end of the session that is under way."""
+
+
+def end_is_requested() -> bool:
+    """Whether a signal has requested the end of the session.
+
+    An exception that a signal raises inside a callback from compiled code goes nowhere. A loop
+    that must end asks here as well.
+    """
+    return _asked
+
+
 @contextmanager
 def leaving_safely() -> Iterator[None]:
     """Turn SIGTERM and SIGHUP into KeyboardInterrupt; no second one breaks into the way out.
@@ -31,6 +44,8 @@ def leaving_safely() -> Iterator[None]:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal left_s
+        global _asked
+        _asked = True
         if number == HANG_UP:
             _leave_lost_terminal()
         if left_s is not None and monotonic() - left_s < LEAVING_S:
@@ -43,6 +58,8 @@ def leaving_safely() -> Iterator[None]:
     numbers = [signal.SIGINT, signal.SIGTERM]
     if HANG_UP is not None and signal.getsignal(HANG_UP) is not signal.SIG_IGN:
         numbers.append(HANG_UP)
+    global _asked
+    _asked = False
     try:
         previous = {number: signal.signal(number, interrupt) for number in numbers}
     except ValueError:  # not in the main thread, where signals never arrive
@@ -51,6 +68,7 @@ def leaving_safely() -> Iterator[None]:
     try:
         yield
     finally:
+        _asked = False
         for number, handler in previous.items():
             signal.signal(number, handler)
 

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 
 from rich.console import Console
 
+from rig.bench.interrupts import end_is_requested
 from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Summary
@@ -54,6 +55,8 @@ def _follow(
     """Feed every block, and give the writer a frame whenever a new period has begun."""
     shown: tuple[str, int] | None = None
     for block in blocks:
+        if end_is_requested():
+            raise KeyboardInterrupt
         state.feed(block)
         # device time stands still while nothing arrives, and silence must be shown too
         silent = len(block) == 0
