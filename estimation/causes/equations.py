@@ -59,7 +59,6 @@ class RunSignals:
         rate_hz: Rate of these values.
         grid: Places regressed on, indices into n.
         used: Equation to the samples it counts, indices into `grid`.
-        conditions: What was held constant.
     """
 
     name: str
@@ -67,7 +66,6 @@ class RunSignals:
     rate_hz: float
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
-    conditions: Mapping[str, float | str]
 
     @cached_property
     def memo(self) -> dict[object, FloatArray | None]:
@@ -279,4 +277,4 @@ def _signals(
                 "The others are flagged, at rest, or too near to the ends for the filter.",
                 "Record it again, or exclude it.",
             )
-    return RunSignals(recording.name, channels, rate_hz, grid, used, dict(recording.conditions))
+    return RunSignals(recording.name, channels, rate_hz, grid, used)

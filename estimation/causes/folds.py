@@ -17,8 +17,7 @@ Folds = Sequence[Sequence[Sequence[int]]]
 def folds_of(layout: Layout) -> list[list[list[int]]]:
     """Return families of folds: each run, and each level of every condition.
 
-    The levels of the loads and of the speed come from the data; further numeric conditions that
-    take a few values come from the recordings.
+    The levels of the loads and of the speed come from the data.
     """
     runs = layout.runs
     families = [[[k] for k in range(len(runs))]]

@@ -36,7 +36,6 @@ class Place:
         home: Equation it is reported under.
         enters: How it enters the equations.
         roles: Role of an effect to the channels that can play it there.
-        sign: Sign of a loss in its home equation.
     """
 
     name: str
@@ -44,7 +43,6 @@ class Place:
     home: str
     enters: tuple[Entry, ...]
     roles: Mapping[str, tuple[str, ...]]
-    sign: int = 1
 
 
 def places_of(layout: Layout) -> list[Place]:
@@ -136,9 +134,7 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
             equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
         )
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
-    return Place(
-        equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles, sign
-    )
+    return Place(equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles)
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place:

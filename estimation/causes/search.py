@@ -145,7 +145,7 @@ def candidates(train: Layout, joint: Joint) -> list[Candidate]:
     for place in places_of(train):
         named: Iterable[Source | Function] = sources_at(train, place)
         for cause in itertools.chain(named, functions_at(train, place)):
-            laid = _laid(train, joint, cause)
+            laid = laid_out(train, joint, cause)
             if laid is not None:
                 out.append(laid)
     count = Counter(_form(c) for c in out)
@@ -278,7 +278,7 @@ def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
                 else cause.shape[k] * ratio**step
             )
             shape = (*cause.shape[:k], float(moved), *cause.shape[k + 1 :])
-            laid = _laid(joint.layout, joint, replace(cause, shape=shape))
+            laid = laid_out(joint.layout, joint, replace(cause, shape=shape))
             if laid is not None:
                 out.append(replace(laid, choices=candidate.choices))
     return out
@@ -303,7 +303,7 @@ def _on_some_runs(
         if scored.candidate.is_function:
             continue
         for acts in _cuts(count):
-            laid = _laid(joint.layout, joint, scored.candidate.cause, acts)
+            laid = laid_out(joint.layout, joint, scored.candidate.cause, acts)
             if laid is not None:
                 tried.append(replace(laid, choices=scored.candidate.choices))
     return evaluate(joint, tried, folds, numbers)
@@ -321,10 +321,17 @@ def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
     return joint
 
 
-def _laid(
+def laid_out(
     layout: Layout, joint: Joint, cause: Source | Function, acts: tuple[bool, ...] | None = None
 ) -> Candidate | None:
-    """Return a cause laid out on the runs in which it acts; None where it is not finite."""
+    """Return a cause laid out on the runs in which it acts; None where it is not finite.
+
+    Args:
+        layout: The runs.
+        joint: The regression of these runs.
+        cause: The cause.
+        acts: Whether it acts in each run; in all when None.
+    """
     columns = []
     for k, run in enumerate(layout.runs):
         own = cause.columns(run)

@@ -25,9 +25,8 @@ DECLARED_ONLY = (
     "sensor.offset",
     "transmission.ratio",
     "transmission.damping",
-    "friction.coulomb",
-    "friction.viscous",
 )
+DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
 ACTUATOR = ("motor.", "ripple.current")
 DEFLECTION = (
     "transmission.",
@@ -157,12 +156,7 @@ def repeats_one_reference(layout: Layout) -> bool:
 
 
 def _acts(effect: Effect, place: Place) -> bool:
-    if effect.id.startswith(DECLARED_ONLY) and effect.family in (
-        "friction.coulomb",
-        "friction.viscous",
-    ):
-        return False
-    if effect.id.startswith(tuple(d for d in DECLARED_ONLY if not d.startswith("friction."))):
+    if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
         return False
     if effect.at_rest or effect.id.startswith("coupling."):
         return False

@@ -14,8 +14,7 @@ from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Columns, Joint, Part
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.search import Candidate, Found, Scored, search
-from estimation.causes.sources import Source
+from estimation.causes.search import Candidate, Found, Scored, laid_out, search
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
 from estimation.diagnosis.split import Sealed
 from estimation.model import Model
@@ -138,22 +137,13 @@ class _Test:
         self.kept: list[_Kept] = []
         self.notes: list[str] = []
 
-    def laid(self, candidate: Candidate) -> list[Columns]:
+    def laid(self, candidate: Candidate) -> Sequence[Columns]:
         """Return a cause's columns on all runs; one of some runs acts in none of the test runs."""
-        columns = []
-        state = self._state(candidate)
-        for run in self.layout.runs:
-            own = candidate.cause.columns(run) or {}
-            if not state[run.name]:
-                own = {name: np.zeros_like(values) for name, values in own.items()}
-            columns.append(own)
-        laid = self.joint.laid(columns, unit=isinstance(candidate.cause, Source))
-        if candidate.acts is None:
-            return laid
-        return [
-            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
-            for own in laid
-        ]
+        acts = None
+        if candidate.acts is not None:
+            acts = tuple(on is True for on in self._state(candidate).values())
+        laid = laid_out(self.layout, self.joint, candidate.cause, acts)
+        return [] if laid is None else laid.columns
 
     def _state(self, candidate: Candidate) -> Mapping[str, bool | None]:
         """Return whether a cause acts in each run; None where the training runs do not decide.
