@@ -16,8 +16,6 @@ from scipy import ndimage
 from estimation.campaign import Campaign
 from estimation.derived import (
     CAMPAIGN_TIME,
-    GEAR_RATIO,
-    GEARBOX,
     measured_channels,
     origin_of,
     zero_phase_channels,
@@ -27,7 +25,8 @@ from estimation.errors import EstimationError
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording, shared_columns
-from estimation.rest import SLOWEST_RAD_S, in_motion
+from estimation.rest import in_motion
+from estimation.signals import Signals
 
 SERIES_PER_CUTOFF = 5.0
 """Samples kept for each period of the filter's cutoff, for effects with memory."""
@@ -182,7 +181,8 @@ def lay_out(
     measured = tuple(n for n in shared_columns(timed) if n != CAMPAIGN_TIME)
     equations = {}
     for model in models:
-        if set(measured_channels([*model.channels, model.target])) <= {*measured, "time_s"}:
+        needed = measured_channels([*model.channels, model.target], model.signals)
+        if {*needed} <= {*measured, "time_s"}:
             equations[model.balance] = _equation(fit(model, campaign, bootstrap=0, every=None))
     if not equations:
         raise LayoutError(
@@ -193,19 +193,20 @@ def lay_out(
     return Layout(equations, [_signals(r, equations, measured) for r in timed], measured)
 
 
-def sensitivity(name: str, measured: str) -> tuple[float, int] | None:
+def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:
     """Return how a channel follows an error of a measured one: (gain, times differentiated).
 
     Args:
         name: Measured or derived channel.
         measured: Measured channel whose reading is wrong.
+        signals: The machine's derived channels.
 
     Returns:
         None where the channel does not read it.
     """
-    if name == GEARBOX:
-        gains = {"motor_angle_rad": 1.0 / GEAR_RATIO, "spindle_angle_rad": -1.0}
-        return (gains[measured], 0) if measured in gains else None
+    if (combination := signals.combination(name)) is not None:
+        gain = combination.gain(measured)
+        return (gain, 0) if gain else None
     source, times = origin_of(name)
     return (1.0, times) if source == measured else None
 
@@ -249,7 +250,7 @@ def _signals(
     ]
     wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
     low_pass = models[0].low_pass
-    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass)
+    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, models[0].signals)
     rate_hz = recording.sample_rate_hz
     step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -267,7 +268,7 @@ def _signals(
     for equation in equations.values():
         moving = np.ones(len(valid), bool)
         if equation.speed and equation.model.counted != "all":
-            slowest = SLOWEST_RAD_S.get(equation.speed, 0.0)
+            slowest = equation.model.signals.rest.get(equation.speed, 0.0)
             moving = in_motion(channels[equation.speed], valid, rate_hz, slowest)
         used[equation.name] = np.flatnonzero(moving[grid])
         if len(used[equation.name]) < 20:

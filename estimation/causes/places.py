@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
 from estimation.derived import CAMPAIGN_TIME, measured_channels
+from estimation.signals import Signals
 
 Kind = Literal["loss", "actuator", "deflection", "torque sensor", "angle sensor"]
 
@@ -72,8 +73,13 @@ def _angles(layout: Layout) -> list[str]:
     No other channel is ever read: another recorded channel may be a copy of a target.
     """
     read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
-    names = [n for n in measured_channels(read) if n.endswith(ANGLES) and n in layout.measured]
+    names = [n for n in measured_channels(read, _signals(layout)) if n.endswith(ANGLES)]
+    names = [n for n in names if n in layout.measured]
     return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
+
+
+def _signals(layout: Layout) -> Signals:
+    return next(iter(layout.equations.values())).model.signals
 
 
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:
@@ -111,7 +117,8 @@ def _own_angle(equation: Equation, angles: Sequence[str]) -> str:
             return angle
     if equation.of_angle:
         inside = [a for a in angles if a in equation.channels]
-        inside += [a for a in angles if sensitivity(equation.target, a) is not None]
+        known = equation.model.signals
+        inside += [a for a in angles if sensitivity(equation.target, a, known) is not None]
         return inside[-1] if inside else angles[-1]
     return angles[0]
 
@@ -166,11 +173,11 @@ def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
 def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:
     enters = []
     for equation in layout.equations.values():
-        found = sensitivity(equation.target, channel)
+        found = sensitivity(equation.target, channel, equation.model.signals)
         if found is not None:
             enters.append(Entry(equation.name, found[0], found[1]))
         for name, weight in equation.channels.items():
-            found = sensitivity(name, channel)
+            found = sensitivity(name, channel, equation.model.signals)
             if found is not None:
                 enters.append(Entry(equation.name, -weight * found[0], found[1]))
     if not enters:

@@ -20,7 +20,7 @@ from estimation.diagnosis.candidate import Candidate, Spans
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SLOWEST_RAD_S, SPEED, SPINDLE_SPEED, closing, in_motion
+from estimation.rest import SPEED, SPINDLE_SPEED, closing, in_motion
 
 WITH_FRICTION = ("motor", "cable", "grasp")
 """Balances that friction stands in. At rest it takes whatever value holds the balance, so samples
@@ -89,7 +89,7 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
     low_pass = model.low_pass
     speeds = _friction_speeds(model, recording)
     wanted = list(dict.fromkeys([*names, *speeds]))
-    filtered = zero_phase_channels(recording, wanted, low_pass)
+    filtered = zero_phase_channels(recording, wanted, low_pass, model.signals)
     rate_hz = recording.sample_rate_hz
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
     # the filter smears what is flagged as it smears the ends
@@ -105,7 +105,7 @@ def prepare(recording: Recording, names: Iterable[str], model: Model) -> Run:
         valid &= closing(channels[SPINDLE_SPEED], rate_hz)  # the others are no part of the claim
     else:
         for speed in speeds:
-            moving &= in_motion(channels[speed], valid, rate_hz, SLOWEST_RAD_S[speed])
+            moving &= in_motion(channels[speed], valid, rate_hz, model.signals.rest.get(speed, 0.0))
     run = Run(recording.name, channels, valid, moving, down)
     if len(run.kept) < 20:
         raise DesignError(
@@ -122,7 +122,7 @@ def _friction_speeds(model: Model, recording: Recording) -> list[str]:
         return [SPINDLE_SPEED]
     if model.counted == "all" or model.balance not in WITH_FRICTION:
         return []
-    own = [channel for channel in model.channels if channel in SLOWEST_RAD_S]
+    own = [channel for channel in model.channels if channel in model.signals.rest]
     return own or ([SPEED] if "motor_angle_rad" in recording else [])
 
 

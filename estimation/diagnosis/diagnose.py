@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 from estimation.campaign import Campaign, with_campaign_time
-from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import pool
@@ -32,6 +31,7 @@ from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
 from estimation.diagnosis.story import Story
 from estimation.diagnosis.twin import Bootstrap, Twin
 from estimation.diagnosis.variables import needed_channels, projection
+from estimation.effects.roles import MOTOR_LOAD
 from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.model import Model

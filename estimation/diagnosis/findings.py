@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.derived import GEAR_RATIO
+from estimation.bank.states import GEAR_RATIO
 from estimation.diagnosis.candidate import UNKNOWN
 from estimation.diagnosis.consequences import follows
 from estimation.diagnosis.design import Run

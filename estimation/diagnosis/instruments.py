@@ -11,10 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, measured_channels
+from estimation.derived import measured_channels
 from estimation.diagnosis.candidate import Candidate, projected
 from estimation.diagnosis.design import Run
 from estimation.diagnosis.least_squares import least_squares
+from estimation.effects.roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.recording import FloatArray
 
 SPEED, ACCELERATION, ANGLE = (

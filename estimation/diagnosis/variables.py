@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, measured_channels
+from estimation.derived import measured_channels
 from estimation.diagnosis.balance import Balance
 from estimation.diagnosis.candidate import Candidate
 from estimation.diagnosis.design import Run
+from estimation.effects.roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.effects.unknown_product import followed
 from estimation.recording import FloatArray
 

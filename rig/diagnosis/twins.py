@@ -70,7 +70,7 @@ def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
         models: Declared models that are diagnosed.
         discover: Runs that discover; confirm runs have no part in a twin.
     """
-    declared = {model.balance: model for model in _shipped()}
+    declared = {model.balance: model for model in model_file.reference_rig()}
     declared |= {model.balance: model for model in models}
     fitted, lost = [], []
     campaign = Campaign.of(discover)
@@ -93,8 +93,3 @@ def twins_of(models: Sequence[Model], discover: Sequence[Recording]) -> Twins:
     note = f"The simulated rig does not play {', '.join(left)}: no twins there." if left else ""
     remembered = Remembered(twin)
     return Twins(twin, dict.fromkeys(played, lambda *_: remembered), note)
-
-
-def _shipped() -> list[Model]:
-    read = [model_file.read(place) for place in model_file.shipped().values()]
-    return [model for model in read if model.name == model.balance]

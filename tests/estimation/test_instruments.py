@@ -1,13 +1,13 @@
 """A regressor's noise is not taken for an effect: it is projected where an effect could fit it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import signal
 
 from estimation.campaign import Campaign
-from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.bent import bent_losses
 from estimation.diagnosis.candidate import Candidate, projected
@@ -16,9 +16,10 @@ from estimation.diagnosis.endogeneity import kept_share, noise_share, own_share
 from estimation.diagnosis.evidence import leave_one_run_out
 from estimation.diagnosis.instruments import instruments, projection, stand_in
 from estimation.effects import effect
+from estimation.effects.roles import MOTOR_LOAD
 from estimation.fitting import fit
 from estimation.model import Term
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from estimation.recording import Recording
 from tests.estimation.synthetic import TRUE, run
 
@@ -50,7 +51,7 @@ def noisy():
         made = quiet(k)
         noise = NOISE_A * np.random.default_rng(100 + k).normal(size=len(made))
         runs.append(made.with_columns(**{CURRENT: made[CURRENT] + noise}))
-    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    model = fit(read(Path("motor")), Campaign.of(runs), bootstrap=0)
     names = [*model.channels, model.target, *instruments(MEASURED)]
     return model, [prepare(r, names, model) for r in runs]
 
@@ -117,7 +118,7 @@ def test_a_loop_made_of_slow_noise_is_lost_through_instruments_and_a_true_one_is
     noise_n_m, loop_rad, low, high
 ):
     recordings = [stretched(k, noise_n_m, loop_rad) for k in range(5)]
-    model = fit(read(shipped()["stretch"]), Campaign.of(recordings), bootstrap=0)
+    model = fit(read(Path("stretch")), Campaign.of(recordings), bootstrap=0)
     names = [*model.channels, model.target, *instruments(MEASURED)]
     balance = lay_out(model, [prepare(r, names, model) for r in recordings])
     assert 1 - balance.loss([*balance.terms, LOOP]) / balance.loss(balance.terms) > 0.05
@@ -139,7 +140,7 @@ def test_the_motors_own_idea_of_its_load_is_fitted_to_the_rig_and_hears_no_other
         runs = [
             r.with_columns(distal_torque_n_m=r["distal_torque_n_m"] * (1 + shift)) for r in runs
         ]
-        model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+        model = fit(read(Path("motor")), Campaign.of(runs), bootstrap=0)
         names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
         made = [prepare(r, names, model) for r in runs]
         put = stand_in(made, model.target)
@@ -157,7 +158,7 @@ def test_an_effect_compared_in_any_form_does_as_well_as_the_form_of_the_truth():
     runs = [
         run(f"r{k}", 0.2, 0.05 + 0.02 * k, seed=k, noise_n_m=1e-4, extra=lost) for k in range(6)
     ]
-    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    model = fit(read(Path("motor")), Campaign.of(runs), bootstrap=0)
     names = [*model.channels, model.target, MOTOR_LOAD, *instruments(MEASURED)]
     made = [prepare(r, names, model) for r in runs]
     put = stand_in(made, model.target)
@@ -186,7 +187,7 @@ def test_what_tells_a_force_without_its_noise_removes_that_noise_and_a_true_effe
         if slow:  # of a time constant of 50 ms, and the same power below the filter
             noise = signal.lfilter([0.1], [1.0, -0.98], noise)
         runs.append(clean.with_columns(**{CURRENT: clean[CURRENT] + noise}))
-    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    model = fit(read(Path("motor")), Campaign.of(runs), bootstrap=0)
     wanted = [*model.channels, model.target, "motor_angle_rad", CURRENT]
     balance = lay_out(model, [prepare(r, wanted, model) for r in runs])
 

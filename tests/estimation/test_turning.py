@@ -1,6 +1,7 @@
 """How wide friction's sign is: told by all samples, where samples in motion do not mind."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from estimation.diagnosis.design import prepare
 from estimation.diagnosis.frozen import freeze, squares
 from estimation.diagnosis.turning import FREE, turned
 from estimation.fitting import fit
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from tests.estimation.synthetic import TRUE, run
 
 
@@ -19,7 +20,7 @@ from tests.estimation.synthetic import TRUE, run
 def balance():
     # slow enough to rest for long at each reversal
     runs = [run(f"r{k}", 0.1, 0.05 + 0.02 * k, seed=k, noise_n_m=2e-3) for k in range(4)]
-    model = fit(read(shipped()["motor"]), Campaign.of(runs), bootstrap=0)
+    model = fit(read(Path("motor")), Campaign.of(runs), bootstrap=0)
     return lay_out(model, [prepare(r, [*model.channels, model.target], model) for r in runs])
 
 

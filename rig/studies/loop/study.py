@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.balance import lay_out
 from estimation.diagnosis.candidate import Candidate, pool
 from estimation.diagnosis.design import DesignError, Run, covered, prepare
@@ -22,6 +21,7 @@ from estimation.diagnosis.search import Search, Trial
 from estimation.diagnosis.split import Sealed, split
 from estimation.diagnosis.steps import forwards
 from estimation.effects import effect
+from estimation.effects.roles import MOTOR_LOAD
 from estimation.fitting import fit
 from estimation.model import Model, Term
 from estimation.recording import Recording
