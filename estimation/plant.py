@@ -121,20 +121,16 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Load:
-    """The weight of a mass on an arm that turns with an axis, its angle 0 where the arm hangs.
+    """A known force or torque that an axis carries, such as the weight of a pendulum.
 
     Attributes:
-        name: Channel of the torque, computed from the angle.
+        name: Channel of it, recorded or computed when a recording is read.
         axis: Axis that carries it.
-        mass_kg: Mass, or the condition of a run that has it.
-        length_m: Length of the arm, or the condition of a run that has it.
         description: In words.
     """
 
     name: str
     axis: str
-    mass_kg: float | str
-    length_m: float | str
     description: str = ""
 
 

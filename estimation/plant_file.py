@@ -237,19 +237,11 @@ def _load(table: Table) -> Load:
     made = Load(
         table.take("name", str),
         table.take("axis", str),
-        _number_or_condition(table, "mass_kg"),
-        _number_or_condition(table, "length_m"),
         table.take("description", str, ""),
     )
     _check_unit(table, made.name)
     table.finish()
     return made
-
-
-def _number_or_condition(table: Table, key: str) -> float | str:
-    if isinstance(table.content.get(key), str):
-        return str(table.take(key, str))
-    return table.number(key)
 
 
 def _equation(table: Table) -> Written:

@@ -41,6 +41,13 @@ class Lines:
             elif key := KEY.match(line):
                 self._line.setdefault((*at, key[1]), number)
 
+        self._named: dict[str, int] = {}
+
+    def following(self, name: str) -> int:
+        """Return which table of a name is read next; tables are read in the file's order."""
+        self._named[name] = self._named.get(name, 0) + 1
+        return self._named[name]
+
     def of(self, place: Place) -> int | None:
         """Return the line of a key, the table's header where the key is not there, or None."""
         name, index, key = place
@@ -111,7 +118,9 @@ class Table:
         for index, entry in enumerate(self.take(key, list, default), start=1):
             if not isinstance(entry, dict):
                 raise self.error(f"{self.at(key)}: {key} holds {entry!r}, not a table.")
-            yield self._within(entry, f"{self.where}, {key} {index}", key, index)
+            name = f"{self.place[0]}.{key}" if self.place[0] else key
+            number = self.lines.following(name) if self.lines else index
+            yield self._within(entry, f"{self.where}, {key} {index}", key, number)
 
     def _within(self, content: Mapping[str, Any], where: str, key: str, index: int) -> "Table":
         name = f"{self.place[0]}.{key}" if self.place[0] else key

@@ -83,6 +83,9 @@ def _signals(layout: Layout) -> Signals:
 
 
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:
+    """Return the channels of an angle's motion; none where no angle is read."""
+    if not angle:
+        return {}
     base = next(a for a in ANGLES if angle.endswith(a))
     speed, acceleration = RATES[base]
     stem = angle.removesuffix(base)
@@ -94,27 +97,33 @@ def _motion(angle: str) -> dict[str, tuple[str, ...]]:
 
 
 def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str, ...]]:
-    return {
+    """Return the roles of clocks, and those of angles as far as any is read."""
+    roles: dict[str, tuple[str, ...]] = {
         "clock": ("time_s",),
         "elapsed": (CAMPAIGN_TIME,),
         "campaign_clock": (CAMPAIGN_TIME,),
-        "motor_angle": tuple(layout_angles[:1]),
-        **dict.fromkeys(("position", "stop", "tilt"), (position,)),
-        # a harmonic of the only shaft there is has one name
-        "output_angle": (position,) if len(layout_angles) > 1 else (),
     }
+    if layout_angles:
+        roles["motor_angle"] = tuple(layout_angles[:1])
+    if position:
+        roles |= dict.fromkeys(("position", "stop", "tilt"), (position,))
+    if len(layout_angles) > 1:  # a harmonic of the only shaft there is has one name
+        roles["output_angle"] = (position,)
+    return roles
 
 
 def _position(angles: Sequence[str], own: str) -> str:
     """Return the angle that the place's shaft or its output turns by."""
     slow = [a for a in angles if a != angles[0]] or list(angles)
-    return own if own in slow else slow[0]
+    return own if own in slow else next(iter(slow), "")
 
 
 def _own_angle(equation: Equation, angles: Sequence[str]) -> str:
     for angle in angles:
         if equation.speed in _motion(angle)["speed"]:
             return angle
+    if not angles:
+        return ""
     if equation.of_angle:
         inside = [a for a in angles if a in equation.channels]
         known = equation.model.signals
@@ -147,7 +156,7 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
     term = next(t for t in equation.terms if t.effect.id == "motor.torque_constant")
     current = term.channels["source"]
-    roles = _shared(angles, _position(angles, angles[0])) | {
+    roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
         "current": (current,),
         "drive": (current,),
         "reading": (current,),

@@ -118,7 +118,7 @@ def plants(draw):
             if draw(st.booleans()):
                 counts, noise = draw(st.none() | positive), draw(st.none() | positive)
                 sensors.append(Sensor(f"{axis.name}{end}", axis.name, reads, counts, noise=noise))
-    loads = [Load("weight_n_m", "axis_0", draw(positive), "arm_m")] if units[0] == "rad" else []
+    loads = [Load("weight_n_m", "axis_0")] if units[0] == "rad" else []
     parts = (Part("sensor.offset"), Part("friction.load", -1, {"speed": "a_velocity_m_s"}))
     own = (Written("mine", "mine_n", parts),)
     share = Share("a_a", draw(finite), draw(positive))
