@@ -130,7 +130,7 @@ def _files(path: Path) -> list[Path]:
 
 def _contents(path: Path) -> dict[str, Content]:
     """Return the variables of each run of a file, by the name of its struct; "" is the file."""
-    variables = _variables(path)
+    variables = read_variables(path)
     sidecar = read_sidecar(path)
     if sidecar is not None:
         return {"": _mapped(path, variables, sidecar)}
@@ -142,7 +142,12 @@ def _contents(path: Path) -> dict[str, Content]:
     return {name: _named(path, fields) for name, fields in structs.items()}
 
 
-def _variables(path: Path) -> dict[str, Value]:
+def read_variables(path: Path) -> dict[str, Value]:
+    """Return the variables of a MATLAB file of versions 5 to 7 by name.
+
+    Raises:
+        DataError: It cannot be read, is damaged, or is of version 7.3.
+    """
     try:
         if path.stat().st_size > MAX_BYTES:
             raise DataError(f"{path} has more than {MAX_BYTES >> 30} GB.")
