@@ -79,7 +79,7 @@ def checked(recording: Recording) -> Recording:
                 f"{recording.source or recording.name}: {found}.",
                 f"{slope_name} must be the time derivative of {name}. Either the sample rate, or a "
                 "scale, a sign or the order of columns is wrong; nothing of it was imported.",
-                "Correct the file, its sidecar or the stated sample rate.",
+                "Correct the file, the mapping of its columns or the stated sample rate.",
             )
     return recording
 

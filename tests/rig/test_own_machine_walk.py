@@ -18,7 +18,7 @@ ASYMMETRY = 40.0
 
 
 def drive_axis(laps=4):
-    """Return a carriage that goes to and fro, and its viscous friction that differs by direction."""
+    """Return a carriage that goes to and fro, its viscous friction different by direction."""
     time_s = np.arange(int(laps * LAP_S * RATE_HZ)) / RATE_HZ
     position = 0.12 - 0.12 * np.cos(2 * np.pi * time_s / LAP_S * 2)
     position += 0.01 * np.sin(2 * np.pi * 1.3 * time_s) * np.sin(np.pi * time_s / 25)

@@ -94,6 +94,8 @@ def _of_arrays(path: Path, values: Mapping[str, Any]) -> Raw:
         array = np.asarray(value)
         if array.dtype.kind in "US" and array.size == 1:
             fields[name] = str(array.reshape(-1)[0])
+        elif array.dtype.kind not in "fiubUS":  # complex numbers
+            continue
         elif array.size == 1:
             fields[name] = float(array.reshape(-1)[0])
         elif array.size:

@@ -9,6 +9,7 @@ import numpy as np
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.recording import FloatArray
 from rig.errors import DataError
+from rig.importers.matlab import carries_unit
 from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.mapping import DATE, TIME, Mapping, Source
@@ -98,7 +99,9 @@ def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values |
 
 def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
     """Return the columns that are named as channels, where no column is mapped at all."""
-    found = {name: Source(column=name) for name in raw.columns if _has_unit(name)}
+    found = {
+        name: Source(column=name) for name in raw.columns if carries_unit(name) and name.islower()
+    }
     used = {one for formula in mapping.data.formulas.values() for one in names_in(formula)}
     if not set(found) - {TIME} and not used:
         raise DataError(
@@ -107,14 +110,6 @@ def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
             "Map them: --column motor_angle_rad=COLUMN:deg, or [data.columns] in --machine FILE.",
         )
     return found
-
-
-def _has_unit(name: str) -> bool:
-    try:
-        unit_of(name)
-    except UnknownUnitError:
-        return False
-    return name == name.lower()
 
 
 def _channel(
@@ -170,7 +165,7 @@ def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float |
     path = ("conditions", name)
     found = find(raw, mapping, path, source.column)
     many = found if isinstance(found, np.ndarray) else np.array([found])
-    if many.dtype.kind in "US" and _has_unit(name):
+    if many.dtype.kind in "US" and carries_unit(name):
         try:
             many = many.astype(np.float64)
         except ValueError as error:

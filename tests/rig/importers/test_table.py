@@ -133,6 +133,22 @@ def test_a_gain_may_be_a_single_value_of_the_file(tmp_path, machine):
     np.testing.assert_allclose(run["drive_force_n"], 35.15 * CURRENT_MA)
 
 
+def test_fields_of_a_struct_and_columns_of_a_matrix_have_names(tmp_path, machine):
+    path = tmp_path / "run.mat"
+    joints = np.column_stack([ANGLE_DEG, 2 * ANGLE_DEG])
+    savemat(path, {"log": {"t": TIME_MS, "q": joints, "z": joints * 1j}, "note": "calm"})
+    text = """
+        [data.columns]
+        time_s = "log.t:ms"
+        joint_2_angle_rad = "log.q.2:deg"
+        [data.conditions]
+        note = "note"
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run["joint_2_angle_rad"], 2 * np.radians(ANGLE_DEG))
+    assert run.conditions == {"note": "calm"}
+
+
 def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
     path = write(tmp_path, "json")
     text = f"""
