@@ -25,6 +25,7 @@ from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
 from rig.cli.help import GroupedHelp
+from rig.cli.import_ import import_
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
@@ -65,6 +66,7 @@ app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.command()(loop)
 app.command()(effects)
+app.command("import")(import_)
 app.add_typer(log_app, name="log")
 app.add_typer(machine_app, name="machine")
 app.add_typer(grasper_app, name="grasper")
