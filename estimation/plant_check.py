@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +90,7 @@ class CheckedPlant:
 
 
 def check(plant: Plant, campaign: Campaign | None = None, file: Path | None = None) -> CheckedPlant:
-    """Return what can be identified of a machine.
+    """Check which parameters of a machine can be identified.
 
     Args:
         plant: The machine.
@@ -143,7 +144,7 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     found = _described(fitted, values=True)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
-    size = float(np.sqrt(np.mean([float(np.mean(r ** 2)) for r in _targets(fitted, campaign)])))
+    size = float(np.sqrt(np.mean([float(np.mean(r**2)) for r in _targets(fitted, campaign)])))
     return CheckedEquation(
         found.name,
         found.sentence,
@@ -172,7 +173,7 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
     """Yield where recorded travels are not as the file states."""
     for axis in plant.axes:
         readings = [s.name for s in plant.sensors if (s.axis, s.reads) == (axis.name, "position")]
-        for first, second in zip(readings, readings[1:], strict=False):
+        for first, second in pairwise(readings):
             slope = _slope(recordings, first, second)
             if slope is not None and abs(slope - 1.0) > FOLLOWS:
                 yield (

@@ -71,36 +71,17 @@ def shipped_plant(name: str) -> Plant:
     return read(shipped()[name])
 
 
-def place_of(path: Path) -> Path:
-    """Return the file of a machine: the path, or the file of that name in `shipped`.
-
-    Raises:
-        NoPlantError: There is no such file and no such name.
-    """
-    known = shipped()
-    place = known.get(str(path), path)
-    if not place.exists():
-        raise NoPlantError(
-            f"There is no machine {str(path)!r}: neither a file nor a shipped machine.",
-            f"Shipped: {', '.join(known)}.",
-            f"{nearest(str(path), list(known))} `rig machine new` writes a file.",
-        )
-    return place
-
-
 def read(path: Path) -> Plant:
     """Read a machine file.
 
-    Args:
-        path: The file, or the name of a machine from `shipped`.
-
     Raises:
-        NoPlantError: There is no such file and no such name; it is a PlantFileError, too.
+        NoPlantError: There is no such file; it is a PlantFileError, too.
         PlantFileError: It is not TOML, a key is unknown, missing or wrong, or parts do not fit.
     """
-    place = place_of(path)
     try:
-        text = place.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise NoPlantError(f"There is no machine file {path}.", fix="Check the path.") from error
     except (OSError, UnicodeDecodeError) as error:
         raise PlantFileError(f"The machine file {path} cannot be read.", str(error)) from error
     return parse(text, str(path))

@@ -153,7 +153,7 @@ def fit(
     from estimation import model_file
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
-    from rig.importers.of_machine import open_recordings
+    from rig.machines.recordings import open_recordings
     from rig.output.table import to_rich
     from rig.reports.first_look import parameter_table
 
@@ -199,13 +199,13 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
         ModelFileError: The model cannot be read.
         PlantFileError: The machine cannot be read.
     """
-    from estimation.plant_file import read as read_plant
     from estimation.plant_models import declared
     from rig.live.estimator import models_in_use
+    from rig.machines.shipped import read_machine
 
     if machine is None:
         return models_in_use(Path(model or "grip"))
-    own = declared(read_plant(machine))
+    own = declared(read_machine(machine))
     named = [one for one in own if model in (None, one.balance)]
     return named or models_in_use(Path(str(model)))
 

@@ -31,10 +31,11 @@ FileArgument = Annotated[
 def show(file: FileArgument, json_: JsonFlag = False) -> None:
     """Show a machine: its parts and its equations."""
     from estimation.plant_equations import signals
-    from estimation.plant_file import read, to_toml
+    from estimation.plant_file import to_toml
     from estimation.plant_models import declared
+    from rig.machines.shipped import read_machine
 
-    plant = read(file)
+    plant = read_machine(file)
     models = declared(plant)
     screen = results(json_)
     screen.print(to_toml(plant))
@@ -59,11 +60,11 @@ def check(
     contradict the file, or where nothing can be identified.
     """
     from estimation.plant_check import check as check_plant
-    from estimation.plant_file import read
     from rig.errors import ExitCode
-    from rig.importers.of_machine import open_recordings
+    from rig.machines.recordings import open_recordings
+    from rig.machines.shipped import read_machine
 
-    plant = read(file)
+    plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file)
     screen = results(json_)

@@ -80,7 +80,7 @@ def plant_of(name: str, answers: Answers) -> Plant:
     try:
         return Plant(
             name=name,
-            axes=tuple(Axis(*parts) for parts in axes),
+            axes=tuple(Axis(axis, unit) for axis, unit in axes),
             transmissions=tuple(_transmission(parts) for parts in joints),
             actuators=tuple(Actuator(channel, axis) for axis, channel in actuators),
             sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in sensors),
@@ -110,7 +110,7 @@ def _transmission(parts: Sequence[str]) -> Transmission:
 
 
 def reads_of(channel: str) -> Reads:
-    """Return what a sensor reads, by the unit and the name of its channel."""
+    """Return the quantity a sensor reads, by the unit and the name of its channel."""
     unit = unit_of(channel)
     if channel.startswith("target_"):
         return "reference"

@@ -43,7 +43,6 @@ def replay(
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.
     """
     from rig.errors import ExitCode, UsageError
-    from rig.importers.of_machine import open_recordings
     from rig.live.estimator import half_widths_of, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
     from rig.live.model_status import with_model_status
@@ -51,6 +50,7 @@ def replay(
     from rig.live.replay import replay_blocks
     from rig.live.run import show
     from rig.live.watching import watched
+    from rig.machines.recordings import open_recordings
 
     if not 0 <= speed < math.inf:
         raise UsageError(

@@ -32,7 +32,8 @@ def model_names() -> list[str]:
 
 def machine_names() -> list[str]:
     """Return the names of the shipped machines."""
-    return _names(Path(estimation.__file__).parent / "machines")
+    examples = Path(rig.__file__).parent / "machines" / "examples"
+    return sorted(_names(Path(estimation.__file__).parent / "machines") + _names(examples))
 
 
 def _matching(names: list[str], start: str) -> list[str]:

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimation import model_file
-from estimation.plant_file import read as read_plant
-from estimation.plant_models import declared as declared_of
 from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
 from estimation.model import Model
+from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared
 from rig.calibrate.diagnose import declared_by_folder, is_raw
 from rig.errors import UsageError
-from rig.importers.of_machine import open_recordings
 from rig.importers.registry import open_campaign
+from rig.machines.recordings import open_recordings
+from rig.machines.shipped import read_machine
 
 WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
 """Those that declare the kinematics of a grasper with three degrees of freedom."""
@@ -65,7 +65,7 @@ def subject(
     if machine is not None:
         campaign = open_recordings(path, machine, format_name)
         if model is None:
-            return Subject(campaign, _of(declared_of(read_plant(machine)), balance))
+            return Subject(campaign, _of(declared_of(read_machine(machine)), balance))
         return Subject(campaign, declared_models(model, balance))
     if model is not None:
         models = declared_models(model, balance)

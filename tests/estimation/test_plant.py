@@ -23,7 +23,7 @@ from estimation.plant import (
     Written,
 )
 from estimation.plant_equations import equations, missing, signals, unused
-from estimation.plant_file import PlantFileError, parse, read, shipped, shipped_plant, to_toml
+from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Combination, Direction, Share
@@ -163,13 +163,6 @@ def test_a_declared_model_of_any_machine_survives_its_file(plant):
         assert model_file.parse_all(model_file.to_toml(*models)) == models
 
 
-@pytest.mark.parametrize("name", sorted(shipped()))
-def test_shipped_machines_can_be_declared(name):
-    plant = read(Path(name))
-    assert declared(plant)
-    assert parse(to_toml(plant)) == plant
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -203,11 +196,6 @@ def test_the_line_named_is_the_line_in_the_file():
     number = next(k for k, line in enumerate(text.splitlines(), 1) if "positon" in line)
     with pytest.raises(PlantFileError, match=f"mine.toml, line {number}:"):
         parse(text, "mine.toml")
-
-
-def test_a_machine_that_is_not_there_names_the_nearest():
-    with pytest.raises(PlantFileError, match="Did you mean 'reference'"):
-        read(Path("referense"))
 
 
 def test_without_a_torque_sensor_the_drive_is_the_target_and_the_gap_is_named():

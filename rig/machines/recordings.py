@@ -1,13 +1,14 @@
 """Recordings of a machine that a file describes."""
 
+import tomllib
 from pathlib import Path
 
 from estimation.campaign import Campaign
-from estimation.plant_file import place_of
 from rig.importers.log import LogImporter
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table
+from rig.machines.shipped import place_of
 
 
 def open_recordings(
@@ -35,6 +36,4 @@ def open_recordings(
 
 def has_data(file: Path) -> bool:
     """Whether a machine file states how a foreign table is read."""
-    import tomllib
-
     return "data" in tomllib.loads(file.read_text("utf-8"))
