@@ -13,6 +13,7 @@ from rig.calibrate.declared import Declared
 from rig.calibrate.diagnose import declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
+from rig.machines.moving import with_motion
 from rig.machines.recordings import open_recordings
 from rig.machines.shipped import read_machine
 
@@ -63,10 +64,11 @@ def subject(
         DataError: The recordings cannot be read.
     """
     if machine is not None:
-        campaign = open_recordings(path, machine, format_name)
         if model is None:
-            return Subject(campaign, _of(declared_of(read_machine(machine)), balance))
-        return Subject(campaign, declared_models(model, balance))
+            models = _of(declared_of(read_machine(machine)), balance)
+        else:
+            models = declared_models(model, balance)
+        return Subject(with_motion(open_recordings(path, machine, format_name), models), models)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name), models)
