@@ -5,7 +5,7 @@ that an equation reads (a torque, a force, a current) is therefore replaced by i
 through the other declared equations: an instrumental variable. Angles are used as measured.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -58,11 +58,14 @@ def _is_motion(channel: str) -> bool:
 
 def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
     own = set(_efforts(equation))
-    known = _propagated(layout, run, own)
+    torques = [e for e in layout.equations.values() if not e.of_angle]
+    known = _propagated(torques, run, own)
+    apart = _propagated([e for e in torques if e is not equation], run, own)
     for channel in own:
         if channel in known:
             run.channels[instrumented(channel, equation.name)] = known[channel]
-            layout.independent.add((channel, equation.name))
+            if channel in apart:  # else through the noise of this equation's own accelerations
+                layout.independent.add((channel, equation.name))
         elif channel == equation.target:
             run.channels[instrumented(channel, equation.name)] = equation.estimate(run.channels)
     if equation.of_angle and equation.target in layout.measured:
@@ -77,11 +80,12 @@ def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
             run.channels[instrumented(speed, equation.name)] = np.gradient(angle) * run.rate_hz
 
 
-def _propagated(layout: Layout, run: RunSignals, without: set[str]) -> Mapping[str, FloatArray]:
+def _propagated(
+    relations: Sequence[Equation], run: RunSignals, without: set[str]
+) -> Mapping[str, FloatArray]:
     """Return every effort that can be worked out from sensors other than some."""
-    efforts = {n for e in layout.equations.values() for n in _efforts(e)}
+    efforts = {n for e in relations for n in _efforts(e)}
     known = {n: run.channels[n] for n in efforts if n not in without}
-    relations = [e for e in layout.equations.values() if not e.of_angle]
     for _ in relations:
         for relation in relations:
             missing = [n for n in _efforts(relation) if n not in known]

@@ -23,6 +23,9 @@ Columns = Mapping[Part, FloatArray]
 
 TINY = 1e-300
 
+MOST_NOISE = 0.95
+"""Share of a run's signal in any direction that may be noise."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -66,7 +69,7 @@ class Joint:
         self._tables: list[dict[Part, FloatArray]] = [self._laid(run) for run in self.runs]
         self.samples = {p: np.array([float(len(t[p])) for t in self._tables]) for p in self.parts}
         self._gram = self._products()
-        self.error = self._declared_error()
+        self._gram, self.error = self._without_noise()
         self._instrumented = [self._instruments(run) for run in self.runs]
         self._projector = self._projectors()
         weights = self.weights
@@ -139,17 +142,44 @@ class Joint:
     def _products(self) -> Mapping[Part, FloatArray]:
         return {p: np.array([t[p].T @ t[p] for t in self._tables]) for p in self.parts}
 
-    def _declared_error(self) -> Mapping[Part, float]:
-        """Return the mean squared residual of the declared model in each part."""
-        count = len(self.runs)
-        self.error = dict.fromkeys(self.parts, 1.0)
+    def _without_noise(self) -> tuple[Mapping[Part, FloatArray], Mapping[Part, float]]:
+        """Return cross-products without the noise of the declared columns, and declared errors.
+
+        Corrected least squares: noise of a regressor would shrink its amplitude, and whatever
+        stands in for that regressor with less noise would then remove error. The noise of the
+        declared fit is put back as a constant, so errors remain those of the declared equations.
+        """
+        raw, noise = self._gram, self._noise_products()
+        clean = {p: raw[p] - noise[p] if p in noise else raw[p] for p in self.parts}
+        error, self._gram, count = dict.fromkeys(self.parts, 1.0), clean, len(self.runs)
         for _ in range(5):
+            self.error = error
             vector = np.append(_solved(self._weighted()), -1.0)
             for p in self.parts:
-                value = float(np.einsum("i,rij,j->", vector, self._gram[p], vector))
+                value = float(np.einsum("i,rij,j->", vector, raw[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
-                self.error[p] = max(spare * value / self.samples[p].sum(), TINY)
-        return self.error
+                error[p] = max(spare * value / self.samples[p].sum(), TINY)
+        for p, made in noise.items():
+            clean[p][:, -1, -1] += np.einsum("i,rij,j->r", vector, made, vector)
+        return clean, error
+
+    def _noise_products(self) -> Mapping[Part, FloatArray]:
+        """Return the noise in the cross-products within runs; the target's own is left in."""
+        out, equations = {}, list(self.layout.equations.values())
+        at, size = 0, self.size + 1
+        for equation in equations:
+            part = (equation.name, "within")
+            made = np.zeros((len(self.runs), size, size))
+            for r, run in enumerate(self.runs):
+                noise = equation.noise(run)[run.grid[run.used[equation.name]]]
+                width = noise.shape[1] - 1
+                own = [*range(at, at + width), size - 1]
+                product = noise.T @ noise
+                product[-1, -1] = 0.0
+                made[r][np.ix_(own, own)] = _at_most(product, self._gram[part][r][np.ix_(own, own)])
+            out[part] = made
+            at += width
+        return out
 
     def _weighted(self, left_out: Sequence[int] = ()) -> FloatArray:
         kept = [i for i in range(len(self.runs)) if i not in set(left_out)]
@@ -293,18 +323,30 @@ class Joint:
 
     def score(
         self,
+        folds: Folds,
         before: Sequence[Mapping[Part, FloatArray]],
         after: Sequence[Mapping[Part, FloatArray]],
     ) -> FloatArray:
         """Return the log ratio of errors, summed over parts, shape (families, candidates)."""
         rows = []
-        for old, new in zip(before, after, strict=True):
+        for family, old, new in zip(folds, before, after, strict=True):
+            spread = self._extrapolated(family)
             means = [
-                {p: e[p].sum(axis=0) / self.samples[p].sum() for p in self.parts}
+                {p: (e[p].sum(axis=0) + spread[p]) / self.samples[p].sum() for p in self.parts}
                 for e in (old, new)
             ]
             rows.append(self.log_ratio(means[0], means[1]))
         return np.array(rows)
+
+    def _extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
+        """Return the squared error that the base's own uncertainty makes in what was left out."""
+        out = dict.fromkeys(self.parts, 0.0)
+        for left_out in family:
+            inverse = _inverse(self._weighted(list(left_out))[:-1, :-1])
+            for p in self.parts:
+                for i in left_out:
+                    out[p] += float(np.sum(self._gram[p][i][:-1, :-1] * inverse))
+        return out
 
     def log_ratio(
         self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
@@ -333,12 +375,34 @@ class Joint:
                 added = columns[i].get(p, np.zeros((len(table[p]), k)))
                 grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
             made._tables.append(grown)
-        made._gram = made._products()
+        made._gram = made._grown(self._gram)
         return made
+
+    def _grown(self, known: Mapping[Part, FloatArray]) -> Mapping[Part, FloatArray]:
+        """Return cross-products with those of the last columns added; known ones are kept."""
+        out, fresh = {}, self._products()
+        for p, raw in fresh.items():
+            old = [*range(known[p].shape[1] - 1), -1]
+            raw[np.ix_(range(len(raw)), old, old)] = known[p]
+            out[p] = raw
+        return out
 
 
 def _first(run: RunSignals) -> Mapping[str, FloatArray]:
     return {name: values[:8] for name, values in run.channels.items()}
+
+
+def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:
+    """Return noise products of columns and target, less than the columns' own in any direction."""
+    scale = _scales(gram[:-1, :-1])
+    inner = gram[:-1, :-1] * np.outer(scale, scale) + 1e-8 * np.eye(len(scale))
+    root = np.linalg.cholesky(inner)
+    turned = np.linalg.solve(root, noise[:-1, :-1] * np.outer(scale, scale))
+    share, axes = np.linalg.eigh(np.linalg.solve(root, turned.T))
+    kept = root @ (axes * np.clip(share, 0.0, MOST_NOISE)) @ axes.T @ root.T
+    out = noise.copy()
+    out[:-1, :-1] = kept / np.outer(scale, scale)
+    return out
 
 
 def _scales(gram: FloatArray) -> FloatArray:

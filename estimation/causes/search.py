@@ -35,7 +35,7 @@ class Candidate:
         cause: The named effect or smooth function.
         columns: Its columns of every run.
         acts: Runs in which it acts; in all when None.
-        choices: Points of the grid that share its family's prior probability at this place.
+        choices: Forms that share the prior probability of a cause, times the points of its grid.
     """
 
     cause: Source | Function
@@ -130,10 +130,9 @@ def _chain(
 ) -> list[Scored]:
     """Return a set of causes, extended one at a time while another one is worth its price."""
     causes = [start]
-    least = max(numbers.least_score, numbers.cause_cost / numbers.sharpness)
     while len(causes) < MOST_CAUSES:
         ranked = _ranked(_with(joint, causes), pool, folds, numbers)
-        if not ranked or ranked[0].score < least:
+        if not ranked or ranked[0].score < numbers.least_score:
             break
         causes.append(ranked[0])
     return causes
@@ -149,7 +148,7 @@ def candidates(train: Layout, joint: Joint) -> list[Candidate]:
             if laid is not None:
                 out.append(laid)
     count = Counter(_form(c) for c in out)
-    return [replace(c, choices=count[_form(c)]) for c in out]
+    return [replace(c, choices=count[_form(c)] * len(count)) for c in out]
 
 
 def _form(candidate: Candidate) -> tuple[str, str]:
@@ -194,7 +193,7 @@ def _evaluated(
 ) -> list[Scored]:
     precision = np.vstack([_precision(joint, c, numbers) for c in part])
     outcome = joint.evaluate(joint.block([c.columns for c in part]), folds, precision)
-    scores = joint.score(before, outcome.errors)
+    scores = joint.score(folds, before, outcome.errors)
     out = []
     for k, candidate in enumerate(part):
         amplitudes = outcome.amplitudes[k]
@@ -232,10 +231,11 @@ def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
 def _price(candidate: Candidate, numbers: Numbers) -> float:
     """Return the price of what was chosen: the logarithm of how many choices there were.
 
-    A family's prior probability at a place is shared by the points of its grid, that of an unknown
-    form by the sets of variables, and that of acting in some of the runs by all choices of them.
+    The prior probability of a cause is shared by all forms at all places, that of a form by the
+    points of its grid, that of an unknown form by the sets of variables, and that of acting in some
+    of the runs by all choices of them.
     """
-    price = float(np.log(candidate.choices))
+    price = numbers.cause_cost + float(np.log(candidate.choices))
     if candidate.is_function:
         price += numbers.function_cost
     if candidate.acts is not None:
