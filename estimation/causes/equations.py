@@ -25,6 +25,7 @@ from estimation.derived import (
 )
 from estimation.effects import Proportional
 from estimation.errors import EstimationError
+from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording, shared_columns
@@ -67,6 +68,7 @@ class RunSignals:
     channels: dict[str, FloatArray]
     noise: Mapping[str, FloatArray]
     rate_hz: float
+    low_pass: LowPass
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
 
@@ -134,6 +136,23 @@ class Equation:
                 parts.append(term.sign * ((ends[0] - ends[1]) @ scale)[:, None])
         return np.hstack(parts)
 
+    @property
+    def of_shape(self) -> list[bool]:
+        """Which of the columns are derivatives by a shape."""
+        kinds = []
+        for term in self.terms:
+            kinds += [False] * len(term.effect.amplitudes) + [True] * len(term.effect.shape)
+        return kinds
+
+    @property
+    def of_channel(self) -> list[bool]:
+        """Which of the columns are a channel times a constant."""
+        kinds = []
+        for term in self.terms:
+            linear = isinstance(term.effect, Proportional)
+            kinds += [linear] * (len(term.effect.amplitudes) + len(term.effect.shape))
+        return kinds
+
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).
 
@@ -146,6 +165,16 @@ class Equation:
             count = own.shape[1] + len(term.effect.shape)
             parts.append(term.sign * own if linear else np.zeros((len(own), count)))
         return np.hstack([*parts, run.noise[self.target][:, None]])
+
+    def is_quieter(self, runs: Sequence[RunSignals]) -> bool:
+        """Whether the right-hand side has less of its sensors' noise than the target has."""
+        linear = [t for t in self.terms if isinstance(t.effect, Proportional)]
+        own = other = 0.0
+        for run in runs:
+            parts = [t.columns(run.noise, ()) @ np.array(t.weights) for t in linear]
+            own += float(np.var(run.noise[self.target]))
+            other += float(np.var(np.sum(parts, axis=0)))
+        return other < own
 
     def estimate(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the right-hand side without offsets, shape (n,)."""
@@ -295,7 +324,7 @@ def _signals(
                 "The others are flagged, at rest, or too near to the ends for the filter.",
                 "Record it again, or exclude it.",
             )
-    return RunSignals(recording.name, channels, noise, rate_hz, grid, used)
+    return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
 
 
 def _white_noise(recording: Recording, names: Sequence[str]) -> Recording:

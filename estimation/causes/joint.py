@@ -7,10 +7,11 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Layout, RunSignals
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
 from estimation.causes.numbers import DEFAULT, Numbers
@@ -21,10 +22,32 @@ Part = tuple[str, str]
 
 Columns = Mapping[Part, FloatArray]
 
+Scale = Literal["each", "first", "none"]
+"""Of which columns the norm is one: of each, of the first, or of none."""
+
 TINY = 1e-300
 
-MOST_NOISE = 0.95
-"""Share of a run's signal in any direction that may be noise."""
+MOST_CHANGE = 2.0
+"""Factor by which the largest linear term of an equation may change beside a cause."""
+
+NOISE_TAKEN = 0.8
+"""Share of the known noise that is taken off the cross-products of a fit: with all of it a column
+that holds nothing but noise has any amplitude."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A candidate's columns without what the declared columns explain.
+
+    Attributes:
+        columns: Part to the columns, one mapping a run.
+        taken: How much of each declared column was taken off, equation to (declared, k).
+        size: What the columns were divided by, shape (k,).
+    """
+
+    columns: Sequence[Columns]
+    taken: Mapping[str, FloatArray]
+    size: FloatArray
 
 
 @dataclass(frozen=True)
@@ -35,11 +58,13 @@ class Block:
         base: Part to candidates' columns times the base's, shape (runs, candidates, base, k).
         own: Part to candidates' columns times themselves, shape (runs, candidates, k, k).
         target: Part to candidates' columns times the target, shape (runs, candidates, k).
+        taken: How much of each declared column was taken off them, (candidates, declared, k).
     """
 
     base: Mapping[Part, FloatArray]
     own: Mapping[Part, FloatArray]
     target: Mapping[Part, FloatArray]
+    taken: FloatArray
 
 
 @dataclass(frozen=True)
@@ -68,8 +93,11 @@ class Joint:
         ]
         self._tables: list[dict[Part, FloatArray]] = [self._laid(run) for run in self.runs]
         self.samples = {p: np.array([float(len(t[p])) for t in self._tables]) for p in self.parts}
-        self._gram = self._products()
-        self._gram, self.error = self._without_noise()
+        self._gram, self._added = self._products(), np.zeros(0)
+        self._taken = np.zeros((self.size, 0))
+        self._noise = self._noise_products()
+        self.error = self._declared_error()
+        self._declared = _solved(self._weighted())
         self._instrumented = [self._instruments(run) for run in self.runs]
         self._projector = self._projectors()
         weights = self.weights
@@ -142,57 +170,105 @@ class Joint:
     def _products(self) -> Mapping[Part, FloatArray]:
         return {p: np.array([t[p].T @ t[p] for t in self._tables]) for p in self.parts}
 
-    def _without_noise(self) -> tuple[Mapping[Part, FloatArray], Mapping[Part, float]]:
-        """Return cross-products without the noise of the declared columns, and declared errors.
-
-        Corrected least squares: noise of a regressor would shrink its amplitude, and whatever
-        stands in for that regressor with less noise would then remove error. The noise of the
-        declared fit is put back as a constant, so errors remain those of the declared equations.
-        """
-        raw, noise = self._gram, self._noise_products()
-        clean = {p: raw[p] - noise[p] if p in noise else raw[p] for p in self.parts}
-        error, self._gram, count = dict.fromkeys(self.parts, 1.0), clean, len(self.runs)
+    def _declared_error(self) -> Mapping[Part, float]:
+        """Return the mean squared residual of the declared model in each part."""
+        error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
         for _ in range(5):
             self.error = error
             vector = np.append(_solved(self._weighted()), -1.0)
             for p in self.parts:
-                value = float(np.einsum("i,rij,j->", vector, raw[p], vector))
+                value = float(np.einsum("i,rij,j->", vector, self._gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
-        for p, made in noise.items():
-            clean[p][:, -1, -1] += np.einsum("i,rij,j->r", vector, made, vector)
-        return clean, error
+        return error
+
+    def _avoided(self, part: Part, run: int, declared: FloatArray) -> FloatArray:
+        """Return the error that is missing because a noisy reading got a smaller amplitude.
+
+        A cause that stands in for a noisy reading removes that reading's noise. This is no merit
+        of the cause: what it removes so is put back.
+
+        Args:
+            part: Of the regression.
+            run: Number of the run.
+            declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
+        """
+        noise = self._noise[part][run]
+
+        def shown(own: FloatArray) -> FloatArray:
+            return np.asarray(((own @ noise[:-1, :-1]) * own).sum(-1) - 2.0 * own @ noise[:-1, -1])
+
+        return np.maximum(shown(self._declared) - shown(declared), 0.0)
+
+    def _whole(self, base: FloatArray) -> FloatArray:
+        """Return amplitudes of the declared columns, with what was taken off those of causes.
+
+        Args:
+            base: Parameters of the base, shape (..., base).
+        """
+        count = base.shape[-1] - self._taken.shape[1]
+        return np.asarray(base[..., :count] - base[..., count:] @ self._taken.T)
+
+    def _taken_off(self, laid: Laid) -> FloatArray:
+        """Return how much of every declared column was taken off a cause's, (declared, k)."""
+        rows = []
+        for equation in self.layout.equations.values():
+            none = np.zeros((len(equation.of_channel), len(laid.size)))
+            rows.append(laid.taken.get(equation.name, none))
+        return np.vstack([*rows, np.zeros((len(self.layout.equations), len(laid.size)))])
 
     def _noise_products(self) -> Mapping[Part, FloatArray]:
         """Return the noise in the cross-products within runs; the target's own is left in."""
-        out, equations = {}, list(self.layout.equations.values())
         at, size = 0, self.size + 1
-        for equation in equations:
+        out = {p: np.zeros((len(self.runs), size, size)) for p in self.parts}
+        for equation in self.layout.equations.values():
             part = (equation.name, "within")
-            made = np.zeros((len(self.runs), size, size))
             for r, run in enumerate(self.runs):
                 noise = equation.noise(run)[run.grid[run.used[equation.name]]]
                 width = noise.shape[1] - 1
                 own = [*range(at, at + width), size - 1]
                 product = noise.T @ noise
                 product[-1, -1] = 0.0
-                made[r][np.ix_(own, own)] = _at_most(product, self._gram[part][r][np.ix_(own, own)])
-            out[part] = made
+                inner = np.ix_(own, own)
+                out[part][r][inner] = _at_most(product, self._gram[part][r][inner])
             at += width
         return out
 
     def _weighted(self, left_out: Sequence[int] = ()) -> FloatArray:
+        """Return the weighted cross-products of all runs but some, with the base's prior."""
         kept = [i for i in range(len(self.runs)) if i not in set(left_out)]
-        weights = self.weights
+        weights, size = self.weights, self._noise[self.parts[0]].shape[1] - 1
         total: FloatArray = sum(
             (weights[p] * self._gram[p][kept].sum(axis=0) for p in self.parts),
             start=np.zeros(()),
         )
+        noise = sum(
+            (weights[p] * self._noise[p][kept].sum(axis=0) for p in self.parts),
+            start=np.zeros(()),
+        )
+        total[np.diag_indices(self.size)] += self._prior()
+        inner = [*range(size), -1]
+        total[np.ix_(inner, inner)] -= NOISE_TAKEN * noise
         return total
+
+    def _prior(self) -> FloatArray:
+        """Return the prior precision of the base: no term exceeds half of all signals.
+
+        A shape is known to within its own size.
+        """
+        weights = self.weights
+        whole = sum(
+            (weights[p] * self._gram[p].sum(axis=0) for p in self.parts), start=np.zeros(())
+        )
+        precision = 4.0 * np.diag(whole)[:-1] / float(whole[-1, -1])
+        shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
+        precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
+        precision[len(precision) - len(self._added) :] = self._added
+        return np.asarray(precision)
 
     # ---- candidates
 
-    def laid(self, columns: Sequence[Mapping[str, FloatArray]], unit: bool) -> list[Columns]:
+    def laid(self, columns: Sequence[Mapping[str, FloatArray]], unit: Scale) -> Laid:
         """Return a candidate's columns of every run, without what the declared columns explain.
 
         The declared columns are those of the instrumented signals, so that a candidate does not
@@ -200,9 +276,10 @@ class Joint:
 
         Args:
             columns: Equation to the columns, one mapping a run.
-            unit: Scale each column to weighted norm one, for amplitudes of one prior width.
+            unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
         """
         weights, out = self.weights, [dict[Part, FloatArray]() for _ in columns]
+        taken = {}
         norm: FloatArray = np.zeros(())
         for name in columns[0]:
             within, between = weights[name, "within"], weights[name, "between"]
@@ -217,19 +294,39 @@ class Joint:
                 part = np.vstack([base.T @ x, np.zeros((1, x.shape[1]))])
                 right = right + within * part + between * np.outer(bases[-1][1], mean)
                 norm = norm + within * (x * x).sum(axis=0) + between * mean * mean
-            slope = self._projector[name] @ right
+            slope = taken[name] = self._projector[name] @ right
             for i, (base, middle) in enumerate(bases):
                 out[i][name, "within"] = inner[i] - base @ slope[:-1]
                 out[i][name, "between"] = (means[i] - middle @ slope)[None]
-        if not unit:
-            return list(out)
-        size = np.sqrt(norm) + TINY
-        return [{p: values / size for p, values in own.items()} for own in out]
+        each = np.sqrt(norm) + TINY
+        size = {"each": each, "first": np.full_like(each, each[0]), "none": np.ones_like(each)}[
+            unit
+        ]
+        return Laid(
+            [{p: x / size for p, x in own.items()} for own in out],
+            {name: slope[:-1] / size for name, slope in taken.items()},
+            size,
+        )
 
-    def block(self, candidates: Sequence[Sequence[Columns]]) -> Block:
+    def by_run(self, columns: Sequence[Columns]) -> tuple[FloatArray, FloatArray]:
+        """Return the products of a candidate with the base's residual, and with itself, by run.
+
+        Returns:
+            Shapes (runs, k) and (runs, k, k), weighted; the second is never singular.
+        """
+        vector, weights = np.append(_solved(self._weighted()), -1.0), self.weights
+        cross, own = [], []
+        for table, mine in zip(self._tables, columns, strict=True):
+            inner = [p for p in mine if p[1] == "within"]
+            cross.append(-sum(weights[p] * mine[p].T @ (table[p] @ vector) for p in inner))
+            product = sum(weights[p] * mine[p].T @ mine[p] for p in inner)
+            own.append(product + 1e-6 * np.trace(product) * np.eye(len(product)) + TINY)
+        return np.array(cross), np.array(own)
+
+    def block(self, laid: Sequence[Laid]) -> Block:
         """Return the cross-products of candidates that have as many columns each."""
-        count, runs = len(candidates), len(self.runs)
-        k = next(iter(candidates[0][0].values())).shape[1]
+        candidates = [one.columns for one in laid]
+        count, runs, k = len(laid), len(self.runs), len(laid[0].size)
         base, own, target = {}, {}, {}
         for p in self.parts:
             there = [j for j, c in enumerate(candidates) if p in c[0]]
@@ -246,7 +343,7 @@ class Joint:
                 target[p][r, there] = product[-1]
                 turned = columns.transpose(1, 2, 0)
                 own[p][r, there] = turned @ turned.transpose(0, 2, 1)
-        return Block(base, own, target)
+        return Block(base, own, target, np.array([self._taken_off(one) for one in laid]))
 
     def evaluate(
         self,
@@ -306,7 +403,33 @@ class Joint:
             cross = np.einsum("ci,cik,ck->c", base, block.base[p][run], amplitudes)
             own = np.einsum("ck,ckl,cl->c", amplitudes, block.own[p][run], amplitudes)
             error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
-        return np.asarray(np.maximum(error, 0.0))
+        declared = self._whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
+        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared))
+
+    def replaces(self, laid: Laid, base: FloatArray, amplitudes: FloatArray) -> bool:
+        """Whether a cause stands in for the largest linear term of an equation.
+
+        A reading of the target through another sensor explains any equation, with no use for the
+        declared terms. A cause comes in addition to them.
+
+        Args:
+            laid: The cause.
+            base: Parameters of the base beside it, shape (base,).
+            amplitudes: Of the cause, shape (k,).
+        """
+        now = self._whole(base) - self._taken_off(laid) @ amplitudes
+        at = 0
+        for equation in self.layout.equations.values():
+            linear = at + np.flatnonzero(equation.of_channel)
+            at += len(equation.of_channel)
+            if equation.name not in laid.taken or not len(linear):
+                continue
+            power = np.diag(self._gram[equation.name, "within"].sum(axis=0))[linear]
+            largest = linear[int(np.argmax(self._declared[linear] ** 2 * power))]
+            change = float(now[largest] / (self._declared[largest] or 1.0))
+            if not 1.0 / MOST_CHANGE < change < MOST_CHANGE:
+                return True
+        return False
 
     def base_errors(self, folds: Folds) -> Sequence[Mapping[Part, FloatArray]]:
         """Return the squared errors of the base on what was left out, one mapping a family."""
@@ -317,7 +440,8 @@ class Joint:
                 vector = np.append(_solved(self._weighted(list(left_out))), -1.0)
                 for p in self.parts:
                     for i in left_out:
-                        found[p][i] = max(float(vector @ self._gram[p][i] @ vector), 0.0)
+                        value = max(float(vector @ self._gram[p][i] @ vector), 0.0)
+                        found[p][i] = value + float(self._avoided(p, i, self._whole(vector[:-1])))
             out.append(found)
         return out
 
@@ -326,17 +450,26 @@ class Joint:
         folds: Folds,
         before: Sequence[Mapping[Part, FloatArray]],
         after: Sequence[Mapping[Part, FloatArray]],
-    ) -> FloatArray:
-        """Return the log ratio of errors, summed over parts, shape (families, candidates)."""
-        rows = []
-        for family, old, new in zip(folds, before, after, strict=True):
-            spread = self._extrapolated(family)
-            means = [
-                {p: (e[p].sum(axis=0) + spread[p]) / self.samples[p].sum() for p in self.parts}
-                for e in (old, new)
-            ]
-            rows.append(self.log_ratio(means[0], means[1]))
-        return np.array(rows)
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return scores of candidates, and those of each family of folds, (families, candidates).
+
+        The score of a part is the mean over families. A family counts by how well the base itself
+        is known where it predicts, and at most what the family of single runs shows: where the base
+        extrapolates badly anything seems to help.
+        """
+        spreads = [self._extrapolated(family) for family in folds]
+        total, by_family = np.zeros(()), [np.zeros(()) for _ in folds]
+        for p in self.parts:
+            ratios, trusts = [], []
+            for spread, old, new in zip(spreads, before, after, strict=True):
+                pair = [(e[p].sum(axis=0) + spread[p]) / self.samples[p].sum() for e in (old, new)]
+                ratios.append(self.log_ratio(p, pair[0], pair[1]))
+                whole = float(old[p].sum()) + TINY
+                trusts.append(whole / (whole + spread[p]))
+            least = [t * np.minimum(r, ratios[0]) for t, r in zip(trusts, ratios, strict=True)]
+            total = total + np.sum(least, axis=0) / sum(trusts)
+            by_family = [f + r for f, r in zip(by_family, ratios, strict=True)]
+        return np.asarray(total), np.array(by_family)
 
     def _extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
         """Return the squared error that the base's own uncertainty makes in what was left out."""
@@ -348,44 +481,33 @@ class Joint:
                     out[p] += float(np.sum(self._gram[p][i][:-1, :-1] * inverse))
         return out
 
-    def log_ratio(
-        self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
-    ) -> FloatArray:
-        """Return the log ratio of mean squared errors, summed over parts, above their floors."""
-        numbers, total = self.numbers, np.zeros(())
-        for p in self.parts:
-            floor, weight = numbers.form_floor * self.error[p], 1.0
-            if p[1] == "between":
-                weight = numbers.between_weight
-                floor += numbers.between_floor * self.error[p[0], "within"]
-            total = total + weight * np.log((before[p] + floor) / (after[p] + floor))
-        return np.asarray(total)
+    def log_ratio(self, part: Part, before: FloatArray, after: FloatArray) -> FloatArray:
+        """Return the weighted log ratio of mean squared errors of a part, above its floor."""
+        numbers, weight = self.numbers, 1.0
+        floor = numbers.form_floor * self.error[part]
+        if part[1] == "between":
+            weight = numbers.between_weight
+            floor += numbers.between_floor * self.error[part[0], "within"]
+        return np.asarray(weight * np.log((before + floor) / (after + floor)))
 
     # ---- accepted causes
 
-    def with_cause(self, columns: Sequence[Columns]) -> "Joint":
-        """Return the regression with a cause's columns in its base."""
+    def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
+        """Return the regression with a cause's columns, of a prior precision each, in its base."""
         made = object.__new__(Joint)
         made.__dict__.update(self.__dict__)
-        k = next(iter(columns[0].values())).shape[1]
+        made._added = np.append(self._added, precision)
+        made._taken = np.hstack([self._taken, self._taken_off(laid)])
+        k = len(laid.size)
         made._tables = []
-        for i, table in enumerate(self._tables):
+        for table, columns in zip(self._tables, laid.columns, strict=True):
             grown = {}
             for p in self.parts:
-                added = columns[i].get(p, np.zeros((len(table[p]), k)))
+                added = columns.get(p, np.zeros((len(table[p]), k)))
                 grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
             made._tables.append(grown)
-        made._gram = made._grown(self._gram)
+        made._gram = made._products()
         return made
-
-    def _grown(self, known: Mapping[Part, FloatArray]) -> Mapping[Part, FloatArray]:
-        """Return cross-products with those of the last columns added; known ones are kept."""
-        out, fresh = {}, self._products()
-        for p, raw in fresh.items():
-            old = [*range(known[p].shape[1] - 1), -1]
-            raw[np.ix_(range(len(raw)), old, old)] = known[p]
-            out[p] = raw
-        return out
 
 
 def _first(run: RunSignals) -> Mapping[str, FloatArray]:
@@ -399,7 +521,7 @@ def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:
     root = np.linalg.cholesky(inner)
     turned = np.linalg.solve(root, noise[:-1, :-1] * np.outer(scale, scale))
     share, axes = np.linalg.eigh(np.linalg.solve(root, turned.T))
-    kept = root @ (axes * np.clip(share, 0.0, MOST_NOISE)) @ axes.T @ root.T
+    kept = root @ (axes * np.clip(share, 0.0, 1.0)) @ axes.T @ root.T
     out = noise.copy()
     out[:-1, :-1] = kept / np.outer(scale, scale)
     return out

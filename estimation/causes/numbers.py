@@ -19,7 +19,7 @@ class Numbers:
         sharpness: Log odds for one unit of score.
         cause_cost: Log prior odds against a cause.
         function_cost: Further log prior odds against an unknown form.
-        least_score: Score below which nothing is claimed.
+        bend_share: Prior standard deviation of a form's deviation from its equation, as a share.
         kept_evidence: E-value on the test runs from which a cause is kept.
     """
 
@@ -31,7 +31,7 @@ class Numbers:
     sharpness: float = 25.0
     cause_cost: float = 2.0
     function_cost: float = 2.0
-    least_score: float = 0.0
+    bend_share: float = 0.3
     kept_evidence: float = 20.0
 
 

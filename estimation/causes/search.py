@@ -10,21 +10,24 @@ import numpy as np
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function, functions_at
-from estimation.causes.joint import Columns, Joint
+from estimation.causes.joint import Columns, Joint, Laid, Scale
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.places import places_of
-from estimation.causes.sources import RELATIVE, Source, sources_at
+from estimation.causes.sources import RELATIVE, Bend, Source, sources_at
 from estimation.recording import FloatArray
 
 AT_ONCE = 3000
 """Candidates times squared columns in one block: keeps its memory small."""
 
 MOST_CAUSES = 3
+KNOTS_OF_BEND, BENT = 5, 24
+"""Hat functions of a form's deviation from its equation, and families that are given one."""
+
 REFINED = 8
 """Families whose shapes are refined after the grid."""
 
-PARTIAL = 24
-"""Families tried on some of the runs alone."""
+PARTIAL, CHOICES = 24, 6
+"""Names tried on some of the runs alone, and choices of runs of each."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +36,15 @@ class Candidate:
 
     Attributes:
         cause: The named effect or smooth function.
-        columns: Its columns of every run.
+        laid: Its columns of every run, without what the declared columns explain.
+        precision: Prior precision of every amplitude.
         acts: Runs in which it acts; in all when None.
         choices: Forms that share the prior probability of a cause, times the points of its grid.
     """
 
     cause: Source | Function
-    columns: Sequence[Columns]
+    laid: Laid
+    precision: FloatArray
     acts: tuple[bool, ...] | None = None
     choices: int = 1
 
@@ -48,6 +53,11 @@ class Candidate:
         """What is claimed: place, family, and the variables of a function."""
         variables = self.cause.variables if isinstance(self.cause, Function) else ()
         return self.cause.place.name, self.cause.family, variables
+
+    @property
+    def columns(self) -> Sequence[Columns]:
+        """Its columns of every run."""
+        return self.laid.columns
 
     @property
     def is_function(self) -> bool:
@@ -104,7 +114,7 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     joint, folds = Joint(train, numbers), folds_of(train)
     pool = candidates(train, joint)
     first = _ranked(joint, pool, folds, numbers)
-    if not first or first[0].score < numbers.least_score:
+    if not first or first[0].score < 0.0:
         return Found([], [], joint, first[0].score if first else 0.0)
     chains = [_chain(joint, start, pool, folds, numbers) for start in _starts(first)]
     causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
@@ -132,7 +142,7 @@ def _chain(
     causes = [start]
     while len(causes) < MOST_CAUSES:
         ranked = _ranked(_with(joint, causes), pool, folds, numbers)
-        if not ranked or ranked[0].score < numbers.least_score:
+        if not ranked or ranked[0].score < 0.0:
             break
         causes.append(ranked[0])
     return causes
@@ -191,33 +201,34 @@ def _evaluated(
     before: Sequence[Mapping[tuple[str, str], FloatArray]],
     numbers: Numbers,
 ) -> list[Scored]:
-    precision = np.vstack([_precision(joint, c, numbers) for c in part])
-    outcome = joint.evaluate(joint.block([c.columns for c in part]), folds, precision)
-    scores = joint.score(folds, before, outcome.errors)
+    precision = np.vstack([c.precision for c in part])
+    outcome = joint.evaluate(joint.block([c.laid for c in part]), folds, precision)
+    scores, by_family = joint.score(folds, before, outcome.errors)
     out = []
     for k, candidate in enumerate(part):
         amplitudes = outcome.amplitudes[k]
         if _sign_is_wrong(candidate, amplitudes):
             continue
-        # a level of a condition counts at most what the runs show: where the base alone
-        # extrapolates badly anything seems to help
-        score = float(np.minimum(scores[:, k], scores[0, k]).mean()) - _price(candidate, numbers)
-        out.append(Scored(candidate, score, scores[:, k], amplitudes))
+        if joint.replaces(candidate.laid, outcome.base[k], amplitudes):
+            continue
+        score = float(scores[k]) - _price(candidate, numbers)
+        out.append(Scored(candidate, score, by_family[:, k], amplitudes))
     return out
 
 
-def _precision(joint: Joint, candidate: Candidate, numbers: Numbers) -> FloatArray:
+def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> FloatArray:
     """Return the prior precision of each amplitude.
 
     A named effect, scaled to norm one, is not larger than half of all signals; a smooth function's
     knots have a standard deviation of so many declared errors.
     """
-    everything = np.full(candidate.width, 4.0 / joint.power)
-    if not candidate.is_function:
-        return everything
-    enters = candidate.cause.place.enters
-    knot = np.mean([e.gain**2 / joint.error[e.equation, "within"] for e in enters])
-    return np.asarray(everything + knot / numbers.knot_sd**2)
+    everything = np.full(len(size), 4.0 / joint.power)
+    if isinstance(cause, Function):
+        knot = [e.gain**2 / joint.error[e.equation, "within"] for e in cause.place.enters]
+        return np.asarray(everything + np.mean(knot) / joint.numbers.knot_sd**2)
+    if cause.bend is not None:
+        everything[1:] += 1.0 / (cause.bend.sd * size[1:]) ** 2
+    return everything
 
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
@@ -256,8 +267,26 @@ def _ranked(
     near = [c for s in best[:REFINED] for c in _neighbours(joint, s.candidate)]
     finer = evaluate(joint, near, folds, numbers) if near else []
     best = best_of_each([*best, *finer])
-    some = _on_some_runs(joint, best[:PARTIAL], folds, numbers)
-    return best_of_each([*best, *some])
+    bent = [c for s in best[:BENT] if (c := _bent(joint, s, numbers)) is not None]
+    some = _on_some_runs(joint, pool, folds, numbers)
+    return best_of_each([*best, *evaluate(joint, bent, folds, numbers), *some])
+
+
+def _bent(joint: Joint, scored: Scored, numbers: Numbers) -> Candidate | None:
+    """Return a named effect of one column with a form that deviates from its equation."""
+    candidate, cause = scored.candidate, scored.candidate.cause
+    if isinstance(cause, Function) or candidate.width != 1:
+        return None
+    signals = [cause.signal(run, cause.place.home) for run in joint.runs]
+    values = np.concatenate([x[:, 0] for x in signals if x is not None])
+    low, high = np.percentile(values, (1.0, 99.0))
+    amplitude = abs(float(scored.amplitudes[0] / candidate.laid.size[0]))
+    if not high > low or amplitude == 0.0:
+        return None
+    knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
+    bent = replace(cause, bend=Bend(knots, numbers.bend_share * amplitude))
+    laid = laid_out(joint.layout, joint, bent, candidate.acts)
+    return None if laid is None else replace(laid, choices=candidate.choices)
 
 
 def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
@@ -285,39 +314,49 @@ def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
 
 
 def _on_some_runs(
-    joint: Joint,
-    best: Sequence[Scored],
-    folds: Folds,
-    numbers: Numbers,
+    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
-    """Return candidates that act in the runs whose own amplitude is unlike zero.
+    """Return named effects that act in some of the runs.
 
-    Runs are ordered by the amplitude that each of them asks for; every cut of that order and every
-    cut of the order of recording is a choice of runs.
+    Every effect is tried on cuts of two orders of the runs: of recording, and of the error that it
+    removes in each of them. The choices of runs that promise most are scored like all others.
     """
     count = len(joint.runs)
     if count < 6:
         return []
-    tried = []
-    for scored in best:
-        if scored.candidate.is_function:
+    named = [c for c in pool if not c.is_function]
+    promise = []
+    for candidate in named:
+        cross, own = joint.by_run(candidate.columns)
+        gains = [float(b @ np.linalg.solve(a, b)) for a, b in zip(own, cross, strict=True)]
+        order = [int(k) for k in np.argsort(gains)[::-1]]
+        for acts in {*_cuts(range(count)), *_cuts(order)}:
+            chosen = [k for k in range(count) if acts[k]]
+            b, a = cross[chosen].sum(axis=0), own[chosen].sum(axis=0)
+            promise.append((float(b @ np.linalg.solve(a, b)), candidate, acts))
+    promise.sort(key=lambda p: -p[0])
+    tried, seen = [], Counter[object]()
+    for _, candidate, acts in promise:
+        seen[candidate.name] += 1
+        if seen[candidate.name] > CHOICES or len(seen) > PARTIAL:
             continue
-        for acts in _cuts(count):
-            laid = laid_out(joint.layout, joint, scored.candidate.cause, acts)
-            if laid is not None:
-                tried.append(replace(laid, choices=scored.candidate.choices))
+        laid = laid_out(joint.layout, joint, candidate.cause, acts)
+        if laid is not None:
+            tried.append(replace(laid, choices=candidate.choices))
     return evaluate(joint, tried, folds, numbers)
 
 
-def _cuts(count: int) -> list[tuple[bool, ...]]:
-    order = range(count)
-    early = [tuple(k < cut for k in order) for cut in range(2, count - 1)]
+def _cuts(order: Sequence[int]) -> list[tuple[bool, ...]]:
+    """Return the first runs of an order, and the last, of every number from two."""
+    early = [
+        tuple(k in set(order[:cut]) for k in range(len(order))) for cut in range(2, len(order) - 1)
+    ]
     return early + [tuple(not x for x in one) for one in early]
 
 
 def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
     for cause in causes:
-        joint = joint.with_cause(cause.candidate.columns)
+        joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
     return joint
 
 
@@ -340,10 +379,14 @@ def laid_out(
         if acts is not None and not acts[k]:
             own = {name: np.zeros_like(values) for name, values in own.items()}
         columns.append(own)
-    laid = joint.laid(columns, unit=isinstance(cause, Source))
+    unit: Scale = "none" if isinstance(cause, Function) else "first" if cause.bend else "each"
+    laid = joint.laid(columns, unit)
     if acts is not None:  # what starts between runs also shifts their means, by its own offset
-        laid = [
-            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
-            for own in laid
-        ]
-    return Candidate(cause, laid, acts)
+        laid = replace(
+            laid,
+            columns=[
+                {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
+                for own in laid.columns
+            ],
+        )
+    return Candidate(cause, laid, _precision(joint, cause, laid.size), acts)
