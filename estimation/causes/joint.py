@@ -6,12 +6,12 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from estimation.causes.equations import SHAPE_STEP, Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Equation, Layout, RunSignals
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
 from estimation.causes.numbers import DEFAULT, Numbers
@@ -43,11 +43,14 @@ class Laid:
         columns: Part to the columns, one mapping a run.
         taken: How much of each declared column was taken off, equation to (declared, k).
         size: What the columns were divided by, shape (k,).
+        noise: Part to the products, run by run, of what noise does to the columns: with itself,
+            (runs, k, k), and with that of the declared columns and target, (runs, k, all + 1).
     """
 
     columns: Sequence[Columns]
     taken: Mapping[str, FloatArray]
     size: FloatArray
+    noise: Mapping[Part, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,14 @@ class Block:
         own: Part to candidates' columns times themselves, shape (runs, candidates, k, k).
         target: Part to candidates' columns times the target, shape (runs, candidates, k).
         taken: How much of each declared column was taken off them, (candidates, declared, k).
+        noise: As of `Laid`, with candidates after runs.
     """
 
     base: Mapping[Part, FloatArray]
     own: Mapping[Part, FloatArray]
     target: Mapping[Part, FloatArray]
     taken: FloatArray
+    noise: Mapping[Part, tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,7 @@ class Joint:
         self._tables: list[dict[Part, FloatArray]] = [self._laid(run) for run in self.runs]
         self.samples = {p: np.array([float(len(t[p])) for t in self._tables]) for p in self.parts}
         self._gram, self._added = self._products(), np.zeros(0)
+        self._declared_size = self.size
         self._taken = np.zeros((self.size, 0))
         self._noise = self._noise_products()
         self.error = self._declared_error()
@@ -182,7 +188,9 @@ class Joint:
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
         return error
 
-    def _avoided(self, part: Part, run: int, declared: FloatArray) -> FloatArray:
+    def _avoided(
+        self, part: Part, run: int, declared: FloatArray, more: FloatArray | float = 0.0
+    ) -> FloatArray:
         """Return the error that is missing because a noisy reading got a smaller amplitude.
 
         A cause that stands in for a noisy reading removes that reading's noise. This is no merit
@@ -192,13 +200,14 @@ class Joint:
             part: Of the regression.
             run: Number of the run.
             declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
+            more: Error that the noise of a cause's own columns makes, shape (...).
         """
         noise = self._noise[part][run]
 
         def shown(own: FloatArray) -> FloatArray:
             return np.asarray(((own @ noise[:-1, :-1]) * own).sum(-1) - 2.0 * own @ noise[:-1, -1])
 
-        return np.maximum(shown(self._declared) - shown(declared), 0.0)
+        return np.maximum(shown(self._declared) - shown(declared) - more, 0.0)
 
     def _whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
@@ -217,21 +226,32 @@ class Joint:
             rows.append(laid.taken.get(equation.name, none))
         return np.vstack([*rows, np.zeros((len(self.layout.equations), len(laid.size)))])
 
+    def _noise_columns(self, run: RunSignals, equation: Equation) -> FloatArray:
+        """Return the noise of all declared columns and the target in one equation, (n, all + 1)."""
+        at = 0
+        for other in self.layout.equations.values():
+            if other.name == equation.name:
+                break
+            at += len(other.of_channel)
+        noise = equation.noise(run)[run.grid[run.used[equation.name]]]
+        out = np.zeros((len(noise), self._declared_size + 1))
+        out[:, at : at + noise.shape[1] - 1] = noise[:, :-1]
+        out[:, -1] = noise[:, -1]
+        return out
+
     def _noise_products(self) -> Mapping[Part, FloatArray]:
         """Return the noise in the cross-products within runs; the target's own is left in."""
-        at, size = 0, self.size + 1
+        size = self._declared_size + 1
         out = {p: np.zeros((len(self.runs), size, size)) for p in self.parts}
         for equation in self.layout.equations.values():
             part = (equation.name, "within")
             for r, run in enumerate(self.runs):
-                noise = equation.noise(run)[run.grid[run.used[equation.name]]]
-                width = noise.shape[1] - 1
-                own = [*range(at, at + width), size - 1]
+                noise = self._noise_columns(run, equation)
                 product = noise.T @ noise
                 product[-1, -1] = 0.0
+                own = [*np.flatnonzero(noise[:, :-1].any(axis=0)), size - 1]
                 inner = np.ix_(own, own)
-                out[part][r][inner] = _at_most(product, self._gram[part][r][inner])
-            at += width
+                out[part][r][inner] = _at_most(product[inner], self._gram[part][r][inner])
         return out
 
     def _weighted(self, left_out: Sequence[int] = ()) -> FloatArray:
@@ -343,7 +363,30 @@ class Joint:
                 target[p][r, there] = product[-1]
                 turned = columns.transpose(1, 2, 0)
                 own[p][r, there] = turned @ turned.transpose(0, 2, 1)
-        return Block(base, own, target, np.array([self._taken_off(one) for one in laid]))
+        noise = {}
+        for p in {p for one in laid for p in one.noise}:
+            none = np.zeros((runs, k, k)), np.zeros((runs, k, self._noise[p].shape[1]))
+            pairs = [one.noise.get(p, none) for one in laid]
+            noise[p] = np.stack([a for a, _ in pairs], 1), np.stack([b for _, b in pairs], 1)
+        taken = np.array([self._taken_off(one) for one in laid])
+        return Block(base, own, target, taken, noise)
+
+    def with_noise(self, laid: Laid, noise: Sequence[Mapping[str, FloatArray]]) -> Laid:
+        """Return a candidate with what noise does to its columns.
+
+        Args:
+            laid: The candidate.
+            noise: Equation to the change of the columns, one mapping a run.
+        """
+        products = {}
+        for name in noise[0]:
+            own, cross = [], []
+            for run, change in zip(self.runs, noise, strict=True):
+                scaled = change[name] / laid.size
+                own.append(scaled.T @ scaled)
+                cross.append(scaled.T @ self._noise_columns(run, self.layout.equations[name]))
+            products[name, "within"] = np.array(own), np.array(cross)
+        return replace(laid, noise=products)
 
     def evaluate(
         self,
@@ -404,7 +447,13 @@ class Joint:
             own = np.einsum("ck,ckl,cl->c", amplitudes, block.own[p][run], amplitudes)
             error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
         declared = self._whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
-        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared))
+        more = np.zeros(len(base))
+        if p in block.noise:
+            own, cross = (products[run] for products in block.noise[p])
+            vector = np.hstack([declared, -np.ones((len(declared), 1))])
+            more = np.einsum("ck,ckl,cl->c", amplitudes, own, amplitudes)
+            more = more + 2.0 * np.einsum("ck,ckd,cd->c", amplitudes, cross, vector)
+        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared, more))
 
     def replaces(self, laid: Laid, base: FloatArray, amplitudes: FloatArray) -> bool:
         """Whether a cause stands in for the largest linear term of an equation.

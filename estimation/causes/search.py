@@ -381,6 +381,13 @@ def laid_out(
         columns.append(own)
     unit: Scale = "none" if isinstance(cause, Function) else "first" if cause.bend else "each"
     laid = joint.laid(columns, unit)
+    noise = [cause.noise(run) for run in layout.runs]
+    if acts is not None:
+        noise = [
+            {name: on * x for name, x in one.items()} for on, one in zip(acts, noise, strict=True)
+        ]
+    if all(noise):
+        laid = joint.with_noise(laid, noise)
     if acts is not None:  # what starts between runs also shifts their means, by its own offset
         laid = replace(
             laid,

@@ -7,7 +7,7 @@ effect that is not distinguishable from a simpler one over that range is left ou
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,10 +58,6 @@ FILTERS = (
 TURNING = ("motor_angle", "output_angle", "encoder")
 CLOCKS = ("clock", "elapsed", "campaign_clock")
 
-NARROW = 10.0
-"""Width of a hysteresis, over the standard deviation of a reading's noise, below which it follows
-that noise."""
-
 LEAST_PERIODS = 1.5
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
 
@@ -91,6 +87,7 @@ class Source:
         parts: Which of its columns take part, so that simpler forms compete too.
         odd: Whether half the difference to the same filter backwards in time stands in for it: its
             correlation with the stationary noise of what it reads is zero.
+        follows: Whether its memory may follow the noise of what it reads.
         bend: Its deviation from its equation, after the column itself; none if None.
     """
 
@@ -100,6 +97,7 @@ class Source:
     shape: tuple[float, ...]
     parts: tuple[int, ...]
     odd: bool = False
+    follows: bool = False
     bend: Bend | None = None
 
     @property
@@ -133,6 +131,17 @@ class Source:
             found = np.column_stack([found, found * np.array(hats).T])
         return found
 
+    def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
+        """Return what its readings' noise does to its columns, where its memory may follow that."""
+        if not self.follows:
+            return {}
+        readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}
+        shaken = replace(run, channels={**run.channels, **readings})
+        usual, other = self.columns(run), self.columns(shaken)
+        if usual is None or other is None:
+            return {}
+        return {name: other[name] - values for name, values in usual.items()}
+
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
         made: dict[str, FloatArray] = {}
@@ -156,13 +165,11 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
-            own = _reads_own_noise(layout, place, channels)
+            own = bool(effect.start()) and _reads_own_noise(layout, place, channels)
             odd = own and effect.id.startswith(FILTERS)
             for shape in _grid(layout, place, effect, dict(channels)):
-                if own and _follows_noise(layout, effect, dict(channels), shape):
-                    continue
                 for parts in _parts(effect):
-                    yield Source(place, effect, tuple(channels), shape, parts, odd)
+                    yield Source(place, effect, tuple(channels), shape, parts, odd, own and not odd)
 
 
 def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
@@ -174,19 +181,6 @@ def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str,
     return any(
         (c, entry.equation) not in layout.independent for c in readings for entry in place.enters
     )
-
-
-def _follows_noise(
-    layout: Layout, effect: Effect, channels: Mapping[str, str], shape: Sequence[float]
-) -> bool:
-    """Whether a memory is so narrow that it follows the noise of the reading it has."""
-    if not effect.start():
-        return False
-    for parameter, value in zip(effect.shape, shape, strict=True):
-        noise = [run.noise.get(channels.get(parameter.unit, ""), 0.0) for run in layout.runs]
-        if value < NARROW * max(float(np.std(x)) for x in noise):
-            return parameter.unit in channels
-    return False
 
 
 def repeats_one_reference(layout: Layout) -> bool:
