@@ -136,7 +136,7 @@ class Equation:
                 parts.append(term.sign * ((ends[0] - ends[1]) @ scale)[:, None])
         return np.hstack(parts)
 
-    @property
+    @cached_property
     def of_shape(self) -> list[bool]:
         """Which of the columns are derivatives by a shape."""
         kinds = []
@@ -144,7 +144,7 @@ class Equation:
             kinds += [False] * len(term.effect.amplitudes) + [True] * len(term.effect.shape)
         return kinds
 
-    @property
+    @cached_property
     def of_channel(self) -> list[bool]:
         """Which of the columns are a channel times a constant."""
         kinds = []

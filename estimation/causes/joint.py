@@ -80,11 +80,16 @@ class Outcome:
         errors: For each family of folds, part to squared error, shape (runs, candidates).
         amplitudes: On all runs, shape (candidates, k).
         base: Parameters of the base on all runs, shape (candidates, base).
+        cross: Products of the columns with the base's residual within runs, weighted, shape
+            (runs, candidates, k).
+        own: Products of the columns with themselves, shape (runs, candidates, k, k).
     """
 
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
     base: FloatArray
+    cross: FloatArray
+    own: FloatArray
 
 
 class Joint:
@@ -103,7 +108,8 @@ class Joint:
         self._taken = np.zeros((self.size, 0))
         self._noise = self._noise_products()
         self.error = self._declared_error()
-        self._declared = _solved(self._weighted())
+        self._prepare()
+        self._declared = self._fitted()[1]
         self._instrumented = [self._instruments(run) for run in self.runs]
         self._projector = self._projectors()
         weights = self.weights
@@ -181,7 +187,8 @@ class Joint:
         error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
         for _ in range(5):
             self.error = error
-            vector = np.append(_solved(self._weighted()), -1.0)
+            self._prepare()
+            vector = np.append(self._fitted()[1], -1.0)
             for p in self.parts:
                 value = float(np.einsum("i,rij,j->", vector, self._gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
@@ -202,6 +209,8 @@ class Joint:
             declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
             more: Error that the noise of a cause's own columns makes, shape (...).
         """
+        if part[1] == "between":
+            return np.zeros(declared.shape[:-1])
         noise = self._noise[part][run]
 
         def shown(own: FloatArray) -> FloatArray:
@@ -254,24 +263,33 @@ class Joint:
                 out[part][r][inner] = _at_most(product[inner], self._gram[part][r][inner])
         return out
 
-    def _weighted(self, left_out: Sequence[int] = ()) -> FloatArray:
-        """Return the weighted cross-products of all runs but some, with the base's prior."""
-        kept = [i for i in range(len(self.runs)) if i not in set(left_out)]
-        weights, size = self.weights, self._noise[self.parts[0]].shape[1] - 1
-        total: FloatArray = sum(
-            (weights[p] * self._gram[p][kept].sum(axis=0) for p in self.parts),
-            start=np.zeros(()),
-        )
-        noise = sum(
-            (weights[p] * self._noise[p][kept].sum(axis=0) for p in self.parts),
-            start=np.zeros(()),
-        )
-        total[np.diag_indices(self.size)] += self._prior()
-        inner = [*range(size), -1]
-        total[np.ix_(inner, inner)] -= NOISE_TAKEN * noise
-        return total
+    def _weighted(self) -> FloatArray:
+        """Return the weighted cross-products of each run, without most of the known noise."""
+        size, weights = self._declared_size, self.weights
+        total = sum((weights[p] * self._gram[p] for p in self.parts), start=np.zeros(()))
+        noise = sum((weights[p] * self._noise[p] for p in self.parts), start=np.zeros(()))
+        inner = np.array([*range(size), -1])
+        total[:, inner[:, None], inner] -= NOISE_TAKEN * noise
+        return np.asarray(total)
 
-    def _prior(self) -> FloatArray:
+    def _fitted(self, left_out: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
+        """Return the inverse of the base's normal matrix without some runs, and its parameters."""
+        key = tuple(left_out)
+        if key not in self._fits:
+            gram = self._whole_gram - self._run_grams[list(key)].sum(axis=0)
+            gram[np.diag_indices(self.size)] += self._prior
+            inverse = _inverse(gram[:-1, :-1])
+            self._fits[key] = inverse, np.asarray(inverse @ gram[:-1, -1])
+        return self._fits[key]
+
+    def _prepare(self) -> None:
+        """Work out what all fits of this base share."""
+        self._run_grams = self._weighted()
+        self._whole_gram = self._run_grams.sum(axis=0)
+        self._prior = self._prior_precision()
+        self._fits: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+
+    def _prior_precision(self) -> FloatArray:
         """Return the prior precision of the base: no term exceeds half of all signals.
 
         A shape is known to within its own size.
@@ -327,21 +345,6 @@ class Joint:
             {name: slope[:-1] / size for name, slope in taken.items()},
             size,
         )
-
-    def by_run(self, columns: Sequence[Columns]) -> tuple[FloatArray, FloatArray]:
-        """Return the products of a candidate with the base's residual, and with itself, by run.
-
-        Returns:
-            Shapes (runs, k) and (runs, k, k), weighted; the second is never singular.
-        """
-        vector, weights = np.append(_solved(self._weighted()), -1.0), self.weights
-        cross, own = [], []
-        for table, mine in zip(self._tables, columns, strict=True):
-            inner = [p for p in mine if p[1] == "within"]
-            cross.append(-sum(weights[p] * mine[p].T @ (table[p] @ vector) for p in inner))
-            product = sum(weights[p] * mine[p].T @ mine[p] for p in inner)
-            own.append(product + 1e-6 * np.trace(product) * np.eye(len(product)) + TINY)
-        return np.array(cross), np.array(own)
 
     def block(self, laid: Sequence[Laid]) -> Block:
         """Return the cross-products of candidates that have as many columns each."""
@@ -407,16 +410,13 @@ class Joint:
             for kind in (block.base, block.own, block.target)
         ]
         wholes = [s.sum(axis=0) for s in sums]
-        whole = self._weighted()
 
         def fitted(left_out: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-            gram = self._weighted(left_out) if left_out else whole
+            inverse, alone = self._fitted(left_out)
             cross, own, right = (
                 w - s[list(left_out)].sum(axis=0) if left_out else w
                 for w, s in zip(wholes, sums, strict=True)
             )
-            inverse = _inverse(gram[:-1, :-1])
-            alone = inverse @ gram[:-1, -1]
             through = np.matmul(inverse, cross)
             eye = np.eye(own.shape[1])
             spread = 1e-9 * np.einsum("ckk->ck", own) + precision
@@ -435,7 +435,14 @@ class Joint:
                         found[p][i] = self._squared(block, p, i, base, amplitudes)
             errors.append(found)
         base, amplitudes = fitted([])
-        return Outcome(errors, amplitudes, base)
+        inside, usual = [p for p in there if p[1] == "within"], self._fitted()[1]
+        cross, own, right = (
+            sum((weights[p] * kind[p] for p in inside), start=np.zeros(()))
+            for kind in (block.base, block.own, block.target)
+        )
+        return Outcome(
+            errors, amplitudes, base, right - np.einsum("rcik,i->rck", cross, usual), own
+        )
 
     def _squared(
         self, block: Block, p: Part, run: int, base: FloatArray, amplitudes: FloatArray
@@ -486,7 +493,7 @@ class Joint:
         for family in folds:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for left_out in family:
-                vector = np.append(_solved(self._weighted(list(left_out))), -1.0)
+                vector = np.append(self._fitted(left_out)[1], -1.0)
                 for p in self.parts:
                     for i in left_out:
                         value = max(float(vector @ self._gram[p][i] @ vector), 0.0)
@@ -496,7 +503,7 @@ class Joint:
 
     def score(
         self,
-        folds: Folds,
+        spreads: Sequence[Mapping[Part, float]],
         before: Sequence[Mapping[Part, FloatArray]],
         after: Sequence[Mapping[Part, FloatArray]],
     ) -> tuple[FloatArray, FloatArray]:
@@ -505,9 +512,13 @@ class Joint:
         The score of a part is the mean over families. A family counts by how well the base itself
         is known where it predicts, and at most what the family of single runs shows: where the base
         extrapolates badly anything seems to help.
+
+        Args:
+            spreads: `extrapolated` of each family of folds.
+            before: Errors of the base, of each family.
+            after: Errors with the candidates.
         """
-        spreads = [self._extrapolated(family) for family in folds]
-        total, by_family = np.zeros(()), [np.zeros(()) for _ in folds]
+        total, by_family = np.zeros(()), [np.zeros(()) for _ in spreads]
         for p in self.parts:
             ratios, trusts = [], []
             for spread, old, new in zip(spreads, before, after, strict=True):
@@ -520,11 +531,11 @@ class Joint:
             by_family = [f + r for f, r in zip(by_family, ratios, strict=True)]
         return np.asarray(total), np.array(by_family)
 
-    def _extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
+    def extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
         """Return the squared error that the base's own uncertainty makes in what was left out."""
         out = dict.fromkeys(self.parts, 0.0)
         for left_out in family:
-            inverse = _inverse(self._weighted(list(left_out))[:-1, :-1])
+            inverse, _ = self._fitted(left_out)
             for p in self.parts:
                 for i in left_out:
                     out[p] += float(np.sum(self._gram[p][i][:-1, :-1] * inverse))
@@ -556,6 +567,7 @@ class Joint:
                 grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
             made._tables.append(grown)
         made._gram = made._products()
+        made._prepare()
         return made
 
 
@@ -584,8 +596,3 @@ def _inverse(gram: FloatArray) -> FloatArray:
     scale = _scales(gram)
     inner = gram * np.outer(scale, scale) + 1e-8 * np.eye(len(gram))
     return np.asarray(np.linalg.inv(inner) * np.outer(scale, scale))
-
-
-def _solved(gram: FloatArray) -> FloatArray:
-    """Solve a Gram matrix of columns and target."""
-    return np.asarray(_inverse(gram[:-1, :-1]) @ gram[:-1, -1])

@@ -10,7 +10,7 @@ import numpy as np
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function, functions_at
-from estimation.causes.joint import Columns, Joint, Laid, Scale
+from estimation.causes.joint import Columns, Joint, Laid, Part, Scale
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.places import places_of
 from estimation.causes.sources import RELATIVE, Bend, Source, sources_at
@@ -85,6 +85,7 @@ class Scored:
     score: float
     by_family: FloatArray
     amplitudes: FloatArray
+    by_run: tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ def evaluate(
     joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
     """Return the score of each candidate given the base; those of a wrong sign are left out."""
-    before = joint.base_errors(folds)
+    base = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
     by_width: dict[int, list[Candidate]] = {}
     for candidate in pool:
         by_width.setdefault(candidate.width, []).append(candidate)
@@ -190,7 +191,7 @@ def evaluate(
         size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
         for start in range(0, len(group), size):
             part = group[start : start + size]
-            out += _evaluated(joint, part, folds, before, numbers)
+            out += _evaluated(joint, part, folds, base, numbers)
     return out
 
 
@@ -198,12 +199,13 @@ def _evaluated(
     joint: Joint,
     part: list[Candidate],
     folds: Folds,
-    before: Sequence[Mapping[tuple[str, str], FloatArray]],
+    base: tuple[Sequence[Mapping[Part, FloatArray]], Sequence[Mapping[Part, float]]],
     numbers: Numbers,
 ) -> list[Scored]:
     precision = np.vstack([c.precision for c in part])
     outcome = joint.evaluate(joint.block([c.laid for c in part]), folds, precision)
-    scores, by_family = joint.score(folds, before, outcome.errors)
+    before, spreads = base
+    scores, by_family = joint.score(spreads, before, outcome.errors)
     out = []
     for k, candidate in enumerate(part):
         amplitudes = outcome.amplitudes[k]
@@ -212,7 +214,8 @@ def _evaluated(
         if joint.replaces(candidate.laid, outcome.base[k], amplitudes):
             continue
         score = float(scores[k]) - _price(candidate, numbers)
-        out.append(Scored(candidate, score, by_family[:, k], amplitudes))
+        by_run = outcome.cross[:, k], outcome.own[:, k]
+        out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
     return out
 
 
@@ -261,14 +264,15 @@ def _ranked(
     joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
     """Return the best of each name: on the grid, refined, and on some of the runs."""
-    best = best_of_each(evaluate(joint, pool, folds, numbers))
+    everything = evaluate(joint, pool, folds, numbers)
+    best = best_of_each(everything)
     if not best:
         return []
     near = [c for s in best[:REFINED] for c in _neighbours(joint, s.candidate)]
     finer = evaluate(joint, near, folds, numbers) if near else []
     best = best_of_each([*best, *finer])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s, numbers)) is not None]
-    some = _on_some_runs(joint, pool, folds, numbers)
+    some = _on_some_runs(joint, everything, folds, numbers)
     return best_of_each([*best, *evaluate(joint, bent, folds, numbers), *some])
 
 
@@ -314,7 +318,7 @@ def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
 
 
 def _on_some_runs(
-    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
+    joint: Joint, scored: Sequence[Scored], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
     """Return named effects that act in some of the runs.
 
@@ -324,34 +328,43 @@ def _on_some_runs(
     count = len(joint.runs)
     if count < 6:
         return []
-    named = [c for c in pool if not c.is_function]
     promise = []
-    for candidate in named:
-        cross, own = joint.by_run(candidate.columns)
-        gains = [float(b @ np.linalg.solve(a, b)) for a, b in zip(own, cross, strict=True)]
-        order = [int(k) for k in np.argsort(gains)[::-1]]
-        for acts in {*_cuts(range(count)), *_cuts(order)}:
-            chosen = [k for k in range(count) if acts[k]]
-            b, a = cross[chosen].sum(axis=0), own[chosen].sum(axis=0)
-            promise.append((float(b @ np.linalg.solve(a, b)), candidate, acts))
-    promise.sort(key=lambda p: -p[0])
-    tried, seen = [], Counter[object]()
-    for _, candidate, acts in promise:
-        seen[candidate.name] += 1
-        if seen[candidate.name] > CHOICES or len(seen) > PARTIAL:
+    for one in scored:
+        if one.candidate.is_function:
             continue
+        cross, own = one.by_run
+        gains = _removed(cross, own)
+        for order in (np.arange(count), np.argsort(gains)[::-1]):
+            for part in (order, order[::-1]):
+                sums = [np.cumsum(x[part], axis=0)[1:-1] for x in (cross, own)]
+                removed = _removed(*sums)
+                promise += [
+                    (float(r), one.candidate, tuple(int(i) for i in sorted(part[: k + 2])))
+                    for k, r in enumerate(removed)
+                ]
+    promise.sort(key=lambda p: -p[0])
+    tried, seen = [], dict[object, set[tuple[int, ...]]]()
+    for _, candidate, chosen in promise:
+        if candidate.name not in seen and len(seen) == PARTIAL:
+            continue
+        known = seen.setdefault(candidate.name, set())
+        if len(known) == CHOICES or chosen in known:
+            continue
+        known.add(chosen)
+        acts = tuple(k in chosen for k in range(count))
         laid = laid_out(joint.layout, joint, candidate.cause, acts)
         if laid is not None:
             tried.append(replace(laid, choices=candidate.choices))
     return evaluate(joint, tried, folds, numbers)
 
 
-def _cuts(order: Sequence[int]) -> list[tuple[bool, ...]]:
-    """Return the first runs of an order, and the last, of every number from two."""
-    early = [
-        tuple(k in set(order[:cut]) for k in range(len(order))) for cut in range(2, len(order) - 1)
-    ]
-    return early + [tuple(not x for x in one) for one in early]
+def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the error that amplitudes remove, from products (n, k) and (n, k, k)."""
+    size = np.einsum("nkk->n", own)[:, None, None]
+    steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[1])
+    return np.asarray(
+        np.einsum("nk,nk->n", cross, np.linalg.solve(steady, cross[..., None])[..., 0])
+    )
 
 
 def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
