@@ -294,8 +294,8 @@ def _signals(
         for rate in rates
     ]
     wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
-    low_pass = models[0].low_pass
-    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, models[0].signals)
+    low_pass, signals = models[0].low_pass, models[0].signals
+    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
     rate_hz = recording.sample_rate_hz
     step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -303,7 +303,8 @@ def _signals(
     spoilt[:edge] = True
     spoilt[max(len(spoilt) - edge, 0) :] = True
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
-    random = zero_phase_channels(_white_noise(recording, wanted), wanted, low_pass)
+    reading = measured_channels((n for n in wanted if n != CAMPAIGN_TIME), signals)
+    random = zero_phase_channels(_white_noise(recording, reading), wanted, low_pass, signals)
     noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
@@ -328,10 +329,9 @@ def _signals(
     return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
 
 
-def _white_noise(recording: Recording, names: Sequence[str]) -> Recording:
+def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:
     """Return a recording of white noise, as wide in each channel as that channel's own."""
     random = np.random.default_rng(0)
-    measured = measured_channels(n for n in names if n != CAMPAIGN_TIME)
     return recording.with_columns(
         **{n: _noise_width(recording[n]) * random.standard_normal(len(recording)) for n in measured}
     )

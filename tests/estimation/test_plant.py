@@ -245,6 +245,32 @@ def test_a_linear_axis_is_fitted_in_metres_and_newtons():
     assert units == ["N s^2/m", "N s/m"]
 
 
+def test_the_unit_of_a_travel_does_not_matter():
+    shaft = Plant(
+        name="the same in other units",
+        axes=(Axis("carriage", "rad"),),
+        actuators=(Actuator("drive_force_n", "carriage"),),
+        sensors=(Sensor("carriage_angle_rad", "carriage", "position", counts=1e3),),
+        run_offsets=False,
+    )
+    runs = [slide(k) for k in range(4)]
+    other = [
+        replace(
+            r,
+            columns={
+                "carriage_angle_rad": 1e3 * r["carriage_position_m"],
+                "drive_force_n": r["drive_force_n"],
+            },
+        )
+        for r in runs
+    ]
+    errors = [
+        fit(declared(plant)[0], Campaign.of(recordings), bootstrap=0).evidence.rmse
+        for plant, recordings in ((SLIDE, runs), (shaft, other))
+    ]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-4)
+
+
 def test_a_resting_speed_follows_the_counts_of_the_sensor():
     coarse = replace(SLIDE, sensors=(replace(SLIDE.sensors[0], counts=1e3),))
     assert signals(coarse).rest["carriage_velocity_m_s"] == pytest.approx(1e-3 * 50.0)
