@@ -194,12 +194,14 @@ class Layout:
         runs: The runs, in the order they were recorded.
         measured: Channels that every run has.
         independent: Pairs of an effort and an equation that has it from other sensors than its own.
+        undecided: Declared equation that is not laid out to the reason.
     """
 
     equations: Mapping[str, Equation]
     runs: Sequence[RunSignals]
     measured: tuple[str, ...]
     independent: set[tuple[str, str]] = field(default_factory=set)
+    undecided: Mapping[str, str] = field(default_factory=dict)
 
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
@@ -221,21 +223,47 @@ def lay_out(
         LayoutError: A run has no sample to regress on.
         FitError: An equation cannot be identified.
     """
-    timed = _on_one_clock(recordings)
+    timed = on_one_clock(recordings)
     campaign = Campaign.of([r for r in timed if r.name in set(train)])
     measured = tuple(n for n in shared_columns(timed) if n != CAMPAIGN_TIME)
-    equations = {}
+    equations: dict[str, Equation] = {}
+    undecided: dict[str, EstimationError] = {}
     for model in models:
-        needed = measured_channels([*model.channels, model.target], model.signals)
-        if {*needed} <= {*measured, "time_s"}:
+        needed = set(measured_channels([*model.channels, model.target], model.signals))
+        try:
+            if lacking := needed - {*measured, "time_s", CAMPAIGN_TIME}:
+                raise LayoutError(
+                    f"Some run has no {', '.join(sorted(lacking))}.",
+                    f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
+                    "Record it, or declare an equation of channels that were recorded.",
+                )
             equations[model.balance] = _equation(fit(model, campaign, bootstrap=0, every=None))
+        except EstimationError as error:
+            undecided[model.balance] = error
     if not equations:
-        raise LayoutError(
-            "No declared equation can be written with these channels.",
-            f"The runs have {', '.join(measured)}.",
-            "Declare an equation of channels that were recorded.",
-        )
-    return Layout(equations, [_signals(r, equations, measured) for r in timed], measured)
+        raise next(iter(undecided.values()))
+    runs = [_signals(r, equations, measured) for r in timed]
+    reasons = {name: str(error) for name, error in undecided.items()}
+    return Layout(equations, runs, measured, undecided=reasons)
+
+
+def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
+    """Return other runs with the equations of a layout, for what a cause would do there.
+
+    A run without enough samples of some equation is left out.
+
+    Raises:
+        LayoutError: All of them are.
+    """
+    runs, lost = [], None
+    for recording in on_one_clock(recordings):
+        try:
+            runs.append(_signals(recording, layout.equations, layout.measured))
+        except LayoutError as error:
+            lost = error
+    if lost is not None and not runs:
+        raise lost
+    return Layout(layout.equations, runs, layout.measured)
 
 
 def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:
@@ -256,7 +284,7 @@ def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int]
     return (1.0, times) if source == measured else None
 
 
-def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
+def on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     """Return the runs with the campaign's time; where no start is known they follow one another."""
     known = Campaign.of(recordings).timed()
     timed = list(known.evidence)

@@ -31,9 +31,7 @@ def diagnose(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A first answer in seconds, without simulated nulls.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")] = False,
     scheduler: Annotated[
         str | None,
         typer.Option(help="Address of a Dask scheduler."),

@@ -29,7 +29,7 @@ def loop(
     seed: Annotated[
         int | None, typer.Option(help="Random seed; taken from the clock by default.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Without simulated nulls.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")] = False,
     workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
     json: JsonFlag = False,

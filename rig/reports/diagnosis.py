@@ -1,17 +1,15 @@
-"""A diagnosis on one page: the sentence, the plots, the numbers, and what it cannot tell."""
+"""A diagnosis on one page: the sentence, the plots, the numbers, and its limits."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
 
+from estimation.causes.functions import Function
+from estimation.causes.verdict import VARIABLE_OF_ROLE, Answer, Kept
 from estimation.channels import unit_of
-from estimation.diagnosis.design import Run
-from estimation.diagnosis.frozen import Frozen
 from estimation.diagnosis.result import Diagnosis, Finding, Value
-from estimation.diagnosis.story import Story
-from estimation.diagnosis.variables import channels_of
 from estimation.recording import FloatArray
 from rig.diagnosis.run import Diagnosed
 from rig.output import figures
@@ -21,15 +19,13 @@ from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display, next_sentence, other_sentences, sentences
 
 CONFIDENCE = (
-    "Confidence is the share of run bootstraps in which the name wins, times the chances that its"
-    " gain is real and general; on known cases it was too sure:"
-    " docs/results/diagnosis-versions.md."
+    "Confidence is the posterior probability of the name among all candidates. It is not calibrated"
+    " yet; answers that were sure and wrong are counted in docs/results/diagnosis-versions.md."
 )
 
-FUNCTIONS = (
-    "bump(x; c, s) = exp(-((x - c) / s)^2), step(x; c, s) = (1 + tanh((x - c) / s)) / 2,"
-    " play(x; s): how far a slack of s on either side is crossed, -1 to 1."
-)
+
+SHOWN = 8
+"""Alternatives in a table."""
 
 
 def page(done: Diagnosed, provenance: Provenance) -> str:
@@ -37,14 +33,14 @@ def page(done: Diagnosed, provenance: Provenance) -> str:
     diagnosis = done.diagnosis
     sealed = done.sealed
     story = (
-        f"{len(sealed.discover)} runs discovered, {len(sealed.confirm)} confirmed"
-        f" ({', '.join(sealed.confirm)}); chosen by seed {sealed.seed} before any fit, seal"
+        f"{len(sealed.discover)} training runs, {len(sealed.confirm)} held-out test runs"
+        f" ({', '.join(sealed.confirm)}); chosen by seed {sealed.seed} before any fit, fingerprint"
         f" {sealed.seal[:12]}, data {sealed.data_hash[:12]}. It took {diagnosis.seconds:.0f} s."
     )
     drawn: list[tuple[str, Markup]] = []
-    for finding in diagnosis.findings:
-        drawn += _over_variable(done.stories[finding.balance], finding)
-    for name in done.stories:
+    for finding, kept in zip(diagnosis.findings, done.answer.kept, strict=True):
+        drawn += _over_variable(done.answer, finding, kept)
+    for name in diagnosis.errors:
         drawn.append(_by_run(diagnosis, name))
     return render(
         "diagnosis.html",
@@ -67,12 +63,9 @@ def tables(done: Diagnosed) -> list[TextTable]:
     shown = [_errors(done.diagnosis)]
     if any(f.parameters for f in done.diagnosis.findings):
         shown.append(_parameters(done.diagnosis.findings))
-    if any(f.form for f in done.diagnosis.findings):
-        shown.append(_forms(done.stories))
-    if any(f.formulas for f in done.diagnosis.findings):
-        shown.append(_formulas(done.diagnosis))
-    for name, story in done.stories.items():
-        shown += [_tried(done.diagnosis, name, story), _moved(done.diagnosis, name, story)]
+    for finding, kept in zip(done.diagnosis.findings, done.answer.kept, strict=True):
+        shown.append(_tried(finding, kept))
+    shown += [_moved(done.diagnosis, name, done.answer) for name in done.diagnosis.errors]
     return shown
 
 
@@ -83,9 +76,9 @@ def _errors(diagnosis: Diagnosis) -> TextTable:
         low, high = error.ratio_ci95
         values = (error.before, error.after, error.with_means_before, error.with_means_after)
         rows.append([name, *(f"{scale * v:.3g}" for v in values), f"{low:.2f} to {high:.2f}", unit])
-    columns = ["balance", "before", "after", "with means, before", "after", "after/before", "unit"]
+    columns = ["equation", "before", "after", "with means, before", "after", "after/before", "unit"]
     return TextTable(
-        "Error on the confirm runs",
+        "Error on the held-out test runs",
         columns,
         rows,
         "Root mean square over all valid samples, those at rest too; each run's mean removed, then"
@@ -114,71 +107,27 @@ def _with_interval(known: Value) -> list[str]:
     return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
 
 
-def _forms(stories: Mapping[str, Story]) -> TextTable:
-    """Return the terms beside each named effect, for what its equation leaves."""
+def _tried(finding: Finding, kept: Kept) -> TextTable:
     rows = []
-    for name, story in stories.items():
-        for claim in story.claims:
-            if claim.form is None:
-                continue
-            for term, words in zip(claim.form.terms, claim.form.products, strict=True):
-                own = story.values[story.after.terms.index(term)]
-                unit = term.term.unit(term.effect.amplitudes[0], story.balance.model.target)
-                known = Value(own["amplitude"].value, unit, own["amplitude"].ci95)
-                rows.append([f"{name}, {claim.family}: times {words}", *_with_interval(known)])
-    columns = ["term, angles in rad", "value", "95 %", "unit"]
+    for likely in kept.likely[:SHOWN]:
+        cause = likely.best.candidate.cause
+        what = likely.family
+        if isinstance(cause, Function):
+            what += f" function of {', '.join(cause.variables)}"
+        rows.append(
+            [f"{what}, {cause.place.name}", f"{likely.share:.3f}", f"{likely.best.score:.3f}"]
+        )
     return TextTable(
-        "Beside the equation of what was found",
-        columns,
+        f"What was tried in place of {finding.family} in {finding.balance}",
+        ["cause, place", "probability", "score"],
         rows,
-        "An equation of the catalogue is one form of a cause, and a rig's own is a little another."
-        " These terms of the same variables tell what the equation leaves; they are no second"
-        f" cause. A model file holds them as unknown.*. {FUNCTIONS}",
+        "Score: log ratio of errors on training runs and conditions left out, less the price of the"
+        " choice. The other findings are part of the model.",
     )
 
 
-def _formulas(diagnosis: Diagnosis) -> TextTable:
-    rows = []
-    for finding in diagnosis.findings:
-        scale, unit = display(diagnosis.unit[finding.balance])
-        for one in finding.formulas:
-            left = "" if one.rmse_after is None else f"{scale * one.rmse_after:.3g} {unit}"
-            rows.append([f"{finding.balance}: {one.text}", f"{100 * one.gain:.1f} %", left])
-    return TextTable(
-        "Formulas of what has no name",
-        ["formula, SI units", "gain, runs left out", "error on the confirm runs"],
-        rows,
-        "These do about equally well on the runs that discovered; a model file holds the first."
-        f" {FUNCTIONS}",
-    )
-
-
-def _tried(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
-    rows = []
-    claimed = {f.family for f in diagnosis.findings if name in (f.balance, *f.also_in)}
-    for k, step in enumerate(story.discovery.steps, start=1):
-        twin = "" if step.p_twin is None else f"{step.p_twin:.3f}"
-        cells = [f"{100 * step.gain:.1f} %", f"{step.p:.3f}", twin, f"{step.agree:.3f}"]
-        said = "claimed" if step.family in claimed else "not claimed"
-        rows.append([f"step {k}: {step.family}, {said}", *cells])
-    for trial in story.discovery.ranking[1:6]:
-        cells = [f"{100 * trial.gain:.1f} %", f"{trial.p:.3f}", "", f"{trial.agree:.3f}"]
-        rows.append([f"at first also: {trial.family}", *cells])
-    left = story.discovery.left_map
-    if left is not None:
-        cells = [f"{100 * left.gain:.1f} %", f"{left.p:.3f}", "", f"{left.agree:.3f}"]
-        rows.append([f"map of {' and '.join(left.variables)}", *cells])
-    return TextTable(
-        f"What was tried: {name}",
-        ["effect", "gain, runs left out", "p, surrogates", "p, twins", "p, runs"],
-        rows,
-        f"{len(story.families)} families at {story.candidates} grid points, then maps of one and"
-        " two variables. Gain: share of the squared error left at that step.",
-    )
-
-
-def _moved(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
-    model = story.balance.model
+def _moved(diagnosis: Diagnosis, name: str, answer: Answer) -> TextTable:
+    model = answer.layout.equations[name].model
     units = {
         f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
         for term in model.terms
@@ -192,34 +141,51 @@ def _moved(diagnosis: Diagnosis, name: str, story: Story) -> TextTable:
     return TextTable(f"Declared parameters: {name}", columns, rows)
 
 
-def _over_variable(story: Story, finding: Finding) -> list[tuple[str, Markup]]:
-    """Draw the residual of the confirm runs over the finding's own variable."""
-    channels = channels_of(finding.balance, story.confirm[0].channels)
-    variable = next((v for v in finding.depends_on if v in channels), None)
-    if variable is None:
+def _over_variable(answer: Answer, finding: Finding, kept: Kept) -> list[tuple[str, Markup]]:
+    """Draw the residual of the test runs over the finding's own variable."""
+    refit = answer.refits.of[finding.balance]
+    before, after = answer.refits.before(finding.balance), answer.refits.after(finding.balance)
+    found = _channel(kept)
+    if found is None:
         return []
-    channel = channels[variable]
-    if any(channel not in run.channels for run in story.confirm):
-        return []
-    x = np.concatenate([run.channels[channel][run.used] for run in story.confirm])
+    variable, channel = found
+    x: list[FloatArray] = []
+    old: list[FloatArray] = []
+    new: list[FloatArray] = []
+    for name in refit.test_names:
+        values = refit.channel(after, name, channel)
+        left, right = (refit.residuals(solved, name) for solved in (before, after))
+        if values is None or left is None or right is None:
+            return []
+        x.append(values)
+        old.append(left[1] - left[1].mean())
+        new.append(right[1] - right[1].mean())
+    whole = np.concatenate(x)
     if channel == "motor_angle_rad":
-        x = np.mod(x, 2 * np.pi)
-    scale, unit = display(story.balance.model.unit)
+        whole = np.mod(whole, 2 * np.pi)
+    scale, unit = display(answer.diagnosis.unit[finding.balance])
     label = f"{variable.replace('_', ' ')}, {unit_of(channel)}"
     panels = [
-        figures.Panel(f"{label}: {when}", x, scale * _left(model, story.confirm))
-        for when, model in (("before", story.before), ("after", story.after))
+        figures.Panel(f"{label}: {when}", whole, scale * np.concatenate(values))
+        for when, values in (("before", old), ("after", new))
     ]
     caption = (
-        f"{finding.balance}: the residual of the confirm runs before and after, mean and the middle"
+        f"{finding.balance}: the residual of the test runs before and after, mean and the middle"
         " 90 % of the samples."
     )
     return [(caption, figures.against(panels, f"residual, {unit}", caption, bins=48))]
 
 
-def _left(model: Frozen, runs: Sequence[Run]) -> FloatArray:
-    errors = [model.error(run) for run in runs]
-    return np.concatenate([e - e.mean() for e in errors])
+def _channel(kept: Kept) -> tuple[str, str] | None:
+    """Return the variable that a cause is drawn over, and its channel."""
+    cause = kept.scored.candidate.cause
+    if isinstance(cause, Function):
+        role = next((v for v in cause.variables if v in cause.place.roles), None)
+        return None if role is None else (role, cause.place.roles[role][0])
+    for role, channel in cause.channels:
+        if role in VARIABLE_OF_ROLE:
+            return VARIABLE_OF_ROLE[role], channel
+    return None
 
 
 def _by_run(diagnosis: Diagnosis, name: str) -> tuple[str, Markup]:
@@ -229,5 +195,5 @@ def _by_run(diagnosis: Diagnosis, name: str) -> tuple[str, Markup]:
         run: (scale * before, scale * error.by_run_after[run])
         for run, before in error.by_run_before.items()
     }
-    caption = f"{name}: error of each confirm run before and after."
+    caption = f"{name}: error of each test run before and after."
     return caption, figures.paired_bars(pairs, ("before", "after"), f"rmse, {unit}", caption)
