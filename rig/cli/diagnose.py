@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
+from rig.cli.machine_option import MachineOption
 from rig.cli.shipped import model_names
 from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
@@ -18,6 +19,7 @@ def diagnose(
             "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
         ),
     ] = None,
+    machine: MachineOption = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: JsonFlag = False,
     json_out: Annotated[
@@ -68,7 +70,7 @@ def diagnose(
     working = remarks()
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
-        asked = subject(path, model, balance, format_)
+        asked = subject(path, model, balance, format_, machine)
         say_left_out(path, asked.campaign)
         done = run_diagnosis(
             asked.campaign,
