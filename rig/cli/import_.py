@@ -21,7 +21,11 @@ def import_(
         Path, typer.Argument(help="CSV, TSV, Parquet, .mat, .npz, JSON, JSON lines, or a folder.")
     ],
     machine: Annotated[
-        Path | None, typer.Option("--machine", help="Machine file whose [data] maps the columns.")
+        Path | None,
+        typer.Option(
+            "--machine",
+            help="Machine file whose [data] maps the columns; also the name of a shipped one.",
+        ),
     ] = None,
     column: Annotated[
         list[str] | None,
