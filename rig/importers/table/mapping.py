@@ -107,6 +107,7 @@ class Runs(_Section):
         at_s: Times since the start of the file, s.
         lap_s: Length of a lap, s.
         start_s: What is before this time since the start of the file is left out, s.
+        tail_s: What is within this time of the end of the file is left out, s.
         least_s: Shorter parts are left out, s; half a lap if laps are cut.
     """
 
@@ -118,6 +119,7 @@ class Runs(_Section):
     at_s: tuple[FiniteFloat, ...] = ()
     lap_s: Positive | None = None
     start_s: FiniteFloat = 0.0
+    tail_s: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     least_s: Annotated[FiniteFloat, Field(ge=0)] | None = None
 
 
