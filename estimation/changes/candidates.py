@@ -122,22 +122,28 @@ def candidates(layout: Layout) -> Iterator[Candidate]:
     for place in places_of(layout):
         if place.kind in ("torque sensor", "angle sensor"):
             yield SensorMoved(place, place.roles["reading"][0])
-        yield from (Came(s) for s in sources_at(layout, place) if not _is_of_time(s))
+        yield from (Came(s) for s in sources_at(layout, place) if _takes_part(s))
 
 
-def _is_of_time(source: Source) -> bool:
-    """Whether an effect is itself a change with the campaigns' clock, which their order is too."""
+def _takes_part(source: Source) -> bool:
+    """Whether an effect can have come: not one of the campaigns' clock, which their order is too.
+
+    Without a declared friction nothing states the speed over which another one changes its sign.
+    """
     clocks = {"elapsed", "campaign_clock"} & set(source.effect.roles)
-    return bool(clocks) or source.effect.id.startswith("change.")
+    widths = [
+        value
+        for parameter, value in zip(source.effect.shape, source.shape, strict=True)
+        if parameter.name == "width"
+    ]
+    return not clocks and not source.effect.id.startswith("change.") and 0.0 not in widths
 
 
 def columns_of(candidate: Candidate, layout: Layout) -> Sequence[Columns] | None:
     """Return a candidate's columns in every run; None where one is not finite."""
     out = []
     for run in layout.runs:
-        # without a declared friction there is no width of its change of sign, and no such effect
-        with np.errstate(divide="ignore", invalid="ignore"):
-            columns = candidate.columns(run, layout)
+        columns = candidate.columns(run, layout)
         if columns is None:
             return None
         out.append(columns)
