@@ -18,7 +18,7 @@ GROUPS = {
         "grasper",
     ),
     "Recordings": ("import", "log", "replay"),
-    "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
+    "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

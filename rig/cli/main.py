@@ -16,6 +16,7 @@ from rig.cli.clear import clear
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
+from rig.cli.diff import diff
 from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.effects import effects
 from rig.cli.estimator import estimator_app
@@ -64,6 +65,7 @@ app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(diff)
 app.command()(loop)
 app.command()(effects)
 app.command("import")(import_)
