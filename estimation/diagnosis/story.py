@@ -85,3 +85,14 @@ class Story:
     def model(self) -> Model:
         """The fitted model with what was found: named effects, and formulas in place of maps."""
         return as_model(self.written.balance, self.written.terms, self.written_values)
+
+    @property
+    def declared_model(self) -> Model:
+        """The declared model, fitted on the training runs."""
+        weights = iter(self.before.weights.tolist())
+        values = [
+            {p.name: Estimate(next(weights)) for p in term.effect.amplitudes}
+            | {p.name: Estimate(x) for p, x in zip(term.effect.shape, term.shape, strict=True)}
+            for term in self.before.terms
+        ]
+        return as_model(self.before.balance, self.before.terms, values)

@@ -119,7 +119,7 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     )
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write_all(written_models(done), model_path)
-    page = diagnosis_page.page(done, Provenance.now(seed))
+    page = diagnosis_page.page(done.diagnosis, done.traces(), Provenance.now(seed))
     report = write_report(folder / "diagnosis.html", page)
     remember(done, looks)
     return Demo(

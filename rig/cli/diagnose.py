@@ -89,7 +89,7 @@ def diagnose(
         model_file.write_all(written_models(done), model_out)
         written.append(f"Model: {model_out}")
     if page_file is not None:
-        write_report(page_file, page(done, Provenance.now(seed)))
+        write_report(page_file, page(done.diagnosis, done.traces(), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))

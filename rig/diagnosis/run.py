@@ -22,6 +22,7 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
+from rig.diagnosis.traces import EquationTraces, traces
 from rig.diagnosis.twins import Twins, twins_of
 
 Stage = Callable[[str], None]
@@ -46,6 +47,13 @@ class Diagnosed:
     sealed: Sealed
     seen: tuple[str, ...]
     looked_at: tuple[Recording, ...]
+
+    def traces(self) -> dict[str, EquationTraces]:
+        """Return the signals of each equation's runs, for a page to draw."""
+        return {
+            name: traces(self.recordings, self.sealed, story.declared_model, story.model)
+            for name, story in self.stories.items()
+        }
 
 
 def remember(done: Diagnosed, ledger: Ledger) -> None:
