@@ -17,7 +17,7 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("log", "replay"),
+    "Recordings": ("campaigns", "log", "replay"),
     "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }

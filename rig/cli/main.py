@@ -12,6 +12,7 @@ from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
+from rig.cli.campaigns import campaigns
 from rig.cli.clear import clear
 from rig.cli.config import config_app
 from rig.cli.demo import demo
@@ -64,6 +65,7 @@ app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
 app.command()(loop)
 app.command()(effects)
+app.command()(campaigns)
 app.add_typer(log_app, name="log")
 app.add_typer(grasper_app, name="grasper")
 app.add_typer(study_app, name="study")
