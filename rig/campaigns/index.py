@@ -46,7 +46,7 @@ class IndexedRun:
         samples: Samples in the log.
         lost: Samples expected and not in the log.
         duration_s: Planned duration, s, or None.
-        excluded: Why the run is no evidence; empty if it is.
+        excluded: Why the run does not count as evidence; empty if it does.
     """
 
     file: str

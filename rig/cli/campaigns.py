@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.shipped import complete_campaign
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
@@ -19,7 +20,10 @@ LONGEST = 40
 def campaigns(
     terms: Annotated[
         list[str] | None,
-        typer.Argument(help="Words, and comparisons such as frequency_hz>=0.5 or verdict=one_of."),
+        typer.Argument(
+            help="Words, and comparisons: 'frequency_hz>=0.5', verdict=one_of.",
+            autocompletion=complete_campaign,
+        ),
     ] = None,
     root: Annotated[Path, typer.Option(help="Folder of the campaigns.")] = Path("logs"),
     runs: Annotated[bool, typer.Option("--runs", help="One row a run.")] = False,
@@ -136,7 +140,7 @@ def _by_campaign(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
 
 
 def _facts(campaign: "IndexedCampaign") -> dict[str, str]:
-    """Return what a table shows of a campaign, by heading."""
+    """Return the cells of a campaign by heading."""
     from rig.campaigns.search import families, verdict
 
     runs = campaign.runs

@@ -6,16 +6,24 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.shipped import model_names
+from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
-    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+        ),
+    ],
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
+            "--model",
+            "-m",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}.",
+            autocompletion=complete_model,
         ),
     ] = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,

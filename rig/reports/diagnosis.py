@@ -116,9 +116,12 @@ def card(finding: Finding, diagnosis: Diagnosis) -> Card:
     if finding.alternatives:
         alternatives = "; ".join(f"{meaning(a) or a} [{a}]" for a in finding.alternatives)
         facts.append(("Could also be", alternatives))
-    title = meaning(finding.family) if named else VERDICTS[finding.verdict]
+    title = meaning(finding.family) if named else f"something that depends on {variables}"
+    if not named and not variables:
+        title = VERDICTS[finding.verdict]
+    title = title or finding.family
     return Card(
-        (title or finding.family).capitalize(),
+        title[0].upper() + title[1:],
         VERDICTS[finding.verdict],
         facts,
         check_of(finding),
