@@ -32,6 +32,9 @@
       if (line.type === "bar") {
         one.marker = { color: role === "before" ? faded(colour, 0.55) : colour,
           line: { color: colour, width: 1 } };
+      } else if (line.mode === "markers") {
+        one.marker = { color: colour, size: 7 };
+        if (line.error_y) one.error_y = { ...line.error_y, color: colour };
       } else if (band) {
         one.line = { width: 0 };
         one.fillcolor = faded(colour, 0.22);
