@@ -1,6 +1,8 @@
 """`rig calibrate` on the simulated rig: what was put in is found, and nothing is half done."""
 
 import json
+import math
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,8 @@ from calibration.fsr import ZHANG_2022
 from calibration.store import CalibrationStore
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED
+from rig.importers.registry import open_campaign
+from rig.log.convert import write_recording
 from rig.simulation.parameters import PlantParameters
 from tests.rig.browser import Opened, chromium
 
@@ -102,6 +106,28 @@ def test_the_page_of_a_calibration_draws_without_an_error(calibrate, tmp_path):
         assert len(opened.requests) == 1
         assert opened.page.locator("#chart-residuals .point").count() == 7
         opened.close()
+
+
+def test_recordings_that_exist_verify_an_encoder(tmp_path, capsys):
+    """A healthy rig raises no alarm; a spindle encoder mounted 17 degrees off is found."""
+    folder = tmp_path / "logs"
+    assert main(["record", "--sim", "--protocol", "quick", "-o", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["calibrate", "check", str(folder), "--json"]) == 0
+    out = json.loads(capsys.readouterr().out)
+    assert out["wrong"] == []
+    assert [one["encoder"] for one in out["agreements"]] == ["spindle"]
+    (tmp_path / "off").mkdir()
+    for handle in open_campaign(folder).runs:
+        run = handle.recording()
+        angle = run["spindle_angle_rad"] + math.radians(17)
+        run = replace(run, columns={**run.columns, "spindle_angle_rad": angle})
+        write_recording(tmp_path / "off" / f"{run.name}.mcap", run)
+    assert main(["calibrate", "check", str(tmp_path / "off")]) == 1
+    said = capsys.readouterr().out
+    assert out["agreements"][0]["offset_rad"] == pytest.approx(0.0, abs=math.radians(1))
+    assert re.search(r"1[67]\.\d deg off", said)
+    assert "rig calibrate encoder --which spindle" in said
 
 
 def test_current_finds_the_plant(calibrate):
