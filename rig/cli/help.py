@@ -17,7 +17,7 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("import", "log", "replay"),
+    "Recordings": ("campaigns", "import", "log", "replay"),
     "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }
