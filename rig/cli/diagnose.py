@@ -7,16 +7,24 @@ import typer
 
 from rig.cli.left_out import say_left_out
 from rig.cli.machine_option import MachineOption
-from rig.cli.shipped import model_names
+from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
-    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+        ),
+    ],
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
+            "--model",
+            "-m",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}.",
+            autocompletion=complete_model,
         ),
     ] = None,
     machine: MachineOption = None,
@@ -89,7 +97,7 @@ def diagnose(
         model_file.write_all(written_models(done), model_out)
         written.append(f"Model: {model_out}")
     if page_file is not None:
-        write_report(page_file, page(done, Provenance.now(seed)))
+        write_report(page_file, page(done.diagnosis, done.traces(), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))

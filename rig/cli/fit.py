@@ -7,7 +7,7 @@ import typer
 
 from rig.cli.left_out import say_left_out
 from rig.cli.machine_option import MachineOption
-from rig.cli.shipped import complete_model, model_names
+from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
@@ -114,7 +114,12 @@ def fit_network(
 
 
 def fit(
-    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+        ),
+    ],
     model: Annotated[
         str | None,
         typer.Option(

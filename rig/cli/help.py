@@ -17,8 +17,8 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("import", "log", "replay"),
-    "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
+    "Recordings": ("campaigns", "import", "log", "replay"),
+    "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

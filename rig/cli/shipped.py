@@ -44,6 +44,28 @@ def _matching(names: list[str], start: str) -> list[str]:
     return [name for name in (*names, *sorted(files)) if name.startswith(start)]
 
 
+def _campaigns() -> list[Path]:
+    """Return the folders of logs in `logs/`, the latest name first."""
+    logs = Path("logs")
+    folders = {path.parent for depth in ("*", "*/*") for path in logs.glob(f"{depth}/*.mcap")}
+    return sorted(folders, reverse=True)
+
+
+def complete_campaign(incomplete: str) -> list[str]:
+    """Complete a campaign by its folder's name within `logs/`."""
+    names = [str(folder.relative_to("logs")) for folder in _campaigns()]
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def complete_recordings(incomplete: str) -> list[str]:
+    """Complete recordings: a campaign's folder, or any path."""
+    typed = Path(incomplete or ".")
+    folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
+    paths = sorted(str(path) for path in folder.iterdir()) if folder.is_dir() else []
+    found = dict.fromkeys([*map(str, _campaigns()), *paths])
+    return [name for name in found if name.startswith(incomplete)]
+
+
 def complete_config(incomplete: str) -> list[str]:
     """Complete a configuration: a shipped name or a file."""
     return _matching(config_names(), incomplete)
