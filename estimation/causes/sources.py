@@ -132,7 +132,7 @@ class Source:
         return found
 
     def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return the change of its columns by the noise of its readings, where memory may follow it."""
+        """Return the change of its columns by noise, where its memory may follow that."""
         if not self.follows:
             return {}
         readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}
