@@ -12,7 +12,7 @@ import numpy as np
 from estimation.causes.equations import Layout, lay_out
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
-from estimation.causes.joint import Columns, Joint, Part
+from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.search import Candidate, Found, Scored, laid_out, search
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
@@ -84,7 +84,7 @@ def diagnose(
     """
     began = time.perf_counter()
     layout = lay_out(models, recordings, sealed.discover)
-    add_instruments(layout)
+    add_instruments(layout, sealed.discover)
     found = search(layout.select(sealed.discover), numbers)
     whole = _Test(layout, sealed, numbers)
     findings = _findings(found, whole, sealed, numbers)
@@ -137,13 +137,13 @@ class _Test:
         self.kept: list[_Kept] = []
         self.notes: list[str] = []
 
-    def laid(self, candidate: Candidate) -> Sequence[Columns]:
-        """Return a cause's columns on all runs; one of some runs acts in none of the test runs."""
+    def beside(self, joint: Joint, candidate: Candidate) -> Joint:
+        """Return a regression with a cause; one of open runs acts in none of those."""
         acts = None
         if candidate.acts is not None:
             acts = tuple(on is True for on in self._state(candidate).values())
         laid = laid_out(self.layout, self.joint, candidate.cause, acts)
-        return [] if laid is None else laid.columns
+        return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 
     def _state(self, candidate: Candidate) -> Mapping[str, bool | None]:
         """Return whether a cause acts in each run; None where the training runs do not decide.
@@ -171,7 +171,7 @@ class _Test:
         """Return the squared error of each test run, fitted on the training runs alone."""
         joint = self.joint
         for cause in causes:
-            joint = joint.with_cause(self.laid(cause))
+            joint = self.beside(joint, cause)
         (errors,) = joint.base_errors([[self.at]])
         return {p: values[self.at] for p, values in errors.items()}
 
@@ -182,14 +182,11 @@ class _Test:
         told = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is not None]
         if not told:
             return 0.0
-        rows = [
-            {
-                p: np.asarray(v[told].sum() / self.joint.samples[p][self.at][told].sum())
-                for p, v in e.items()
-            }
-            for e in (old, new)
-        ]
-        return float(self.joint.log_ratio(rows[0], rows[1]))
+        total = 0.0
+        for p, samples in self.joint.samples.items():
+            pair = [e[p][told].sum() / samples[self.at][told].sum() for e in (old, new)]
+            total += float(self.joint.log_ratio(p, *pair))
+        return total
 
     def rmse(self, causes: Sequence[Candidate], equation: str) -> float:
         """Return the root mean square error within test runs of one equation."""
@@ -257,7 +254,7 @@ def _finding(
     home = cause.place.home
     lead, covered, others = likely[0], likely[0].share, []
     for one in likely[1:]:
-        if covered >= IN_SET:
+        if covered >= (SURE if not others else IN_SET):
             break
         covered += one.share
         others.append(one.family)
