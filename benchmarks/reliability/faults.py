@@ -85,7 +85,7 @@ class Outcome:
         kind: What was injected.
         detected: Whether the program noticed.
         named: Whether it said what it was: the trip's own code, an error, or counters that rise
-            with this fault of the link alone. Where a protocol does not tell two faults apart,
+            with this fault of the link alone. Where a protocol does not distinguish two faults,
             neither is named.
         mis_stamped: Samples whose counts are of another tick than their time stamp says.
         safe_after_s: Virtual time from the fault, less the time it is allowed to last, to the safe

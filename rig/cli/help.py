@@ -5,7 +5,7 @@ from typing import Any
 from typer.core import TyperGroup
 
 GROUPS = {
-    "Begin": ("demo", "config", "doctor", "devices", "selftest", "udev", "firmware"),
+    "Begin": ("demo", "config", "doctor", "devices", "selftest", "commission", "udev", "firmware"),
     "At the rig": (
         "live",
         "record",

@@ -13,6 +13,7 @@ from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
 from rig.cli.clear import clear
+from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -71,6 +72,7 @@ app.add_typer(config_app, name="config")
 app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
+app.command()(commission)
 app.command()(reference)
 app.command()(stop)
 app.command()(clear)

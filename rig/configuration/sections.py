@@ -114,7 +114,7 @@ class SafetySection(Section):
         saturated_s: How long a torque or current sensor may be at the end of its range.
         stale_s: How long its reading may not change at all.
         load_continuous_a: Load current that warms the load motor no further, by its data sheet; the
-            limit of the load where it is not set, which is no watch.
+            limit of the load where it is not set, which is never exceeded.
         load_heat_a2_s: Heat above it that the load motor can take; it has no current read-back, so
             the current it is given counts.
         dry_s: How long the last setpoint is held while none follows.

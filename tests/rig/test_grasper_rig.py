@@ -78,7 +78,7 @@ def test_a_campaign_at_2_khz_closes_the_jaws_and_measures_their_force(
     [
         ({"limits": {"jaw_2_force_n": 0.4}}, (0, 0, 0.14), Trip.OVER_FORCE),
         ({"limits": {"yaw_current_a": 0.01}}, (0.14, 0, 0), Trip.OVER_CURRENT),
-        ({"safety": {"motor_speed_rad_s": 16.0}}, (0, 0.14, 0), Trip.OVER_SPEED),
+        ({"safety": {"motor_speed_rad_s": 14.0}}, (0, 0.13, 0), Trip.OVER_SPEED),
         ({"safety": {"stall_current_a": 0.015, "stall_s": 0.3}}, (0, 0, 0.2), Trip.STALLED),
         ({"safety": {"continuous_current_a": 0.004, "heat_a2_s": 1e-5}}, (0.12, 0, 0), 8),
     ],
