@@ -1,6 +1,7 @@
 """The simulated rig with the declared equations of a diagnosis, to play experiments on."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from estimation import model_file
@@ -33,11 +34,13 @@ def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Twin |
     if not own:
         return None
     campaign, parts = Campaign.of(train), []
+    signals = next(iter(own.values())).signals
     try:
         for name in PLAYED:
             model = own.get(name)
             try:
-                parts.append(model or fit(model_file.read(Path(name)), campaign, bootstrap=0))
+                shipped = replace(model_file.read(Path(name)), signals=signals)
+                parts.append(model or fit(shipped, campaign, bootstrap=0))
             except EstimationError:
                 continue
         return build_twin(parts, campaign)

@@ -45,8 +45,8 @@ def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -
         NotFittedError: A parameter has no value.
         DataError: A value makes no plant, such as a negative stiffness.
     """
-    plant = start
     by_balance = {model.balance: model for model in models}
+    plant = replace(start, gear_ratio=_gear_ratio(by_balance.values(), start.gear_ratio))
     for balance, change in (
         ("motor", _with_motor),
         ("gearbox", _with_gearbox),
@@ -56,6 +56,15 @@ def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -
         if balance in by_balance:
             plant = change(by_balance[balance], plant)
     return plant
+
+
+def _gear_ratio(models: Iterable[Model], usual: float) -> float:
+    """Return the ratio of the gearbox of the models' machine; the usual one if none has it."""
+    for model in models:
+        bend = model.signals.combination("gearbox_differential_rad")
+        if bend is not None and (gain := bend.gain("motor_angle_rad")) > 0.0:
+            return 1.0 / gain
+    return usual
 
 
 def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:

@@ -1,17 +1,14 @@
 """The four declared balances of the rig, as shipped, and a campaign to fit them on."""
 
-from pathlib import Path
-
 import numpy as np
 
 from estimation import model_file
 from estimation.recording import Recording
-from rig.diagnosis.subject import REFERENCE_RIG
 from rig.protocols.protocol import load_protocol
 from rig.simulation.parameters import PlantParameters, SensorParameters
 from rig.simulation.twin import reference_of, simulate
 
-MODELS = [model_file.read(Path(name)) for name in REFERENCE_RIG]
+MODELS = model_file.reference_rig()
 
 
 def record(
