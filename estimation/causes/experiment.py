@@ -12,12 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
-from estimation.causes.equations import Layout, LayoutError, laid_out_like
+from estimation.causes.equations import Layout, LayoutError, RunSignals, laid_out_like
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
-from estimation.causes.joint import Joint
-from estimation.causes.search import Scored
+from estimation.causes.search import Candidate, Scored
 from estimation.causes.sources import Source
 from estimation.causes.verdict import IN_SET, Answer, Kept
 from estimation.recording import FloatArray, Recording
@@ -49,8 +49,7 @@ class Question:
 
     Attributes:
         hypotheses: Two at least.
-        noise: Equation to the variance of its residual with the likeliest hypothesis, on runs left
-            out.
+        noise: Equation to the variance of its residual with the likeliest hypothesis.
         layout: The equations.
     """
 
@@ -68,25 +67,19 @@ def question(answer: Answer, place: int) -> Question | None:
     """
     if answer.diagnosis.findings[place].verdict == "identified":
         return None
-    joint = answer.found.joint
-    for k, other in enumerate(answer.kept):
-        if k != place:
-            joint = joint.with_cause(other.scored.candidate.columns)
-    likely = _likely(answer.kept[place], joint)
+    likely = _likely(answer.kept[place], answer.refits.numbers.sharpness)
     if len(likely) < 2:
         return None
-    best = joint.with_cause(likely[0][1].candidate.columns)
-    (errors,) = best.base_errors([[[k] for k in range(len(joint.runs))]])
-    noise = {
-        name: float(errors[name, "within"].sum() / joint.samples[name, "within"].sum())
-        for name in joint.layout.equations
-    }
+    train = answer.layout.select(answer.diagnosis.sealed.discover)
+    others = [k.scored.candidate for i, k in enumerate(answer.kept) if i != place]
     total = sum(share for share, _ in likely)
-    found = tuple(
-        Hypothesis(_label(one), share / total, one.candidate.cause, _amplitudes(joint, one))
-        for share, one in likely
-    )
-    return Question(found, noise, answer.layout)
+    found, noise = [], None
+    for share, one in likely:
+        amplitudes, left = _fitted(train, others, one.candidate)
+        noise = noise or left
+        cause = one.candidate.cause
+        found.append(Hypothesis(_label(one), share / total, cause, amplitudes))
+    return Question(tuple(found), noise or {}, answer.layout)
 
 
 def separation(asked: Question, recordings: Sequence[Recording]) -> float | None:
@@ -117,9 +110,8 @@ def separation(asked: Question, recordings: Sequence[Recording]) -> float | None
     return total / weight
 
 
-def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
+def _likely(kept: Kept, sharpness: float) -> list[tuple[float, Scored]]:
     """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
-    sharpness = joint.numbers.sharpness
     scores = np.array([s.score for s in kept.ranked])
     weights = np.exp(sharpness * (scores - scores.max()))
     shares: dict[str, float] = {}
@@ -145,18 +137,44 @@ def _label(scored: Scored) -> str:
     return f"a function of {' and '.join(names(cause.place, cause.variables))}"
 
 
-def _amplitudes(joint: Joint, one: Scored) -> FloatArray:
-    """Return amplitudes of the cause's own columns; the search has those of a named one scaled."""
-    candidate = one.candidate
-    if isinstance(candidate.cause, Function):
-        return one.amplitudes
-    own = []
-    for k, run in enumerate(joint.runs):
-        columns = candidate.cause.columns(run) or {}
-        acts = candidate.acts is None or candidate.acts[k]
-        own.append({name: x * float(acts) for name, x in columns.items()})
-    block = joint.block([joint.laid(own, unit=False)])
-    return np.asarray(joint.evaluate(block, [], np.zeros((1, candidate.width))).amplitudes[0])
+def _fitted(
+    train: Layout, others: Sequence[Candidate], one: Candidate
+) -> tuple[FloatArray, dict[str, float]]:
+    """Fit a cause with the declared terms and other causes on all equations together.
+
+    Returns:
+        Its amplitudes, shape (k,), and the variance of each equation's residual.
+    """
+    blocks, aims, sizes = [], [], {}
+    for name, equation in train.equations.items():
+        rows, aim = [], []
+        for k, run in enumerate(train.runs):
+            used = run.grid[run.used[name]]
+            own = [_acting(c, k, run, name) for c in (*others, one)]
+            rows.append(np.hstack([equation.columns(run.channels)[used], *own]))
+            aim.append(run.channels[equation.target][used])
+            rows[-1], aim[-1] = rows[-1] - rows[-1].mean(axis=0), aim[-1] - aim[-1].mean()
+        table, target = np.vstack(rows), np.concatenate(aim)
+        width = table.shape[1] - one.width - sum(c.width for c in others)
+        left = target - table @ np.linalg.lstsq(table, target, rcond=1e-8)[0]
+        sizes[name] = float(np.mean(left**2))
+        # every equation has its own declared terms, and all share the causes
+        scale = 1.0 / np.sqrt(max(sizes[name], 1e-300))
+        blocks.append((table[:, :width] * scale, table[:, width:] * scale))
+        aims.append(target * scale)
+    declared = linalg.block_diag(*(own for own, _ in blocks))
+    whole = np.hstack([declared, np.vstack([shared for _, shared in blocks])])
+    weights = np.linalg.lstsq(whole, np.concatenate(aims), rcond=1e-6)[0]
+    return np.asarray(weights[-one.width :]), sizes
+
+
+def _acting(candidate: Candidate, k: int, run: RunSignals, equation: str) -> FloatArray:
+    """Return a cause's columns in one equation of the k-th training run, (n, width)."""
+    columns = (candidate.cause.columns(run) or {}).get(equation)
+    acts = candidate.acts is None or candidate.acts[k]
+    if columns is None or not acts:
+        return np.zeros((len(run.used[equation]), candidate.width))
+    return columns
 
 
 def _predicted(one: Hypothesis, layout: Layout) -> Mapping[str, FloatArray]:

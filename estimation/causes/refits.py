@@ -98,6 +98,8 @@ class Refits:
         if isinstance(cause, Source):
             term = term_of(cause, equation, self.layout.measured)
             if term is not None:
+                if set(term.channels.values()) - {channel for _, channel in cause.channels}:
+                    term = self.of[name].refined(self.parts[name], term)
                 return Part(term, acts)
             if name != cause.place.home:
                 return None

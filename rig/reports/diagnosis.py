@@ -98,7 +98,7 @@ def _parameters(findings: Sequence[Finding]) -> TextTable:
 
 
 def _with_interval(known: Value) -> list[str]:
-    """Return value, interval and unit, with the digits that the interval leaves."""
+    """Return value, interval and unit, with the digits that the interval supports."""
     scale, unit = display(known.unit)
     if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
         return [f"{scale * known.value:.4g}", "", unit]
