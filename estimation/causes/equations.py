@@ -5,6 +5,7 @@ its cutoff. Effects with memory are worked out on that series; everything is reg
 grid that all equations of a run share.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,6 +25,7 @@ from estimation.derived import (
 )
 from estimation.effects import Proportional
 from estimation.errors import EstimationError
+from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording, shared_columns
@@ -57,13 +59,16 @@ class RunSignals:
         name: Name of the run.
         channels: Channel to values, each of shape (n,), SI units; further signals may be added.
         rate_hz: Rate of these values.
+        noise: Channel to one realisation of its sensors' white noise, filtered in the same way.
         grid: Places regressed on, indices into n.
         used: Equation to the samples it counts, indices into `grid`.
     """
 
     name: str
     channels: dict[str, FloatArray]
+    noise: Mapping[str, FloatArray]
     rate_hz: float
+    low_pass: LowPass
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
 
@@ -130,6 +135,46 @@ class Equation:
                 scale = weights if np.any(weights) else np.ones(len(weights))
                 parts.append(term.sign * ((ends[0] - ends[1]) @ scale)[:, None])
         return np.hstack(parts)
+
+    @cached_property
+    def of_shape(self) -> list[bool]:
+        """Which of the columns are derivatives by a shape."""
+        kinds = []
+        for term in self.terms:
+            kinds += [False] * len(term.effect.amplitudes) + [True] * len(term.effect.shape)
+        return kinds
+
+    @cached_property
+    def of_channel(self) -> list[bool]:
+        """Which of the columns are a channel times a constant."""
+        kinds = []
+        for term in self.terms:
+            linear = isinstance(term.effect, Proportional)
+            kinds += [linear] * (len(term.effect.amplitudes) + len(term.effect.shape))
+        return kinds
+
+    def noise(self, run: RunSignals) -> FloatArray:
+        """Return the noise in `columns` and in the target, (n, k + 1).
+
+        Where a column is not proportional to its channel, small noise is no guide: it is left out.
+        """
+        parts = []
+        for term in self.terms:
+            own = term.columns(run.noise, term.numbers(term.effect.shape))
+            linear = isinstance(term.effect, Proportional)
+            count = own.shape[1] + len(term.effect.shape)
+            parts.append(term.sign * own if linear else np.zeros((len(own), count)))
+        return np.hstack([*parts, run.noise[self.target][:, None]])
+
+    def is_quieter(self, runs: Sequence[RunSignals]) -> bool:
+        """Whether the right-hand side has less of its sensors' noise than the target has."""
+        linear = [t for t in self.terms if isinstance(t.effect, Proportional)]
+        own = other = 0.0
+        for run in runs:
+            parts = [t.columns(run.noise, ()) @ np.array(t.weights) for t in linear]
+            own += float(np.var(run.noise[self.target]))
+            other += float(np.var(np.sum(parts, axis=0)))
+        return other < own
 
     def estimate(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the right-hand side without offsets, shape (n,)."""
@@ -286,6 +331,8 @@ def _signals(
     spoilt[:edge] = True
     spoilt[max(len(spoilt) - edge, 0) :] = True
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
+    random = zero_phase_channels(_white_noise(recording, wanted), wanted, low_pass)
+    noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
     valid, rate_hz = ~spoilt[::step], rate_hz / step
@@ -306,4 +353,27 @@ def _signals(
                 "The others are flagged, at rest, or too near to the ends for the filter.",
                 "Record it again, or exclude it.",
             )
-    return RunSignals(recording.name, channels, rate_hz, grid, used)
+    return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
+
+
+def _white_noise(recording: Recording, names: Sequence[str]) -> Recording:
+    """Return a recording of white noise, as wide in each channel as that channel's own."""
+    random = np.random.default_rng(0)
+    measured = measured_channels(n for n in names if n != CAMPAIGN_TIME)
+    return recording.with_columns(
+        **{n: _noise_width(recording[n]) * random.standard_normal(len(recording)) for n in measured}
+    )
+
+
+def _noise_width(values: FloatArray) -> float:
+    """Return the standard deviation of a reading's white noise, the steps of its counts included.
+
+    Third differences hold noise and hardly any motion; a tenth of the blocks, in which a contact or
+    a reversal may show, is left out. At rest counts stand still, in motion they are noise.
+    """
+    squared = np.diff(values, 3) ** 2 / 20.0
+    blocks = [float(np.mean(b)) for b in np.array_split(squared, max(1, len(squared) // 50))]
+    usual = float(np.nanmean(np.sort(blocks)[: max(1, round(0.9 * len(blocks)))]))
+    steps = np.abs(np.diff(values))
+    count = float(steps[steps > 0.0].min(initial=np.inf))
+    return math.sqrt(max(usual, count**2 / 12.0 if math.isfinite(count) else 0.0))

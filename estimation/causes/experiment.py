@@ -19,6 +19,7 @@ from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
 from estimation.causes.search import Candidate, Scored
 from estimation.causes.sources import Source
+from estimation.causes.terms import plain
 from estimation.causes.verdict import IN_SET, Answer, Kept
 from estimation.recording import FloatArray, Recording
 
@@ -77,7 +78,7 @@ def question(answer: Answer, place: int) -> Question | None:
     for share, one in likely:
         amplitudes, left = _fitted(train, others, one.candidate)
         noise = noise or left
-        cause = one.candidate.cause
+        cause = plain(one.candidate.cause)
         found.append(Hypothesis(_label(one), share / total, cause, amplitudes))
     return Question(tuple(found), noise or {}, answer.layout)
 
@@ -96,7 +97,7 @@ def separation(asked: Question, recordings: Sequence[Recording]) -> float | None
         layout = laid_out_like(asked.layout, recordings)
     except LayoutError:
         return None
-    add_instruments(layout)
+    add_instruments(layout, [run.name for run in layout.runs])
     total, weight = 0.0, 0.0
     predicted = [_predicted(one, layout) for one in asked.hypotheses]
     pairs = itertools.combinations(zip(asked.hypotheses, predicted, strict=True), 2)
@@ -155,26 +156,28 @@ def _fitted(
             aim.append(run.channels[equation.target][used])
             rows[-1], aim[-1] = rows[-1] - rows[-1].mean(axis=0), aim[-1] - aim[-1].mean()
         table, target = np.vstack(rows), np.concatenate(aim)
-        width = table.shape[1] - one.width - sum(c.width for c in others)
+        width = equation.columns(train.runs[0].channels).shape[1]
         left = target - table @ np.linalg.lstsq(table, target, rcond=1e-8)[0]
         sizes[name] = float(np.mean(left**2))
         # every equation has its own declared terms, and all share the causes
         scale = 1.0 / np.sqrt(max(sizes[name], 1e-300))
         blocks.append((table[:, :width] * scale, table[:, width:] * scale))
         aims.append(target * scale)
+        count = own[-1].shape[1]
     declared = linalg.block_diag(*(own for own, _ in blocks))
     whole = np.hstack([declared, np.vstack([shared for _, shared in blocks])])
     weights = np.linalg.lstsq(whole, np.concatenate(aims), rcond=1e-6)[0]
-    return np.asarray(weights[-one.width :]), sizes
+    return np.asarray(weights[-count:]), sizes
 
 
 def _acting(candidate: Candidate, k: int, run: RunSignals, equation: str) -> FloatArray:
     """Return a cause's columns in one equation of the k-th training run, (n, width)."""
-    columns = (candidate.cause.columns(run) or {}).get(equation)
+    columns = plain(candidate.cause).columns(run) or {}
+    width = next(x.shape[1] for x in columns.values())
     acts = candidate.acts is None or candidate.acts[k]
-    if columns is None or not acts:
-        return np.zeros((len(run.used[equation]), candidate.width))
-    return columns
+    if equation not in columns or not acts:
+        return np.zeros((len(run.used[equation]), width))
+    return columns[equation]
 
 
 def _predicted(one: Hypothesis, layout: Layout) -> Mapping[str, FloatArray]:

@@ -13,8 +13,8 @@ from estimation.causes.places import Place, direction_width
 from estimation.derived import CAMPAIGN_TIME
 from estimation.recording import FloatArray
 
-KNOTS = 6
-"""Knots of a variable's hat functions."""
+KNOTS, KNOTS_ALONE = 6, 14
+"""Knots of a variable's hat functions: of a function of two variables, and of one alone."""
 
 PLAY = 0.06
 """Half width of the play operator that stands for history, share of the travel."""
@@ -43,6 +43,15 @@ class Function:
 
     family = "unknown"
 
+    @property
+    def knots(self) -> int:
+        """Number of knots of each variable that is not a direction."""
+        return KNOTS_ALONE if len({*self.variables} - {"velocity_sign"}) == 1 else KNOTS
+
+    def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
+        """Return what its readings' noise does to its columns: nothing that counts."""
+        return {}
+
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:
         """Return the tensor product of the variables' bases in every equation it enters."""
         made = {}
@@ -50,7 +59,7 @@ class Function:
             product = np.ones((len(run.grid), 1))
             for variable, (low, high) in zip(self.variables, self.ranges, strict=True):
                 values = variable_of(run, self.place, variable, entry.equation, self.width)
-                own = _basis(variable, values, low, high)
+                own = _basis(variable, values, (low, high), self.knots)
                 product = (product[:, :, None] * own[:, None, :]).reshape(len(own), -1)
             made[entry.equation] = entry.gain * product[run.used[entry.equation]]
         return made
@@ -142,12 +151,14 @@ def _variable_range(
     return (low, high) if high > low else (low, low + 1.0)
 
 
-def _basis(variable: str, values: FloatArray, low: float, high: float) -> FloatArray:
+def _basis(
+    variable: str, values: FloatArray, inside: tuple[float, float], count: int
+) -> FloatArray:
     if variable == "velocity_sign":
         return np.column_stack([np.ones(len(values)), values])
-    knots = np.linspace(low, high, KNOTS)
-    inside = np.clip(values, low, high)
-    return np.column_stack([np.interp(inside, knots, row) for row in np.eye(KNOTS)])
+    knots = np.linspace(*inside, count)
+    clipped = np.clip(values, *inside)
+    return np.column_stack([np.interp(clipped, knots, row) for row in np.eye(count)])
 
 
 @numba.njit(cache=True)

@@ -2,10 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from estimation.causes.equations import Layout
-from estimation.causes.joint import Columns, Joint, Part
+from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import Numbers
 from estimation.causes.search import Candidate, laid_out
 from estimation.causes.sources import Source
@@ -60,28 +58,27 @@ class HeldOut:
         known = [k for k in range(len(self.at)) if k not in open_to]
         if not known:
             return 0.0
-        samples = self.joint.samples
-        rows = [
-            {p: np.asarray(v[known].sum() / samples[p][self.at][known].sum()) for p, v in e.items()}
-            for e in (old, new)
-        ]
-        return float(self.joint.log_ratio(rows[0], rows[1]))
+        total = 0.0
+        for p, samples in self.joint.samples.items():
+            pair = [e[p][known].sum() / samples[self.at][known].sum() for e in (old, new)]
+            total += float(self.joint.log_ratio(p, *pair))
+        return total
 
     def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""
         joint = self.joint
         for cause in causes:
-            joint = joint.with_cause(self._laid(cause))
+            joint = self._with(joint, cause)
         (errors,) = joint.base_errors([[self.at]])
         return {p: values[self.at] for p, values in errors.items()}
 
-    def _laid(self, candidate: Candidate) -> Sequence[Columns]:
-        """Return a cause's columns on all runs; where it is open whether it acts it does not."""
+    def _with(self, joint: Joint, candidate: Candidate) -> Joint:
+        """Return a regression with a cause; where it is open whether it acts it does not."""
         acts = None
         if candidate.acts is not None:
             acts = tuple(on is True for on in self.acts_in(candidate).values())
         laid = laid_out(self.layout, self.joint, candidate.cause, acts)
-        return [] if laid is None else laid.columns
+        return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 
 
 def _since(candidate: Candidate) -> float | None:

@@ -5,7 +5,7 @@ that an equation reads (a torque, a force, a current) is therefore replaced by i
 through the other declared equations: an instrumental variable. Angles are used as measured.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,15 +18,34 @@ def instrumented(channel: str, equation: str) -> str:
     return f"{channel} for {equation}"
 
 
-def add_instruments(layout: Layout) -> None:
+def add_instruments(layout: Layout, train: Sequence[str]) -> None:
     """Add to every run the efforts of every equation, predicted without that equation's sensors.
 
-    Where no other sensor reaches an effort, a target is replaced by its own equation's estimate and
-    a regressor is used as it was measured.
+    A prediction stands in for a reading where it is the better of the two: where its discrepancy
+    to the reading is no larger than the equation's residual, which holds the reading's noise. Else
+    a target is replaced by its own equation's estimate if that is quieter.
+
+    Args:
+        layout: The equations and all runs.
+        train: Names of the runs that decide which reading is replaced.
     """
+    torques = [e for e in layout.equations.values() if not e.of_angle]
+    trained = {run.name for run in layout.runs} & set(train)
     for equation in layout.equations.values():
+        own = set(_efforts(equation))
+        apart: set[str] = set()  # from no noise of this equation's own accelerations either
+        known = {}
         for run in layout.runs:
-            _add(layout, equation, run)
+            known[run.name] = _propagated(torques, run, own)
+            apart |= set(_propagated([e for e in torques if e is not equation], run, own))
+        seen = [run for run in layout.runs if run.name in trained]
+        good = {c for c in own if _is_better(equation, c, seen, known)}
+        layout.independent.update((c, equation.name) for c in good & apart)
+        for run in layout.runs:
+            for channel in good:
+                run.channels[instrumented(channel, equation.name)] = known[run.name][channel]
+            if equation.target not in good and equation.is_quieter(seen):
+                _add_estimate(equation, run)
 
 
 def signal(run: RunSignals, channel: str, equation: str) -> str:
@@ -56,32 +75,44 @@ def _is_motion(channel: str) -> bool:
     )
 
 
-def _add(layout: Layout, equation: Equation, run: RunSignals) -> None:
-    own = set(_efforts(equation))
-    known = _propagated(layout, run, own)
-    for channel in own:
-        if channel in known:
-            run.channels[instrumented(channel, equation.name)] = known[channel]
-            layout.independent.add((channel, equation.name))
-        elif channel == equation.target:
-            run.channels[instrumented(channel, equation.name)] = equation.estimate(run.channels)
-    if equation.of_angle and equation.target in layout.measured:
-        angle = equation.estimate(run.channels | {c: known[c] for c in own if c in known})
-        # an estimate has no offset, and a place along the travel needs one
-        angle = angle + float(np.mean(run.channels[equation.target] - angle))
-        run.channels[instrumented(equation.target, equation.name)] = angle
-        base = next((a for a in ANGLES if equation.target.endswith(a)), "")
-        if base:
-            unit = "_velocity_rad_s" if base == "_angle_rad" else "_velocity_m_s"
-            speed = equation.target.removesuffix(base) + unit
-            run.channels[instrumented(speed, equation.name)] = np.gradient(angle) * run.rate_hz
+def _is_better(
+    equation: Equation,
+    channel: str,
+    runs: Sequence[RunSignals],
+    known: Mapping[str, Mapping[str, FloatArray]],
+) -> bool:
+    """Whether an effort's prediction adds no more error to an equation than there is."""
+    if any(channel not in known[run.name] for run in runs):
+        return False
+    gain = 1.0 if channel == equation.target else equation.channels[channel]
+    added = left = 0.0
+    for run in runs:
+        used = run.grid[run.used[equation.name]]
+        residual = run.channels[equation.target] - equation.estimate(run.channels)
+        added += gain**2 * float(np.var((known[run.name][channel] - run.channels[channel])[used]))
+        left += float(np.var(residual[used]))
+    return added <= left
 
 
-def _propagated(layout: Layout, run: RunSignals, without: set[str]) -> Mapping[str, FloatArray]:
+def _add_estimate(equation: Equation, run: RunSignals) -> None:
+    """Add what an equation predicts for its target, and for the speed of an angle."""
+    target = equation.estimate(run.channels)
+    if equation.of_angle:  # an estimate has no offset, and a place along the travel needs one
+        target = target + float(np.mean(run.channels[equation.target] - target))
+    run.channels[instrumented(equation.target, equation.name)] = target
+    base = next((a for a in ANGLES if equation.target.endswith(a)), "")
+    if base:
+        unit = "_velocity_rad_s" if base == "_angle_rad" else "_velocity_m_s"
+        speed = equation.target.removesuffix(base) + unit
+        run.channels[instrumented(speed, equation.name)] = np.gradient(target) * run.rate_hz
+
+
+def _propagated(
+    relations: Sequence[Equation], run: RunSignals, without: set[str]
+) -> Mapping[str, FloatArray]:
     """Return every effort that can be worked out from sensors other than some."""
-    efforts = {n for e in layout.equations.values() for n in _efforts(e)}
+    efforts = {n for e in relations for n in _efforts(e)}
     known = {n: run.channels[n] for n in efforts if n not in without}
-    relations = [e for e in layout.equations.values() if not e.of_angle]
     for _ in relations:
         for relation in relations:
             missing = [n for n in _efforts(relation) if n not in known]

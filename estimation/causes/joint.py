@@ -6,11 +6,12 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Equation, Layout, RunSignals
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
 from estimation.causes.numbers import DEFAULT, Numbers
@@ -21,7 +22,35 @@ Part = tuple[str, str]
 
 Columns = Mapping[Part, FloatArray]
 
+Scale = Literal["each", "first", "none"]
+"""Of which columns the norm is one: of each, of the first, or of none."""
+
 TINY = 1e-300
+
+MOST_CHANGE = 2.0
+"""Factor by which the largest linear term of an equation may change beside a cause."""
+
+NOISE_TAKEN = 0.8
+"""Share of the known noise that is taken off the cross-products of a fit: with all of it a column
+that holds nothing but noise has any amplitude."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A candidate's columns without what the declared columns explain.
+
+    Attributes:
+        columns: Part to the columns, one mapping a run.
+        taken: How much of each declared column was taken off, equation to (declared, k).
+        size: What the columns were divided by, shape (k,).
+        noise: Part to the products, run by run, of what noise does to the columns: with itself,
+            (runs, k, k), and with that of the declared columns and target, (runs, k, all + 1).
+    """
+
+    columns: Sequence[Columns]
+    taken: Mapping[str, FloatArray]
+    size: FloatArray
+    noise: Mapping[Part, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -32,11 +61,15 @@ class Block:
         base: Part to candidates' columns times the base's, shape (runs, candidates, base, k).
         own: Part to candidates' columns times themselves, shape (runs, candidates, k, k).
         target: Part to candidates' columns times the target, shape (runs, candidates, k).
+        taken: How much of each declared column was taken off them, (candidates, declared, k).
+        noise: As of `Laid`, with candidates after runs.
     """
 
     base: Mapping[Part, FloatArray]
     own: Mapping[Part, FloatArray]
     target: Mapping[Part, FloatArray]
+    taken: FloatArray
+    noise: Mapping[Part, tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -47,11 +80,16 @@ class Outcome:
         errors: For each family of folds, part to squared error, shape (runs, candidates).
         amplitudes: On all runs, shape (candidates, k).
         base: Parameters of the base on all runs, shape (candidates, base).
+        cross: Products of the columns with the base's residual within runs, weighted, shape
+            (runs, candidates, k).
+        own: Products of the columns with themselves, shape (runs, candidates, k, k).
     """
 
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
     base: FloatArray
+    cross: FloatArray
+    own: FloatArray
 
 
 class Joint:
@@ -65,8 +103,13 @@ class Joint:
         ]
         self._tables: list[dict[Part, FloatArray]] = [self._laid(run) for run in self.runs]
         self.samples = {p: np.array([float(len(t[p])) for t in self._tables]) for p in self.parts}
-        self._gram = self._products()
+        self._gram, self._added = self._products(), np.zeros(0)
+        self._declared_size = self.size
+        self._taken = np.zeros((self.size, 0))
+        self._noise = self._noise_products()
         self.error = self._declared_error()
+        self._prepare()
+        self._declared = self._fitted()[1]
         self._instrumented = [self._instruments(run) for run in self.runs]
         self._projector = self._projectors()
         weights = self.weights
@@ -141,28 +184,129 @@ class Joint:
 
     def _declared_error(self) -> Mapping[Part, float]:
         """Return the mean squared residual of the declared model in each part."""
-        count = len(self.runs)
-        self.error = dict.fromkeys(self.parts, 1.0)
+        error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
         for _ in range(5):
-            vector = np.append(_solved(self._weighted()), -1.0)
+            self.error = error
+            self._prepare()
+            vector = np.append(self._fitted()[1], -1.0)
             for p in self.parts:
                 value = float(np.einsum("i,rij,j->", vector, self._gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
-                self.error[p] = max(spare * value / self.samples[p].sum(), TINY)
-        return self.error
+                error[p] = max(spare * value / self.samples[p].sum(), TINY)
+        return error
 
-    def _weighted(self, left_out: Sequence[int] = ()) -> FloatArray:
-        kept = [i for i in range(len(self.runs)) if i not in set(left_out)]
+    def _avoided(
+        self, part: Part, run: int, declared: FloatArray, more: FloatArray | float = 0.0
+    ) -> FloatArray:
+        """Return the error that is missing because a noisy reading got a smaller amplitude.
+
+        A cause that stands in for a noisy reading removes that reading's noise. This is no merit
+        of the cause: what it removes so is put back.
+
+        Args:
+            part: Of the regression.
+            run: Number of the run.
+            declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
+            more: Error that the noise of a cause's own columns makes, shape (...).
+        """
+        if part[1] == "between":
+            return np.zeros(declared.shape[:-1])
+        noise = self._noise[part][run]
+
+        def shown(own: FloatArray) -> FloatArray:
+            return np.asarray(((own @ noise[:-1, :-1]) * own).sum(-1) - 2.0 * own @ noise[:-1, -1])
+
+        return np.maximum(shown(self._declared) - shown(declared) - more, 0.0)
+
+    def _whole(self, base: FloatArray) -> FloatArray:
+        """Return amplitudes of the declared columns, with what was taken off those of causes.
+
+        Args:
+            base: Parameters of the base, shape (..., base).
+        """
+        count = base.shape[-1] - self._taken.shape[1]
+        return np.asarray(base[..., :count] - base[..., count:] @ self._taken.T)
+
+    def _taken_off(self, laid: Laid) -> FloatArray:
+        """Return how much of every declared column was taken off a cause's, (declared, k)."""
+        rows = []
+        for equation in self.layout.equations.values():
+            none = np.zeros((len(equation.of_channel), len(laid.size)))
+            rows.append(laid.taken.get(equation.name, none))
+        return np.vstack([*rows, np.zeros((len(self.layout.equations), len(laid.size)))])
+
+    def _noise_columns(self, run: RunSignals, equation: Equation) -> FloatArray:
+        """Return the noise of all declared columns and the target in one equation, (n, all + 1)."""
+        at = 0
+        for other in self.layout.equations.values():
+            if other.name == equation.name:
+                break
+            at += len(other.of_channel)
+        noise = equation.noise(run)[run.grid[run.used[equation.name]]]
+        out = np.zeros((len(noise), self._declared_size + 1))
+        out[:, at : at + noise.shape[1] - 1] = noise[:, :-1]
+        out[:, -1] = noise[:, -1]
+        return out
+
+    def _noise_products(self) -> Mapping[Part, FloatArray]:
+        """Return the noise in the cross-products within runs; the target's own is left in."""
+        size = self._declared_size + 1
+        out = {p: np.zeros((len(self.runs), size, size)) for p in self.parts}
+        for equation in self.layout.equations.values():
+            part = (equation.name, "within")
+            for r, run in enumerate(self.runs):
+                noise = self._noise_columns(run, equation)
+                product = noise.T @ noise
+                product[-1, -1] = 0.0
+                own = [*np.flatnonzero(noise[:, :-1].any(axis=0)), size - 1]
+                inner = np.ix_(own, own)
+                out[part][r][inner] = _at_most(product[inner], self._gram[part][r][inner])
+        return out
+
+    def _weighted(self) -> FloatArray:
+        """Return the weighted cross-products of each run, without most of the known noise."""
+        size, weights = self._declared_size, self.weights
+        total = sum((weights[p] * self._gram[p] for p in self.parts), start=np.zeros(()))
+        noise = sum((weights[p] * self._noise[p] for p in self.parts), start=np.zeros(()))
+        inner = np.array([*range(size), -1])
+        total[:, inner[:, None], inner] -= NOISE_TAKEN * noise
+        return np.asarray(total)
+
+    def _fitted(self, left_out: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
+        """Return the inverse of the base's normal matrix without some runs, and its parameters."""
+        key = tuple(left_out)
+        if key not in self._fits:
+            gram = self._whole_gram - self._run_grams[list(key)].sum(axis=0)
+            gram[np.diag_indices(self.size)] += self._prior
+            inverse = _inverse(gram[:-1, :-1])
+            self._fits[key] = inverse, np.asarray(inverse @ gram[:-1, -1])
+        return self._fits[key]
+
+    def _prepare(self) -> None:
+        """Work out what all fits of this base share."""
+        self._run_grams = self._weighted()
+        self._whole_gram = self._run_grams.sum(axis=0)
+        self._prior = self._prior_precision()
+        self._fits: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+
+    def _prior_precision(self) -> FloatArray:
+        """Return the prior precision of the base: no term exceeds half of all signals.
+
+        A shape is known to within its own size.
+        """
         weights = self.weights
-        total: FloatArray = sum(
-            (weights[p] * self._gram[p][kept].sum(axis=0) for p in self.parts),
-            start=np.zeros(()),
+        whole = sum(
+            (weights[p] * self._gram[p].sum(axis=0) for p in self.parts), start=np.zeros(())
         )
-        return total
+        precision = 4.0 * np.diag(whole)[:-1] / float(whole[-1, -1])
+        shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
+        precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
+        precision[len(precision) - len(self._added) :] = self._added
+        return np.asarray(precision)
 
     # ---- candidates
 
-    def laid(self, columns: Sequence[Mapping[str, FloatArray]], unit: bool) -> list[Columns]:
+    def laid(self, columns: Sequence[Mapping[str, FloatArray]], unit: Scale) -> Laid:
         """Return a candidate's columns of every run, without what the declared columns explain.
 
         The declared columns are those of the instrumented signals, so that a candidate does not
@@ -170,9 +314,10 @@ class Joint:
 
         Args:
             columns: Equation to the columns, one mapping a run.
-            unit: Scale each column to weighted norm one, for amplitudes of one prior width.
+            unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
         """
         weights, out = self.weights, [dict[Part, FloatArray]() for _ in columns]
+        taken = {}
         norm: FloatArray = np.zeros(())
         for name in columns[0]:
             within, between = weights[name, "within"], weights[name, "between"]
@@ -187,19 +332,24 @@ class Joint:
                 part = np.vstack([base.T @ x, np.zeros((1, x.shape[1]))])
                 right = right + within * part + between * np.outer(bases[-1][1], mean)
                 norm = norm + within * (x * x).sum(axis=0) + between * mean * mean
-            slope = self._projector[name] @ right
+            slope = taken[name] = self._projector[name] @ right
             for i, (base, middle) in enumerate(bases):
                 out[i][name, "within"] = inner[i] - base @ slope[:-1]
                 out[i][name, "between"] = (means[i] - middle @ slope)[None]
-        if not unit:
-            return list(out)
-        size = np.sqrt(norm) + TINY
-        return [{p: values / size for p, values in own.items()} for own in out]
+        each = np.sqrt(norm) + TINY
+        size = {"each": each, "first": np.full_like(each, each[0]), "none": np.ones_like(each)}[
+            unit
+        ]
+        return Laid(
+            [{p: x / size for p, x in own.items()} for own in out],
+            {name: slope[:-1] / size for name, slope in taken.items()},
+            size,
+        )
 
-    def block(self, candidates: Sequence[Sequence[Columns]]) -> Block:
+    def block(self, laid: Sequence[Laid]) -> Block:
         """Return the cross-products of candidates that have as many columns each."""
-        count, runs = len(candidates), len(self.runs)
-        k = next(iter(candidates[0][0].values())).shape[1]
+        candidates = [one.columns for one in laid]
+        count, runs, k = len(laid), len(self.runs), len(laid[0].size)
         base, own, target = {}, {}, {}
         for p in self.parts:
             there = [j for j, c in enumerate(candidates) if p in c[0]]
@@ -216,7 +366,30 @@ class Joint:
                 target[p][r, there] = product[-1]
                 turned = columns.transpose(1, 2, 0)
                 own[p][r, there] = turned @ turned.transpose(0, 2, 1)
-        return Block(base, own, target)
+        noise = {}
+        for p in {p for one in laid for p in one.noise}:
+            none = np.zeros((runs, k, k)), np.zeros((runs, k, self._noise[p].shape[1]))
+            pairs = [one.noise.get(p, none) for one in laid]
+            noise[p] = np.stack([a for a, _ in pairs], 1), np.stack([b for _, b in pairs], 1)
+        taken = np.array([self._taken_off(one) for one in laid])
+        return Block(base, own, target, taken, noise)
+
+    def with_noise(self, laid: Laid, noise: Sequence[Mapping[str, FloatArray]]) -> Laid:
+        """Return a candidate with what noise does to its columns.
+
+        Args:
+            laid: The candidate.
+            noise: Equation to the change of the columns, one mapping a run.
+        """
+        products = {}
+        for name in noise[0]:
+            own, cross = [], []
+            for run, change in zip(self.runs, noise, strict=True):
+                scaled = change[name] / laid.size
+                own.append(scaled.T @ scaled)
+                cross.append(scaled.T @ self._noise_columns(run, self.layout.equations[name]))
+            products[name, "within"] = np.array(own), np.array(cross)
+        return replace(laid, noise=products)
 
     def evaluate(
         self,
@@ -237,16 +410,13 @@ class Joint:
             for kind in (block.base, block.own, block.target)
         ]
         wholes = [s.sum(axis=0) for s in sums]
-        whole = self._weighted()
 
         def fitted(left_out: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-            gram = self._weighted(left_out) if left_out else whole
+            inverse, alone = self._fitted(left_out)
             cross, own, right = (
                 w - s[list(left_out)].sum(axis=0) if left_out else w
                 for w, s in zip(wholes, sums, strict=True)
             )
-            inverse = _inverse(gram[:-1, :-1])
-            alone = inverse @ gram[:-1, -1]
             through = np.matmul(inverse, cross)
             eye = np.eye(own.shape[1])
             spread = 1e-9 * np.einsum("ckk->ck", own) + precision
@@ -265,7 +435,14 @@ class Joint:
                         found[p][i] = self._squared(block, p, i, base, amplitudes)
             errors.append(found)
         base, amplitudes = fitted([])
-        return Outcome(errors, amplitudes, base)
+        inside, usual = [p for p in there if p[1] == "within"], self._fitted()[1]
+        cross, own, right = (
+            sum((weights[p] * kind[p] for p in inside), start=np.zeros(()))
+            for kind in (block.base, block.own, block.target)
+        )
+        return Outcome(
+            errors, amplitudes, base, right - np.einsum("rcik,i->rck", cross, usual), own
+        )
 
     def _squared(
         self, block: Block, p: Part, run: int, base: FloatArray, amplitudes: FloatArray
@@ -276,7 +453,39 @@ class Joint:
             cross = np.einsum("ci,cik,ck->c", base, block.base[p][run], amplitudes)
             own = np.einsum("ck,ckl,cl->c", amplitudes, block.own[p][run], amplitudes)
             error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
-        return np.asarray(np.maximum(error, 0.0))
+        declared = self._whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
+        more = np.zeros(len(base))
+        if p in block.noise:
+            own, cross = (products[run] for products in block.noise[p])
+            vector = np.hstack([declared, -np.ones((len(declared), 1))])
+            more = np.einsum("ck,ckl,cl->c", amplitudes, own, amplitudes)
+            more = more + 2.0 * np.einsum("ck,ckd,cd->c", amplitudes, cross, vector)
+        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared, more))
+
+    def replaces(self, laid: Laid, base: FloatArray, amplitudes: FloatArray) -> bool:
+        """Whether a cause stands in for the largest linear term of an equation.
+
+        A reading of the target through another sensor explains any equation, with no use for the
+        declared terms. A cause comes in addition to them.
+
+        Args:
+            laid: The cause.
+            base: Parameters of the base beside it, shape (base,).
+            amplitudes: Of the cause, shape (k,).
+        """
+        now = self._whole(base) - self._taken_off(laid) @ amplitudes
+        at = 0
+        for equation in self.layout.equations.values():
+            linear = at + np.flatnonzero(equation.of_channel)
+            at += len(equation.of_channel)
+            if equation.name not in laid.taken or not len(linear):
+                continue
+            power = np.diag(self._gram[equation.name, "within"].sum(axis=0))[linear]
+            largest = linear[int(np.argmax(self._declared[linear] ** 2 * power))]
+            change = float(now[largest] / (self._declared[largest] or 1.0))
+            if not 1.0 / MOST_CHANGE < change < MOST_CHANGE:
+                return True
+        return False
 
     def base_errors(self, folds: Folds) -> Sequence[Mapping[Part, FloatArray]]:
         """Return the squared errors of the base on what was left out, one mapping a family."""
@@ -284,61 +493,99 @@ class Joint:
         for family in folds:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for left_out in family:
-                vector = np.append(_solved(self._weighted(list(left_out))), -1.0)
+                vector = np.append(self._fitted(left_out)[1], -1.0)
                 for p in self.parts:
                     for i in left_out:
-                        found[p][i] = max(float(vector @ self._gram[p][i] @ vector), 0.0)
+                        value = max(float(vector @ self._gram[p][i] @ vector), 0.0)
+                        found[p][i] = value + float(self._avoided(p, i, self._whole(vector[:-1])))
             out.append(found)
         return out
 
     def score(
         self,
+        spreads: Sequence[Mapping[Part, float]],
         before: Sequence[Mapping[Part, FloatArray]],
         after: Sequence[Mapping[Part, FloatArray]],
-    ) -> FloatArray:
-        """Return the log ratio of errors, summed over parts, shape (families, candidates)."""
-        rows = []
-        for old, new in zip(before, after, strict=True):
-            means = [
-                {p: e[p].sum(axis=0) / self.samples[p].sum() for p in self.parts}
-                for e in (old, new)
-            ]
-            rows.append(self.log_ratio(means[0], means[1]))
-        return np.array(rows)
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return scores of candidates, and those of each family of folds, (families, candidates).
 
-    def log_ratio(
-        self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
-    ) -> FloatArray:
-        """Return the log ratio of mean squared errors, summed over parts, above their floors."""
-        numbers, total = self.numbers, np.zeros(())
+        The score of a part is the mean over families. A family counts by how well the base itself
+        is known where it predicts, and at most what the family of single runs shows: where the base
+        extrapolates badly anything seems to help.
+
+        Args:
+            spreads: `extrapolated` of each family of folds.
+            before: Errors of the base, of each family.
+            after: Errors with the candidates.
+        """
+        total, by_family = np.zeros(()), [np.zeros(()) for _ in spreads]
         for p in self.parts:
-            floor, weight = numbers.form_floor * self.error[p], 1.0
-            if p[1] == "between":
-                weight = numbers.between_weight
-                floor += numbers.between_floor * self.error[p[0], "within"]
-            total = total + weight * np.log((before[p] + floor) / (after[p] + floor))
-        return np.asarray(total)
+            ratios, trusts = [], []
+            for spread, old, new in zip(spreads, before, after, strict=True):
+                pair = [(e[p].sum(axis=0) + spread[p]) / self.samples[p].sum() for e in (old, new)]
+                ratios.append(self.log_ratio(p, pair[0], pair[1]))
+                whole = float(old[p].sum()) + TINY
+                trusts.append(whole / (whole + spread[p]))
+            least = [t * np.minimum(r, ratios[0]) for t, r in zip(trusts, ratios, strict=True)]
+            total = total + np.sum(least, axis=0) / sum(trusts)
+            by_family = [f + r for f, r in zip(by_family, ratios, strict=True)]
+        return np.asarray(total), np.array(by_family)
+
+    def extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
+        """Return the squared error that the base's own uncertainty makes in what was left out."""
+        out = dict.fromkeys(self.parts, 0.0)
+        for left_out in family:
+            inverse, _ = self._fitted(left_out)
+            for p in self.parts:
+                for i in left_out:
+                    out[p] += float(np.sum(self._gram[p][i][:-1, :-1] * inverse))
+        return out
+
+    def log_ratio(self, part: Part, before: FloatArray, after: FloatArray) -> FloatArray:
+        """Return the weighted log ratio of mean squared errors of a part, above its floor."""
+        numbers, weight = self.numbers, 1.0
+        floor = numbers.form_floor * self.error[part]
+        if part[1] == "between":
+            weight = numbers.between_weight
+            floor += numbers.between_floor * self.error[part[0], "within"]
+        return np.asarray(weight * np.log((before + floor) / (after + floor)))
 
     # ---- accepted causes
 
-    def with_cause(self, columns: Sequence[Columns]) -> "Joint":
-        """Return the regression with a cause's columns in its base."""
+    def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
+        """Return the regression with a cause's columns, of a prior precision each, in its base."""
         made = object.__new__(Joint)
         made.__dict__.update(self.__dict__)
-        k = next(iter(columns[0].values())).shape[1]
+        made._added = np.append(self._added, precision)
+        made._taken = np.hstack([self._taken, self._taken_off(laid)])
+        k = len(laid.size)
         made._tables = []
-        for i, table in enumerate(self._tables):
+        for table, columns in zip(self._tables, laid.columns, strict=True):
             grown = {}
             for p in self.parts:
-                added = columns[i].get(p, np.zeros((len(table[p]), k)))
+                added = columns.get(p, np.zeros((len(table[p]), k)))
                 grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
             made._tables.append(grown)
         made._gram = made._products()
+        made._prepare()
         return made
 
 
 def _first(run: RunSignals) -> Mapping[str, FloatArray]:
     return {name: values[:8] for name, values in run.channels.items()}
+
+
+def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:
+    """Return noise products of columns and target, less than the columns' own in any direction."""
+    scale = _scales(gram[:-1, :-1])
+    inner = gram[:-1, :-1] * np.outer(scale, scale) + 1e-8 * np.eye(len(scale))
+    root = np.linalg.cholesky(inner)
+    turned = np.linalg.solve(root, noise[:-1, :-1] * np.outer(scale, scale))
+    share, axes = np.linalg.eigh(np.linalg.solve(root, turned.T))
+    kept = root @ (axes * np.clip(share, 0.0, 1.0)) @ axes.T @ root.T
+    out = noise.copy()
+    out[:-1, :-1] = kept / np.outer(scale, scale)
+    return out
 
 
 def _scales(gram: FloatArray) -> FloatArray:
@@ -349,8 +596,3 @@ def _inverse(gram: FloatArray) -> FloatArray:
     scale = _scales(gram)
     inner = gram * np.outer(scale, scale) + 1e-8 * np.eye(len(gram))
     return np.asarray(np.linalg.inv(inner) * np.outer(scale, scale))
-
-
-def _solved(gram: FloatArray) -> FloatArray:
-    """Solve a Gram matrix of columns and target."""
-    return np.asarray(_inverse(gram[:-1, :-1]) @ gram[:-1, -1])

@@ -17,9 +17,9 @@ class Numbers:
         between_floor: Share of the error within runs below which run means carry no evidence.
         knot_sd: Prior standard deviation of a smooth function's knot, of the declared error.
         sharpness: Log odds for one unit of score.
-        cause_cost: Log prior odds against one more cause.
+        cause_cost: Log prior odds against a cause.
         function_cost: Further log prior odds against an unknown form.
-        least_score: Score below which nothing is claimed.
+        bend_share: Prior standard deviation of a form's deviation from its equation, as a share.
         kept_evidence: E-value on the test runs from which a cause is kept.
     """
 
@@ -29,9 +29,9 @@ class Numbers:
     between_floor: float = 0.25
     knot_sd: float = 2.0
     sharpness: float = 25.0
-    cause_cost: float = 4.0
+    cause_cost: float = 2.0
     function_cost: float = 2.0
-    least_score: float = 0.15
+    bend_share: float = 0.3
     kept_evidence: float = 20.0
 
 

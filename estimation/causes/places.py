@@ -132,6 +132,7 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
     effort = _effort(equation)
     roles |= {"load": (effort,)}
     if equation.of_angle:
+        roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
         return Place(
             equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
         )

@@ -10,7 +10,7 @@ from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part, Refit, Solved
 from estimation.causes.search import Candidate
 from estimation.causes.sources import Source
-from estimation.causes.terms import term_of
+from estimation.causes.terms import plain, term_of
 from estimation.diagnosis.result import Error
 from estimation.diagnosis.split import Sealed
 from estimation.model import Model
@@ -120,7 +120,7 @@ def _everywhere(
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and a cause's columns there, at all of a run's places, at standstill too."""
     everything = {name: np.arange(len(run.grid)) for name in run.used}
-    columns = candidate.cause.columns(replace(run, used=everything)) or {}
+    columns = plain(candidate.cause).columns(replace(run, used=everything)) or {}
     return run.channels["time_s"][run.grid], columns[equation]
 
 

@@ -10,21 +10,24 @@ import numpy as np
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function, functions_at
-from estimation.causes.joint import Columns, Joint
+from estimation.causes.joint import Columns, Joint, Laid, Part, Scale
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.places import places_of
-from estimation.causes.sources import RELATIVE, Source, sources_at
+from estimation.causes.sources import RELATIVE, Bend, Source, sources_at
 from estimation.recording import FloatArray
 
 AT_ONCE = 3000
 """Candidates times squared columns in one block: keeps its memory small."""
 
 MOST_CAUSES = 3
+KNOTS_OF_BEND, BENT = 5, 24
+"""Hat functions of a form's deviation from its equation, and families that are given one."""
+
 REFINED = 8
 """Families whose shapes are refined after the grid."""
 
-PARTIAL = 24
-"""Families tried on some of the runs alone."""
+PARTIAL, CHOICES = 24, 6
+"""Names tried on some of the runs alone, and choices of runs of each."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +36,15 @@ class Candidate:
 
     Attributes:
         cause: The named effect or smooth function.
-        columns: Its columns of every run.
+        laid: Its columns of every run, without what the declared columns explain.
+        precision: Prior precision of every amplitude.
         acts: Runs in which it acts; in all when None.
-        choices: Points of the grid that share its family's prior probability at this place.
+        choices: Forms that share the prior probability of a cause, times the points of its grid.
     """
 
     cause: Source | Function
-    columns: Sequence[Columns]
+    laid: Laid
+    precision: FloatArray
     acts: tuple[bool, ...] | None = None
     choices: int = 1
 
@@ -48,6 +53,11 @@ class Candidate:
         """What is claimed: place, family, and the variables of a function."""
         variables = self.cause.variables if isinstance(self.cause, Function) else ()
         return self.cause.place.name, self.cause.family, variables
+
+    @property
+    def columns(self) -> Sequence[Columns]:
+        """Its columns of every run."""
+        return self.laid.columns
 
     @property
     def is_function(self) -> bool:
@@ -75,6 +85,7 @@ class Scored:
     score: float
     by_family: FloatArray
     amplitudes: FloatArray
+    by_run: tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -104,7 +115,7 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     joint, folds = Joint(train, numbers), folds_of(train)
     pool = candidates(train, joint)
     first = _ranked(joint, pool, folds, numbers)
-    if not first or first[0].score < numbers.least_score:
+    if not first or first[0].score < 0.0:
         return Found([], [], joint, first[0].score if first else 0.0)
     chains = [_chain(joint, start, pool, folds, numbers) for start in _starts(first)]
     causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
@@ -130,10 +141,9 @@ def _chain(
 ) -> list[Scored]:
     """Return a set of causes, extended one at a time while another one is worth its price."""
     causes = [start]
-    least = max(numbers.least_score, numbers.cause_cost / numbers.sharpness)
     while len(causes) < MOST_CAUSES:
         ranked = _ranked(_with(joint, causes), pool, folds, numbers)
-        if not ranked or ranked[0].score < least:
+        if not ranked or ranked[0].score < 0.0:
             break
         causes.append(ranked[0])
     return causes
@@ -149,7 +159,7 @@ def candidates(train: Layout, joint: Joint) -> list[Candidate]:
             if laid is not None:
                 out.append(laid)
     count = Counter(_form(c) for c in out)
-    return [replace(c, choices=count[_form(c)]) for c in out]
+    return [replace(c, choices=count[_form(c)] * len(count)) for c in out]
 
 
 def _form(candidate: Candidate) -> tuple[str, str]:
@@ -172,7 +182,7 @@ def evaluate(
     joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
     """Return the score of each candidate given the base; those of a wrong sign are left out."""
-    before = joint.base_errors(folds)
+    base = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
     by_width: dict[int, list[Candidate]] = {}
     for candidate in pool:
         by_width.setdefault(candidate.width, []).append(candidate)
@@ -181,7 +191,7 @@ def evaluate(
         size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
         for start in range(0, len(group), size):
             part = group[start : start + size]
-            out += _evaluated(joint, part, folds, before, numbers)
+            out += _evaluated(joint, part, folds, base, numbers)
     return out
 
 
@@ -189,36 +199,39 @@ def _evaluated(
     joint: Joint,
     part: list[Candidate],
     folds: Folds,
-    before: Sequence[Mapping[tuple[str, str], FloatArray]],
+    base: tuple[Sequence[Mapping[Part, FloatArray]], Sequence[Mapping[Part, float]]],
     numbers: Numbers,
 ) -> list[Scored]:
-    precision = np.vstack([_precision(joint, c, numbers) for c in part])
-    outcome = joint.evaluate(joint.block([c.columns for c in part]), folds, precision)
-    scores = joint.score(before, outcome.errors)
+    precision = np.vstack([c.precision for c in part])
+    outcome = joint.evaluate(joint.block([c.laid for c in part]), folds, precision)
+    before, spreads = base
+    scores, by_family = joint.score(spreads, before, outcome.errors)
     out = []
     for k, candidate in enumerate(part):
         amplitudes = outcome.amplitudes[k]
         if _sign_is_wrong(candidate, amplitudes):
             continue
-        # a level of a condition counts at most what the runs show: where the base alone
-        # extrapolates badly anything seems to help
-        score = float(np.minimum(scores[:, k], scores[0, k]).mean()) - _price(candidate, numbers)
-        out.append(Scored(candidate, score, scores[:, k], amplitudes))
+        if joint.replaces(candidate.laid, outcome.base[k], amplitudes):
+            continue
+        score = float(scores[k]) - _price(candidate, numbers)
+        by_run = outcome.cross[:, k], outcome.own[:, k]
+        out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
     return out
 
 
-def _precision(joint: Joint, candidate: Candidate, numbers: Numbers) -> FloatArray:
+def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> FloatArray:
     """Return the prior precision of each amplitude.
 
     A named effect, scaled to norm one, is not larger than half of all signals; a smooth function's
     knots have a standard deviation of so many declared errors.
     """
-    everything = np.full(candidate.width, 4.0 / joint.power)
-    if not candidate.is_function:
-        return everything
-    enters = candidate.cause.place.enters
-    knot = np.mean([e.gain**2 / joint.error[e.equation, "within"] for e in enters])
-    return np.asarray(everything + knot / numbers.knot_sd**2)
+    everything = np.full(len(size), 4.0 / joint.power)
+    if isinstance(cause, Function):
+        knot = [e.gain**2 / joint.error[e.equation, "within"] for e in cause.place.enters]
+        return np.asarray(everything + np.mean(knot) / joint.numbers.knot_sd**2)
+    if cause.bend is not None:
+        everything[1:] += 1.0 / (cause.bend.sd * size[1:]) ** 2
+    return everything
 
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
@@ -232,10 +245,11 @@ def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
 def _price(candidate: Candidate, numbers: Numbers) -> float:
     """Return the price of what was chosen: the logarithm of how many choices there were.
 
-    A family's prior probability at a place is shared by the points of its grid, that of an unknown
-    form by the sets of variables, and that of acting in some of the runs by all choices of them.
+    The prior probability of a cause is shared by all forms at all places, that of a form by the
+    points of its grid, that of an unknown form by the sets of variables, and that of acting in some
+    of the runs by all choices of them.
     """
-    price = float(np.log(candidate.choices))
+    price = numbers.cause_cost + float(np.log(candidate.choices))
     if candidate.is_function:
         price += numbers.function_cost
     if candidate.acts is not None:
@@ -250,14 +264,33 @@ def _ranked(
     joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
     """Return the best of each name: on the grid, refined, and on some of the runs."""
-    best = best_of_each(evaluate(joint, pool, folds, numbers))
+    everything = evaluate(joint, pool, folds, numbers)
+    best = best_of_each(everything)
     if not best:
         return []
     near = [c for s in best[:REFINED] for c in _neighbours(joint, s.candidate)]
     finer = evaluate(joint, near, folds, numbers) if near else []
     best = best_of_each([*best, *finer])
-    some = _on_some_runs(joint, best[:PARTIAL], folds, numbers)
-    return best_of_each([*best, *some])
+    bent = [c for s in best[:BENT] if (c := _bent(joint, s, numbers)) is not None]
+    some = _on_some_runs(joint, everything, folds, numbers)
+    return best_of_each([*best, *evaluate(joint, bent, folds, numbers), *some])
+
+
+def _bent(joint: Joint, scored: Scored, numbers: Numbers) -> Candidate | None:
+    """Return a named effect of one column with a form that deviates from its equation."""
+    candidate, cause = scored.candidate, scored.candidate.cause
+    if isinstance(cause, Function) or candidate.width != 1:
+        return None
+    signals = [cause.signal(run, cause.place.home) for run in joint.runs]
+    values = np.concatenate([x[:, 0] for x in signals if x is not None])
+    low, high = np.percentile(values, (1.0, 99.0))
+    amplitude = abs(float(scored.amplitudes[0] / candidate.laid.size[0]))
+    if not high > low or amplitude == 0.0:
+        return None
+    knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
+    bent = replace(cause, bend=Bend(knots, numbers.bend_share * amplitude))
+    laid = laid_out(joint.layout, joint, bent, candidate.acts)
+    return None if laid is None else replace(laid, choices=candidate.choices)
 
 
 def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
@@ -285,39 +318,58 @@ def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
 
 
 def _on_some_runs(
-    joint: Joint,
-    best: Sequence[Scored],
-    folds: Folds,
-    numbers: Numbers,
+    joint: Joint, scored: Sequence[Scored], folds: Folds, numbers: Numbers
 ) -> list[Scored]:
-    """Return candidates that act in the runs whose own amplitude is unlike zero.
+    """Return named effects that act in some of the runs.
 
-    Runs are ordered by the amplitude that each of them asks for; every cut of that order and every
-    cut of the order of recording is a choice of runs.
+    Every effect is tried on cuts of two orders of the runs: of recording, and of the error that it
+    removes in each of them. The choices of runs that promise most are scored like all others.
     """
     count = len(joint.runs)
     if count < 6:
         return []
-    tried = []
-    for scored in best:
-        if scored.candidate.is_function:
+    promise = []
+    for one in scored:
+        if one.candidate.is_function:
             continue
-        for acts in _cuts(count):
-            laid = laid_out(joint.layout, joint, scored.candidate.cause, acts)
-            if laid is not None:
-                tried.append(replace(laid, choices=scored.candidate.choices))
+        cross, own = one.by_run
+        gains = _removed(cross, own)
+        for order in (np.arange(count), np.argsort(gains)[::-1]):
+            for part in (order, order[::-1]):
+                sums = [np.cumsum(x[part], axis=0)[1:-1] for x in (cross, own)]
+                removed = _removed(*sums)
+                promise += [
+                    (float(r), one.candidate, tuple(int(i) for i in sorted(part[: k + 2])))
+                    for k, r in enumerate(removed)
+                ]
+    promise.sort(key=lambda p: -p[0])
+    tried, seen = [], dict[object, set[tuple[int, ...]]]()
+    for _, candidate, chosen in promise:
+        if candidate.name not in seen and len(seen) == PARTIAL:
+            continue
+        known = seen.setdefault(candidate.name, set())
+        if len(known) == CHOICES or chosen in known:
+            continue
+        known.add(chosen)
+        acts = tuple(k in chosen for k in range(count))
+        laid = laid_out(joint.layout, joint, candidate.cause, acts)
+        if laid is not None:
+            tried.append(replace(laid, choices=candidate.choices))
     return evaluate(joint, tried, folds, numbers)
 
 
-def _cuts(count: int) -> list[tuple[bool, ...]]:
-    order = range(count)
-    early = [tuple(k < cut for k in order) for cut in range(2, count - 1)]
-    return early + [tuple(not x for x in one) for one in early]
+def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the error that amplitudes remove, from products (n, k) and (n, k, k)."""
+    size = np.einsum("nkk->n", own)[:, None, None]
+    steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[1])
+    return np.asarray(
+        np.einsum("nk,nk->n", cross, np.linalg.solve(steady, cross[..., None])[..., 0])
+    )
 
 
 def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
     for cause in causes:
-        joint = joint.with_cause(cause.candidate.columns)
+        joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
     return joint
 
 
@@ -340,10 +392,21 @@ def laid_out(
         if acts is not None and not acts[k]:
             own = {name: np.zeros_like(values) for name, values in own.items()}
         columns.append(own)
-    laid = joint.laid(columns, unit=isinstance(cause, Source))
-    if acts is not None:  # what starts between runs also shifts their means, by its own offset
-        laid = [
-            {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
-            for own in laid
+    unit: Scale = "none" if isinstance(cause, Function) else "first" if cause.bend else "each"
+    laid = joint.laid(columns, unit)
+    noise = [cause.noise(run) for run in layout.runs]
+    if acts is not None:
+        noise = [
+            {name: on * x for name, x in one.items()} for on, one in zip(acts, noise, strict=True)
         ]
-    return Candidate(cause, laid, acts)
+    if all(noise):
+        laid = joint.with_noise(laid, noise)
+    if acts is not None:  # what starts between runs also shifts their means, by its own offset
+        laid = replace(
+            laid,
+            columns=[
+                {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
+                for own in laid.columns
+            ],
+        )
+    return Candidate(cause, laid, _precision(joint, cause, laid.size), acts)

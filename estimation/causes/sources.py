@@ -7,11 +7,11 @@ effect that is not distinguishable from a simpler one over that range is left ou
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.causes.equations import ANGLES, Layout, RunSignals
+from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
@@ -56,8 +56,24 @@ FILTERS = (
 )
 """Effects that pass a reading through a linear filter, as smoothing its noise does."""
 
+TURNING = ("motor_angle", "output_angle", "encoder")
+CLOCKS = ("clock", "elapsed", "campaign_clock")
+
 LEAST_PERIODS = 1.5
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """How far a cause's true form may be from its equation: source(x) (1 + smooth function of it).
+
+    Attributes:
+        knots: Values of the source at which hat functions stand.
+        sd: Prior standard deviation of a knot's own amplitude.
+    """
+
+    knots: tuple[float, ...]
+    sd: float
 
 
 @dataclass(frozen=True)
@@ -70,6 +86,10 @@ class Source:
         channels: Role to the channel that plays it, before instruments.
         shape: Values of its shape parameters.
         parts: Which of its columns take part, so that simpler forms compete too.
+        odd: Whether half the difference to the same filter backwards in time stands in for it: its
+            correlation with the stationary noise of what it reads is zero.
+        follows: Whether its memory may follow the noise of what it reads.
+        bend: Its deviation from its equation, after the column itself; none if None.
     """
 
     place: Place
@@ -77,6 +97,9 @@ class Source:
     channels: tuple[tuple[str, str], ...]
     shape: tuple[float, ...]
     parts: tuple[int, ...]
+    odd: bool = False
+    follows: bool = False
+    bend: Bend | None = None
 
     @property
     def family(self) -> str:
@@ -91,16 +114,34 @@ class Source:
         return next(iter(self.effect.balances.values()), 1)
 
     def signal(self, run: RunSignals, equation: str) -> FloatArray | None:
-        """Return the source's columns in one equation at the run's grid, (n, parts).
+        """Return the source's columns in one equation over the whole run, (n, parts).
 
         None where a column is not finite.
         """
         names = tuple(signal(run, channel, equation) for _, channel in self.channels)
-        key = (self.effect.id, self.shape, names)
+        key = (self.effect.id, self.shape, names, self.odd)
         if key not in run.memo:
-            run.memo[key] = _worked_out(self.effect, self.channels, names, self.shape, run)
+            run.memo[key] = _worked_out(self, names, run)
         found = run.memo[key]
-        return None if found is None else found[:, list(self.parts)]
+        if found is None:
+            return None
+        found = found[:, list(self.parts)]
+        if self.bend is not None:
+            inside = np.clip(found[:, 0], self.bend.knots[0], self.bend.knots[-1])
+            hats = [np.interp(inside, self.bend.knots, row) for row in np.eye(len(self.bend.knots))]
+            found = np.column_stack([found, found * np.array(hats).T])
+        return found
+
+    def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
+        """Return what its readings' noise does to its columns, where its memory may follow that."""
+        if not self.follows:
+            return {}
+        readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}
+        shaken = replace(run, channels={**run.channels, **readings})
+        usual, other = self.columns(run), self.columns(shaken)
+        if usual is None or other is None:
+            return {}
+        return {name: other[name] - values for name, values in usual.items()}
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
@@ -109,7 +150,7 @@ class Source:
             found = self.signal(run, entry.equation)
             if found is None:
                 return None
-            column = entry.gain * self.side * _derived(found, run, entry.order)
+            column = entry.gain * self.side * _derived(found, run.rate_hz, entry.order)[run.grid]
             used = column[run.used[entry.equation]]
             made[entry.equation] = made[entry.equation] + used if entry.equation in made else used
         return made
@@ -125,21 +166,21 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
-            if effect.id.startswith(FILTERS) and _reads_own_noise(layout, place, channels):
-                continue
+            own = bool(effect.start()) and _reads_own_noise(layout, place, channels)
+            odd = own and effect.id.startswith(FILTERS)
             for shape in _grid(layout, place, effect, dict(channels)):
                 for parts in _parts(effect):
-                    yield Source(place, effect, tuple(channels), shape, parts)
+                    yield Source(place, effect, tuple(channels), shape, parts, odd, own and not odd)
 
 
 def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
-    """Whether an effort is read that some equation has from its own sensors alone.
+    """Whether a reading has noise that is also in some equation's residual.
 
-    A filter of such a reading explains that sensor's noise: a second sensor is needed.
+    A filter of such a reading explains that sensor's noise.
     """
-    efforts = [c for _, c in channels if c in layout.measured and not c.endswith(ANGLES)]
+    readings = [c for _, c in channels if c in layout.measured]
     return any(
-        (c, entry.equation) not in layout.independent for c in efforts for entry in place.enters
+        (c, entry.equation) not in layout.independent for c in readings for entry in place.enters
     )
 
 
@@ -222,7 +263,7 @@ def _axis(
     if parameter.name == "middle":
         return [0.0]  # play is crossed where the load changes its side
     if parameter.name == "order":
-        role = next(r for r in ("motor_angle", "output_angle", "encoder") if r in channels)
+        role = next(r for r in TURNING if r in channels)
         return _orders(layout, effect, channels[role])
     relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.unit in channels and relative is not None:
@@ -288,25 +329,35 @@ def _range(layout: Layout, channel: str) -> tuple[float, float]:
     return low, high
 
 
-def _worked_out(
-    effect: Effect,
-    channels: Sequence[tuple[str, str]],
-    names: Sequence[str],
-    shape: Sequence[float],
-    run: RunSignals,
-) -> FloatArray | None:
-    roles = [role for role, _ in channels]
-    if effect.start():
-        whole = {r: run.channels[n] for r, n in zip(roles, names, strict=True)}
-        columns = effect.columns(whole, shape)[run.grid]
-    else:
-        there = {r: run.on_grid(n) for r, n in zip(roles, names, strict=True)}
-        columns = effect.columns(there, shape)
-    return columns if np.isfinite(columns).all() else None
+def _worked_out(source: Source, names: Sequence[str], run: RunSignals) -> FloatArray | None:
+    effect, roles = source.effect, [role for role, _ in source.channels]
+    seen = {r: run.channels[n] for r, n in zip(roles, names, strict=True)}
+    columns = effect.columns(seen, source.shape)
+    if source.odd:
+        back = {r: x[::-1] if r not in CLOCKS else x[-1] - x[::-1] for r, x in seen.items()}
+        columns = 0.5 * (columns - effect.columns(back, source.shape)[::-1])
+    if not np.isfinite(columns).all():
+        return None
+    order = next(
+        (x for p, x in zip(effect.shape, source.shape, strict=True) if p.name == "order"), None
+    )
+    if order is not None:
+        angle = next(seen[r] for r in TURNING if r in seen)
+        columns = columns * _passed(run, order * angle)[:, None]
+    return columns
 
 
-def _derived(columns: FloatArray, run: RunSignals, order: int) -> FloatArray:
-    """Return the time derivative of columns on the grid, of order 0 to 2."""
+def _passed(run: RunSignals, phase_rad: FloatArray) -> FloatArray:
+    """Return the gain that the channels' filter, forwards and backwards, has on a wave."""
+    frequency_hz = np.abs(np.gradient(phase_rad)) * run.rate_hz / (2 * math.pi)
+    low_pass = run.low_pass
+    return np.asarray(1.0 / (1.0 + (frequency_hz / low_pass.cutoff_hz) ** (2 * low_pass.order)))
+
+
+def _derived(columns: FloatArray, rate_hz: float, order: int) -> FloatArray:
+    """Return the time derivative of columns of order 0 to 2, by differences over five samples."""
     for _ in range(order):
-        columns = np.gradient(columns, run.grid / run.rate_hz, axis=0)
+        wide = np.pad(columns, ((2, 2), (0, 0)), mode="edge")
+        near, far = wide[3:-1] - wide[1:-3], wide[4:] - wide[:-4]
+        columns = (8.0 * near - far) * (rate_hz / 12.0)
     return columns

@@ -141,7 +141,7 @@ def answer(
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
     layout = lay_out(models, timed, sealed.discover)
-    add_instruments(layout)
+    add_instruments(layout, sealed.discover)
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
         found = search(layout.select(sealed.discover), numbers)
@@ -248,7 +248,8 @@ def _named(one: Kept, may_name: bool) -> Finding:
     """Return the claim of a cause, without its errors."""
     cause = one.scored.candidate.cause
     home = cause.place.home
-    lead, covered, others = one.likely[0], one.likely[0].share, []
+    lead = one.likely[0]
+    covered, others = lead.share, list[str]()
     for likely in one.likely[1:]:
         if covered >= (SURE if not others else IN_SET):
             break

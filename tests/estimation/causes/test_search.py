@@ -31,7 +31,7 @@ def _rippled(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArr
 def _found(runs: list[Recording]) -> list[tuple[str, str, tuple[str, ...]]]:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
-    add_instruments(layout)
+    add_instruments(layout, sealed.discover)
     found = search(layout.select(sealed.discover))
     return [c.candidate.name for c in found.causes]
 
@@ -96,7 +96,7 @@ def test_no_candidate_reads_a_channel_that_no_equation_declares(
         copy = scale * (np.cumsum(target) / 250 if integrated else target)
         runs.append(run.with_columns(**{name: copy + random.normal(0, noise, len(copy))}))
     layout = lay_out([motor()], runs, [r.name for r in runs])
-    add_instruments(layout)
+    add_instruments(layout, [r.name for r in runs])
     read = {
         channel
         for place in places_of(layout)
@@ -107,20 +107,23 @@ def test_no_candidate_reads_a_channel_that_no_equation_declares(
 
 
 def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> None:
-    runs = recordings(runs=6)
-    layout = lay_out([motor()], runs, [r.name for r in runs])
-    add_instruments(layout)
-    run = layout.runs[0]
-    columns = [(s, s.columns(run)) for p in places_of(layout) for s in sources_at(layout, p)]
-    noise = np.random.default_rng(1).normal(0, 1.0, len(run.channels["time_s"]))
-    run.channels["proximal_torque_n_m"] = run.channels["proximal_torque_n_m"] + noise
-    run.memo.clear()
-    add_instruments(layout)
-    for source, before in columns:
-        after = source.columns(run)
-        assert (before is None) == (after is None)
-        if before is not None and after is not None:
-            np.testing.assert_allclose(after["motor"], before["motor"], rtol=1e-9, atol=1e-12)
+    quiet, random = recordings(runs=6), np.random.default_rng(1)
+    noisy = []
+    for run in quiet:
+        torque = run["proximal_torque_n_m"]
+        noise = random.normal(0, np.std(torque), len(torque))
+        noisy.append(run.with_columns(proximal_torque_n_m=torque + noise))
+    names = [r.name for r in quiet]
+    layouts = [lay_out([motor()], runs, names) for runs in (quiet, noisy)]
+    add_instruments(layouts[1], names)
+    run, channel = layouts[1].runs[0], "proximal_torque_n_m"
+    added = (run.channels[channel] - layouts[0].runs[0].channels[channel])[run.grid]
+    for place in places_of(layouts[1]):
+        for source in sources_at(layouts[1], place):
+            columns = source.columns(run)
+            for column in [] if columns is None else columns["motor"].T:
+                if np.std(column) > 0.0 and not source.follows:
+                    assert abs(np.corrcoef(column, added[run.used["motor"]])[0, 1]) < 0.3
 
 
 def test_each_family_of_folds_leaves_every_run_out_once() -> None:
@@ -136,7 +139,7 @@ def test_probabilities_of_families_sum_to_one() -> None:
     runs = recordings(_rippled)
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
-    add_instruments(layout)
+    add_instruments(layout, sealed.discover)
     found = search(layout.select(sealed.discover))
     for ranked in found.conditional:
         assert sum(p.share for p in family_probabilities(ranked, DEFAULT)) == pytest.approx(1.0)
