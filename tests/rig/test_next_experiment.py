@@ -25,7 +25,7 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def rippled() -> list[Recording]:
-    return on_one_clock(record(HiddenEffect("motor_ripple", 0.5)))
+    return on_one_clock(record(HiddenEffect("motor_ripple", 1.0)))
 
 
 @pytest.fixture(scope="module")
