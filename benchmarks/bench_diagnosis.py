@@ -83,8 +83,9 @@ def _cost(recordings: tuple[Recording, ...], share: float) -> Cost:
 
     def search() -> None:
         nonlocal tried
-        layout = lay_out([model], recordings, [r.name for r in recordings])
-        add_instruments(layout)
+        names = [r.name for r in recordings]
+        layout = lay_out([model], recordings, names)
+        add_instruments(layout, names)
         joint = Joint(layout)
         pool = candidates(layout, joint)[::step]
         evaluate(joint, pool, folds_of(layout), DEFAULT)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from estimation.campaign import Campaign
-from estimation.derived import CAMPAIGN_TIME, settled_places
+from estimation.derived import CAMPAIGN_TIME
 from estimation.effects import Parameter, Remembering
 from estimation.errors import EstimationError
 from estimation.model import (
@@ -24,6 +24,7 @@ from estimation.model import (
     Term,
     balance_channels,
     estimate,
+    settled,
     with_values,
 )
 from estimation.recording import FloatArray, Recording
@@ -169,7 +170,7 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
     for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
-        places = settled_places(whole, model.low_pass, step, model.samples)
+        places = settled(model, whole, step)
         if places.size:
             runs.append(FitRun(whole, places, whole.at(places)))
     if not runs:

@@ -17,8 +17,6 @@ from scipy import ndimage
 from estimation.campaign import Campaign
 from estimation.derived import (
     CAMPAIGN_TIME,
-    GEAR_RATIO,
-    GEARBOX,
     measured_channels,
     origin_of,
     zero_phase_channels,
@@ -29,7 +27,8 @@ from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording, shared_columns
-from estimation.rest import SLOWEST_RAD_S, in_motion
+from estimation.rest import in_motion
+from estimation.signals import Signals
 
 SERIES_PER_CUTOFF = 5.0
 """Samples kept for each period of the filter's cutoff, for effects with memory."""
@@ -231,7 +230,7 @@ def lay_out(
     equations: dict[str, Equation] = {}
     undecided: dict[str, EstimationError] = {}
     for model in models:
-        needed = set(measured_channels([*model.channels, model.target]))
+        needed = set(measured_channels([*model.channels, model.target], model.signals))
         try:
             if lacking := needed - {*measured, "time_s", CAMPAIGN_TIME}:
                 raise LayoutError(
@@ -268,19 +267,20 @@ def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
     return Layout(layout.equations, runs, layout.measured)
 
 
-def sensitivity(name: str, measured: str) -> tuple[float, int] | None:
+def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:
     """Return how a channel follows an error of a measured one: (gain, times differentiated).
 
     Args:
         name: Measured or derived channel.
         measured: Measured channel whose reading is wrong.
+        signals: The machine's derived channels.
 
     Returns:
         None where the channel does not read it.
     """
-    if name == GEARBOX:
-        gains = {"motor_angle_rad": 1.0 / GEAR_RATIO, "spindle_angle_rad": -1.0}
-        return (gains[measured], 0) if measured in gains else None
+    if (combination := signals.combination(name)) is not None:
+        gain = combination.gain(measured)
+        return (gain, 0) if gain else None
     source, times = origin_of(name)
     return (1.0, times) if source == measured else None
 
@@ -323,8 +323,8 @@ def _signals(
         for rate in rates
     ]
     wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
-    low_pass = models[0].low_pass
-    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass)
+    low_pass, signals = models[0].low_pass, models[0].signals
+    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
     rate_hz = recording.sample_rate_hz
     step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -332,7 +332,8 @@ def _signals(
     spoilt[:edge] = True
     spoilt[max(len(spoilt) - edge, 0) :] = True
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
-    random = zero_phase_channels(_white_noise(recording, wanted), wanted, low_pass)
+    reading = measured_channels((n for n in wanted if n != CAMPAIGN_TIME), signals)
+    random = zero_phase_channels(_white_noise(recording, reading), wanted, low_pass, signals)
     noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
@@ -344,7 +345,7 @@ def _signals(
     for equation in equations.values():
         moving = np.ones(len(valid), bool)
         if equation.speed and equation.model.counted != "all":
-            slowest = SLOWEST_RAD_S.get(equation.speed, 0.0)
+            slowest = equation.model.signals.rest.get(equation.speed, 0.0)
             moving = in_motion(channels[equation.speed], valid, rate_hz, slowest)
         used[equation.name] = np.flatnonzero(moving[grid])
         if len(used[equation.name]) < 20:
@@ -357,10 +358,9 @@ def _signals(
     return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
 
 
-def _white_noise(recording: Recording, names: Sequence[str]) -> Recording:
+def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:
     """Return a recording of white noise, as wide in each channel as that channel's own."""
     random = np.random.default_rng(0)
-    measured = measured_channels(n for n in names if n != CAMPAIGN_TIME)
     return recording.with_columns(
         **{n: _noise_width(recording[n]) * random.standard_normal(len(recording)) for n in measured}
     )

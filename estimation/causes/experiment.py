@@ -12,14 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
-from estimation.causes.equations import Layout, LayoutError, RunSignals, laid_out_like
+from estimation.causes.equations import Layout, LayoutError, laid_out_like
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
-from estimation.causes.search import Candidate, Scored
+from estimation.causes.joint import Joint
+from estimation.causes.search import Scored
 from estimation.causes.sources import Source
-from estimation.causes.terms import plain
 from estimation.causes.verdict import IN_SET, Answer, Kept
 from estimation.recording import FloatArray, Recording
 
@@ -50,7 +49,8 @@ class Question:
 
     Attributes:
         hypotheses: Two at least.
-        noise: Equation to the variance of its residual with the likeliest hypothesis.
+        noise: Equation to the variance of its residual with the likeliest hypothesis, on runs left
+            out.
         layout: The equations.
     """
 
@@ -68,19 +68,31 @@ def question(answer: Answer, place: int) -> Question | None:
     """
     if answer.diagnosis.findings[place].verdict == "identified":
         return None
-    likely = _likely(answer.kept[place], answer.refits.numbers.sharpness)
+    joint = answer.found.joint
+    for k, other in enumerate(answer.kept):
+        if k != place:
+            joint = joint.with_cause(other.scored.candidate.laid, other.scored.candidate.precision)
+    likely = _likely(answer.kept[place], joint)
     if len(likely) < 2:
         return None
-    train = answer.layout.select(answer.diagnosis.sealed.discover)
-    others = [k.scored.candidate for i, k in enumerate(answer.kept) if i != place]
+    leading = likely[0][1].candidate
+    best = joint.with_cause(leading.laid, leading.precision)
+    (errors,) = best.base_errors([[[k] for k in range(len(joint.runs))]])
+    noise = {
+        name: float(errors[name, "within"].sum() / joint.samples[name, "within"].sum())
+        for name in joint.layout.equations
+    }
     total = sum(share for share, _ in likely)
-    found, noise = [], None
-    for share, one in likely:
-        amplitudes, left = _fitted(train, others, one.candidate)
-        noise = noise or left
-        cause = plain(one.candidate.cause)
-        found.append(Hypothesis(_label(one), share / total, cause, amplitudes))
-    return Question(tuple(found), noise or {}, answer.layout)
+    found = tuple(
+        Hypothesis(
+            _label(one),
+            share / total,
+            one.candidate.cause,
+            one.amplitudes / one.candidate.laid.size,
+        )
+        for share, one in likely
+    )
+    return Question(found, noise, answer.layout)
 
 
 def separation(asked: Question, recordings: Sequence[Recording]) -> float | None:
@@ -111,8 +123,9 @@ def separation(asked: Question, recordings: Sequence[Recording]) -> float | None
     return total / weight
 
 
-def _likely(kept: Kept, sharpness: float) -> list[tuple[float, Scored]]:
+def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
     """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
+    sharpness = joint.numbers.sharpness
     scores = np.array([s.score for s in kept.ranked])
     weights = np.exp(sharpness * (scores - scores.max()))
     shares: dict[str, float] = {}
@@ -136,48 +149,6 @@ def _label(scored: Scored) -> str:
     if isinstance(cause, Source):
         return cause.family
     return f"a function of {' and '.join(names(cause.place, cause.variables))}"
-
-
-def _fitted(
-    train: Layout, others: Sequence[Candidate], one: Candidate
-) -> tuple[FloatArray, dict[str, float]]:
-    """Fit a cause with the declared terms and other causes on all equations together.
-
-    Returns:
-        Its amplitudes, shape (k,), and the variance of each equation's residual.
-    """
-    blocks, aims, sizes = [], [], {}
-    for name, equation in train.equations.items():
-        rows, aim = [], []
-        for k, run in enumerate(train.runs):
-            used = run.grid[run.used[name]]
-            own = [_acting(c, k, run, name) for c in (*others, one)]
-            rows.append(np.hstack([equation.columns(run.channels)[used], *own]))
-            aim.append(run.channels[equation.target][used])
-            rows[-1], aim[-1] = rows[-1] - rows[-1].mean(axis=0), aim[-1] - aim[-1].mean()
-        table, target = np.vstack(rows), np.concatenate(aim)
-        width = equation.columns(train.runs[0].channels).shape[1]
-        left = target - table @ np.linalg.lstsq(table, target, rcond=1e-8)[0]
-        sizes[name] = float(np.mean(left**2))
-        # every equation has its own declared terms, and all share the causes
-        scale = 1.0 / np.sqrt(max(sizes[name], 1e-300))
-        blocks.append((table[:, :width] * scale, table[:, width:] * scale))
-        aims.append(target * scale)
-        count = own[-1].shape[1]
-    declared = linalg.block_diag(*(own for own, _ in blocks))
-    whole = np.hstack([declared, np.vstack([shared for _, shared in blocks])])
-    weights = np.linalg.lstsq(whole, np.concatenate(aims), rcond=1e-6)[0]
-    return np.asarray(weights[-count:]), sizes
-
-
-def _acting(candidate: Candidate, k: int, run: RunSignals, equation: str) -> FloatArray:
-    """Return a cause's columns in one equation of the k-th training run, (n, width)."""
-    columns = plain(candidate.cause).columns(run) or {}
-    width = next(x.shape[1] for x in columns.values())
-    acts = candidate.acts is None or candidate.acts[k]
-    if equation not in columns or not acts:
-        return np.zeros((len(run.used[equation]), width))
-    return columns[equation]
 
 
 def _predicted(one: Hypothesis, layout: Layout) -> Mapping[str, FloatArray]:

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import Numbers
@@ -60,8 +62,10 @@ class HeldOut:
             return 0.0
         total = 0.0
         for p, samples in self.joint.samples.items():
-            pair = [e[p][known].sum() / samples[self.at][known].sum() for e in (old, new)]
-            total += float(self.joint.log_ratio(p, *pair))
+            pair = [
+                np.asarray(e[p][known].sum() / samples[self.at][known].sum()) for e in (old, new)
+            ]
+            total += float(self.joint.log_ratio(p, pair[0], pair[1]))
         return total
 
     def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:

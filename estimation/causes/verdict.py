@@ -248,10 +248,10 @@ def _named(one: Kept, may_name: bool) -> Finding:
     """Return the claim of a cause, without its errors."""
     cause = one.scored.candidate.cause
     home = cause.place.home
-    lead = one.likely[0]
-    covered, others = lead.share, list[str]()
+    lead, covered = one.likely[0], one.likely[0].share
+    others: list[str] = []
     for likely in one.likely[1:]:
-        if covered >= (SURE if not others else IN_SET):
+        if covered >= (IN_SET if others else SURE):
             break
         covered += likely.share
         others.append(likely.family)

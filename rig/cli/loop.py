@@ -86,7 +86,8 @@ def loop(
             for line in sentences(one.done.diagnosis):
                 screen.print(line, markup=False)
             report = folder / f"round-{one.number}"
-            where = write_report(report / "diagnosis.html", page(one.done, Provenance.now(number)))
+            text = page(one.done.diagnosis, one.done.traces(), Provenance.now(number))
+            where = write_report(report / "diagnosis.html", text)
             screen.print(f"Report: {where}", markup=False)
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
             bar.start()

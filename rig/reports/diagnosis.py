@@ -1,104 +1,177 @@
-"""A diagnosis on one page: the sentence, the plots, the numbers, and its limits."""
+"""A diagnosis as one interactive page: the answer and what to check, the evidence, the method."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-from markupsafe import Markup
-
-from estimation.causes.functions import Function
-from estimation.causes.verdict import VARIABLE_OF_ROLE, Answer, Kept
-from estimation.channels import unit_of
 from estimation.diagnosis.result import Diagnosis, Finding, Value
-from estimation.recording import FloatArray
-from rig.diagnosis.run import Diagnosed
-from rig.output import figures
+from estimation.model import Model
+from rig.diagnosis.traces import EquationTraces
+from rig.output.charts import embedded, scripts
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import display, next_sentence, other_sentences, sentences
+from rig.reports.diagnosis_figures import charts
+from rig.reports.diagnosis_words import (
+    check_of,
+    display,
+    meaning,
+    next_sentence,
+    other_sentences,
+    sentences,
+    sizes_of,
+)
+
+VERDICTS = {
+    "identified": "effect identified",
+    "one_of": "one of several effects",
+    "depends_on": "effect of unknown form",
+    "something_missing": "model incomplete, cause not identified",
+    "nothing_missing": "no unmodelled effect found",
+}
+"""Verdict to the words of the heading."""
+
 
 CONFIDENCE = (
-    "Confidence is the posterior probability of the name among all candidates. It is not calibrated"
-    " yet; answers that were sure and wrong are counted in docs/results/diagnosis-versions.md."
+    "Confidence is the probability of the name, given these runs. How often it was right on known"
+    " cases: docs/results/diagnosis-versions.md."
 )
 
 
-SHOWN = 8
-"""Alternatives in a table."""
+@dataclass(frozen=True)
+class Card:
+    """One finding for the person at the bench.
+
+    Attributes:
+        title: What it is, in plain words.
+        verdict: What is claimed of it.
+        facts: Name and text of each fact: size, error, confidence, alternatives.
+        check: What to check at the rig.
+        command: Command that describes the effect; empty without a name.
+    """
+
+    title: str
+    verdict: str
+    facts: Sequence[tuple[str, str]]
+    check: str
+    command: str
 
 
-def page(done: Diagnosed, provenance: Provenance) -> str:
-    """Return the page of HTML."""
-    diagnosis = done.diagnosis
-    sealed = done.sealed
-    story = (
-        f"{len(sealed.discover)} training runs, {len(sealed.confirm)} held-out test runs"
-        f" ({', '.join(sealed.confirm)}); chosen by seed {sealed.seed} before any fit, fingerprint"
-        f" {sealed.seal[:12]}, data {sealed.data_hash[:12]}. It took {diagnosis.seconds:.0f} s."
+def page(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces], provenance: Provenance) -> str:
+    """Return the page of HTML, which needs nothing outside itself.
+
+    Args:
+        diagnosis: The answer.
+        traces: Equation to the signals of its runs; an equation without has no signal charts.
+        provenance: When and from what this was made.
+    """
+    drawn = charts(diagnosis, traces)
+    sealed = diagnosis.sealed
+    method = (
+        f"The model was fitted and searched on {len(sealed.discover)} training runs. The"
+        f" {len(sealed.confirm)} held-out test runs ({', '.join(sealed.confirm)}) were opened once,"
+        f" at the end; seed {sealed.seed} chose them before any fit. Split {sealed.seal[:12]}, data"
+        f" {sealed.data_hash[:12]}. It took {diagnosis.seconds:.0f} s."
     )
-    drawn: list[tuple[str, Markup]] = []
-    for finding, kept in zip(diagnosis.findings, done.answer.kept, strict=True):
-        drawn += _over_variable(done.answer, finding, kept)
-    for name in diagnosis.errors:
-        drawn.append(_by_run(diagnosis, name))
     return render(
         "diagnosis.html",
         {
-            "title": f"Diagnosis: {diagnosis.verdict.replace('_', ' ')}",
+            "title": f"Diagnosis: {VERDICTS[diagnosis.verdict]}",
             "sentences": sentences(diagnosis),
-            "story": story,
-            "figures": drawn,
-            "tables": tables(done),
+            "cards": [card(finding, diagnosis) for finding in diagnosis.findings],
+            "errors": error_table(diagnosis),
+            "charts": drawn,
+            "runs": sealed.confirm,
+            "tables": [_parameters(diagnosis.findings), *_moved(diagnosis, traces)],
+            "tried": [_tried(f) for f in diagnosis.findings if f.probabilities],
             "others": other_sentences(diagnosis),
             "limits": [*diagnosis.notes, CONFIDENCE],
             "next_experiment": next_sentence(diagnosis),
+            "method": method,
+            "data": embedded(drawn),
+            "script": scripts(),
             "provenance": provenance,
         },
     )
 
 
-def tables(done: Diagnosed) -> list[TextTable]:
-    """Return the tables of the page."""
-    shown = [_errors(done.diagnosis)]
-    if any(f.parameters for f in done.diagnosis.findings):
-        shown.append(_parameters(done.diagnosis.findings))
-    for finding, kept in zip(done.diagnosis.findings, done.answer.kept, strict=True):
-        shown.append(_tried(finding, kept))
-    shown += [_moved(done.diagnosis, name, done.answer) for name in done.diagnosis.errors]
-    return shown
+def card(finding: Finding, diagnosis: Diagnosis) -> Card:
+    """Return a finding as the person at the bench needs it."""
+    scale, unit = display(diagnosis.unit[finding.balance])
+    named = finding.verdict in ("identified", "one_of")
+    variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    facts = []
+    if named and finding.parameters:
+        sizes = ", ".join(f"{name} {text}" for name, text in sizes_of(finding.parameters).items())
+        facts.append(("Size", sizes))
+    fall = f"{scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {unit}"
+    runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"
+    facts.append(("Error", f"{fall}, {runs}"))
+    if variables:
+        facts.append(("Depends on", variables))
+    equations = " and ".join([finding.balance, *finding.also_in])
+    facts.append(("Equation", equations))
+    if finding.confidence is not None:
+        facts.append(("Confidence", f"{finding.confidence:.0%}"))
+    if finding.alternatives:
+        alternatives = "; ".join(f"{meaning(a) or a} [{a}]" for a in finding.alternatives)
+        facts.append(("Could also be", alternatives))
+    title = meaning(finding.family) if named else f"something that depends on {variables}"
+    if not named and not variables:
+        title = VERDICTS[finding.verdict]
+    title = title or finding.family
+    return Card(
+        title[0].upper() + title[1:],
+        VERDICTS[finding.verdict],
+        facts,
+        check_of(finding),
+        f"rig effects {finding.family}" if named else "",
+    )
 
 
-def _errors(diagnosis: Diagnosis) -> TextTable:
+def error_table(diagnosis: Diagnosis) -> TextTable:
+    """Return the errors on the held-out test runs before and after."""
     rows = []
     for name, error in diagnosis.errors.items():
         scale, unit = display(diagnosis.unit[name])
         low, high = error.ratio_ci95
+        ratio = f"{error.after / error.before:.2f}" if error.before else ""
+        if math.isfinite(low) and math.isfinite(high):
+            ratio += f" ({low:.2f} to {high:.2f})"
+        floor = diagnosis.noise_floor.get(name)
         values = (error.before, error.after, error.with_means_before, error.with_means_after)
-        rows.append([name, *(f"{scale * v:.3g}" for v in values), f"{low:.2f} to {high:.2f}", unit])
-    columns = ["equation", "before", "after", "with means, before", "after", "after/before", "unit"]
+        rows.append(
+            [
+                f"{name}, {unit}",
+                *(f"{scale * v:.3g}" for v in values),
+                ratio,
+                "" if floor is None else f"{scale * floor:.3g}",
+            ]
+        )
+    columns = ["equation", "before", "after", "before, with means", "after, with means"]
     return TextTable(
         "Error on the held-out test runs",
-        columns,
+        [*columns, "after/before (95 %)", "noise floor"],
         rows,
-        "Root mean square over all valid samples, those at rest too; each run's mean removed, then"
-        " with the means left in."
-        " Ratio: 95 % interval of a bootstrap over runs.",
+        "Root mean square over all valid samples, those at standstill too; each run's mean"
+        " removed, then with the means left in. Interval: bootstrap over runs.",
     )
 
 
-def _parameters(findings: Sequence[Finding]) -> TextTable:
+def _parameters(findings: Sequence[Finding]) -> TextTable | None:
     rows = [
         [f"{finding.balance}, {finding.family}, {name}", *_with_interval(known)]
         for finding in findings
         for name, known in finding.parameters.items()
     ]
+    if not rows:
+        return None
     columns = ["parameter", "value", "95 %", "unit"]
-    return TextTable("Parameters of what was found", columns, rows, "Bootstrap over runs.")
+    return TextTable("Parameters of the findings", columns, rows, "Bootstrap over runs.")
 
 
 def _with_interval(known: Value) -> list[str]:
-    """Return value, interval and unit, with the digits that the interval supports."""
+    """Return value, interval and unit, to the digits that the interval supports."""
     scale, unit = display(known.unit)
     if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
         return [f"{scale * known.value:.4g}", "", unit]
@@ -107,93 +180,36 @@ def _with_interval(known: Value) -> list[str]:
     return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
 
 
-def _tried(finding: Finding, kept: Kept) -> TextTable:
-    rows = []
-    for likely in kept.likely[:SHOWN]:
-        cause = likely.best.candidate.cause
-        what = likely.family
-        if isinstance(cause, Function):
-            what += f" function of {', '.join(cause.variables)}"
-        rows.append(
-            [f"{what}, {cause.place.name}", f"{likely.share:.3f}", f"{likely.best.score:.3f}"]
-        )
+def _tried(finding: Finding) -> TextTable:
+    rows = [[family, f"{share:.3f}"] for family, share in finding.probabilities.items()]
     return TextTable(
         f"What was tried in place of {finding.family} in {finding.balance}",
-        ["cause, place", "probability", "score"],
+        ["cause", "probability"],
         rows,
-        "Score: log ratio of errors on training runs and conditions left out, less the price of the"
-        " choice. The other findings are part of the model.",
+        "From errors on training runs and conditions left out. The other findings are part of the"
+        " model.",
     )
 
 
-def _moved(diagnosis: Diagnosis, name: str, answer: Answer) -> TextTable:
-    model = answer.layout.equations[name].model
-    units = {
+def _moved(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces]) -> list[TextTable]:
+    """Return the declared parameters of each equation before and after the findings."""
+    shown = []
+    for name, parameters in diagnosis.moved.items():
+        units = _units(traces[name].before) if name in traces else {}
+        rows = []
+        for key, value in parameters.items():
+            scale, unit = display(units.get(key, ""))
+            cells = (f"{scale * value[side]:.4g}" for side in ("before", "after"))
+            rows.append([key, *cells, unit])
+        if rows:
+            columns = ["parameter", "before", "after", "unit"]
+            shown.append(TextTable(f"Declared parameters: {name}", columns, rows))
+    return shown
+
+
+def _units(model: Model) -> dict[str, str]:
+    return {
         f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
         for term in model.terms
         for parameter in term.parameters
     }
-    rows = []
-    for key, value in diagnosis.moved[name].items():
-        scale, unit = display(units.get(key, ""))
-        rows.append([key, f"{scale * value['before']:.4g}", f"{scale * value['after']:.4g}", unit])
-    columns = ["parameter", "before", "after", "unit"]
-    return TextTable(f"Declared parameters: {name}", columns, rows)
-
-
-def _over_variable(answer: Answer, finding: Finding, kept: Kept) -> list[tuple[str, Markup]]:
-    """Draw the residual of the test runs over the finding's own variable."""
-    refit = answer.refits.of[finding.balance]
-    before, after = answer.refits.before(finding.balance), answer.refits.after(finding.balance)
-    found = _channel(kept)
-    if found is None:
-        return []
-    variable, channel = found
-    x: list[FloatArray] = []
-    old: list[FloatArray] = []
-    new: list[FloatArray] = []
-    for name in refit.test_names:
-        values = refit.channel(after, name, channel)
-        left, right = (refit.residuals(solved, name) for solved in (before, after))
-        if values is None or left is None or right is None:
-            return []
-        x.append(values)
-        old.append(left[1] - left[1].mean())
-        new.append(right[1] - right[1].mean())
-    whole = np.concatenate(x)
-    if channel == "motor_angle_rad":
-        whole = np.mod(whole, 2 * np.pi)
-    scale, unit = display(answer.diagnosis.unit[finding.balance])
-    label = f"{variable.replace('_', ' ')}, {unit_of(channel)}"
-    panels = [
-        figures.Panel(f"{label}: {when}", whole, scale * np.concatenate(values))
-        for when, values in (("before", old), ("after", new))
-    ]
-    caption = (
-        f"{finding.balance}: the residual of the test runs before and after, mean and the middle"
-        " 90 % of the samples."
-    )
-    return [(caption, figures.against(panels, f"residual, {unit}", caption, bins=48))]
-
-
-def _channel(kept: Kept) -> tuple[str, str] | None:
-    """Return the variable that a cause is drawn over, and its channel."""
-    cause = kept.scored.candidate.cause
-    if isinstance(cause, Function):
-        role = next((v for v in cause.variables if v in cause.place.roles), None)
-        return None if role is None else (role, cause.place.roles[role][0])
-    for role, channel in cause.channels:
-        if role in VARIABLE_OF_ROLE:
-            return VARIABLE_OF_ROLE[role], channel
-    return None
-
-
-def _by_run(diagnosis: Diagnosis, name: str) -> tuple[str, Markup]:
-    error = diagnosis.errors[name]
-    scale, unit = display(diagnosis.unit[name])
-    pairs = {
-        run: (scale * before, scale * error.by_run_after[run])
-        for run, before in error.by_run_before.items()
-    }
-    caption = f"{name}: error of each test run before and after."
-    return caption, figures.paired_bars(pairs, ("before", "after"), f"rmse, {unit}", caption)

@@ -78,6 +78,32 @@ def meaning(family: str) -> str:
     return first.partition(": ")[2].removesuffix(".")
 
 
+def check_of(finding: Finding) -> str:
+    """Return what to check at the rig for a finding, one sentence at least."""
+    if finding.verdict in ("identified", "one_of"):
+        checks = [_check(family) for family in (finding.family, *finding.alternatives)]
+        if any(checks):
+            return " Then: ".join(dict.fromkeys(check for check in checks if check))
+    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    if words:
+        return (
+            f"Find the part of the rig whose behaviour changes with {words}: the residual below"
+            " depends on it. Then record the next experiment."
+        )
+    return "Record the next experiment: these runs do not single out a part of the rig."
+
+
+def _check(family: str) -> str:
+    """Return the advice in the description of an effect; empty without."""
+    known = catalogue().get(family)
+    text = inspect.cleandoc(type(known).__doc__ or "") if known else ""
+    checks = [p for p in text.split("\n\n") if p.startswith("Check: ")]
+    if not checks:
+        return ""
+    advice = " ".join(checks[0].removeprefix("Check: ").split())
+    return advice[0].upper() + advice[1:]
+
+
 def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
     """Return parameters with their units, sine and cosine of one wave as its amplitude."""
     left = dict(parameters)

@@ -12,9 +12,9 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.candidates import candidates
-from estimation.derived import MOTOR_LOAD
 from estimation.diagnosis.split import Sealed, split
 from estimation.effects import effect
+from estimation.effects.roles import MOTOR_LOAD
 from estimation.fitting import prepared
 from estimation.model import Model, Term, estimate
 from estimation.recording import FloatArray, Recording
