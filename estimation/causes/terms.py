@@ -66,7 +66,7 @@ def _instead(source: Source, equation: Equation, measured: Collection[str]) -> M
     found: dict[str, str] = {}
     for entry in entries(source.effect, equation.name):
         for role, channel in entry.channels.items():
-            known = set(measured_channels([channel])) <= there
+            known = set(measured_channels([channel], equation.model.signals)) <= there
             if known and not _reads_target(channel, equation):
                 found.setdefault(role, channel)
     return found
