@@ -62,6 +62,7 @@ def record(seed: int, only: int | None = None, **changed: float) -> list[Recordi
         ({"mass": 2.2}, "inertia.missing inertia of motor", "inertia", 0.2),
         ({"damping": 6.0}, "friction.viscous damping of motor", "damping", 1.0),
         ({"friction": 1.2}, "friction.coulomb friction of motor", "friction", -0.3),
+        ({"offset": 0.5}, "sensor.offset offset of motor", "offset", 0.3),
     ],
 )
 def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter, change):
@@ -73,14 +74,6 @@ def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter,
     known = MACHINE[next(iter(changed))]
     assert found.before[parameter] == pytest.approx(known, rel=0.15)
     assert found.confidence >= 0.9
-    assert found.p <= 0.05
-
-
-def test_what_mimics_a_change_on_these_runs_is_named_with_it():
-    # the weight of a payload on a short travel is nearly constant
-    (found,) = compare(record(1), record(2, offset=0.5), [axis()]).changes
-    assert found.verdict == "one_of"
-    assert "sensor.offset offset of motor" in (found.name, *found.alternatives)
     assert found.p <= 0.05
 
 
