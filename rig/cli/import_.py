@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.shipped import complete_machine, machine_names
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
@@ -24,7 +25,9 @@ def import_(
         Path | None,
         typer.Option(
             "--machine",
-            help="Machine file whose [data] maps the columns; also the name of a shipped one.",
+            help="Machine file whose [data] maps the columns, or one of"
+            f" {', '.join(machine_names())}.",
+            autocompletion=complete_machine,
         ),
     ] = None,
     column: Annotated[
@@ -75,6 +78,7 @@ def import_(
     from rig.importers.table.open import read_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
+    from rig.machines.shipped import place_of
 
     if not preview and out is None:
         raise UsageError(
@@ -84,7 +88,7 @@ def import_(
     flags = _flags(column or [], condition or [], runs or [], set_ or [])
     if rate is not None:
         flags.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
-    mapping = read_mapping(machine, flags)
+    mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     recordings = list(read_runs(path, mapping, said))
     if not recordings:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from estimation.plant_file import parse
+from estimation.plant_models import declared
 from rig.cli.main import main
 
 PAGE = Path(__file__).parents[2] / "docs" / "your-own-machine.md"
@@ -41,7 +43,7 @@ def write_table(folder, kind):
 
 def walk():
     """Return the page's files, by name, and its commands, up to the heading after the walk."""
-    text = PAGE.read_text().split("## Formats")[0]
+    text = PAGE.read_text().split("## The machine")[0]
     names = re.findall(r"Save this as `([^`]+)`", text)
     blocks = re.findall(r"```(\w+)\n(.*?)```", text, flags=re.DOTALL)
     files = dict(zip(names, [body for kind, body in blocks if kind == "toml"], strict=True))
@@ -65,10 +67,19 @@ def test_the_walk_goes_from_a_table_to_a_verdict(tmp_path, monkeypatch, capsys, 
         said.append(printed.out + printed.err)
         # the first look has no mapping yet: its answer is the list of columns
         assert code == (5 if words == ["import", f"DATA_EMPS.{kind}", "--preview"] else 0), said[-1]
-    listed, previewed, imported, fitted, diagnosed = said
+    listed, previewed, checked, imported, fitted, diagnosed = said
     assert "'qm'" in listed
     assert "Nothing looks wrong" in previewed
     assert "wrote 8 recordings" in imported
+    assert "drive_force_n = inertia x carriage_acceleration_m_s2" in checked
     assert f"{MASS:.0f}" in fitted
-    assert diagnosed.startswith("motor: ")
+    assert "\ncarriage: " in f"\n{diagnosed}"
     assert Path("emps.html").exists()
+
+
+def test_the_machine_of_the_page_is_one():
+    section = PAGE.read_text().split("## The machine")[1]
+    (text,) = re.findall(r"```toml\n(schema.*?)```", section, flags=re.DOTALL)
+    plant = parse(text)
+    assert [model.balance for model in declared(plant)] == ["motor", "gearbox", "cell"]
+    assert "counts" in text
