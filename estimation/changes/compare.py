@@ -8,7 +8,7 @@ import numpy as np
 from estimation.causes.equations import Layout, lay_out
 from estimation.changes.candidates import Came, SensorMoved
 from estimation.changes.regression import Regression, solved
-from estimation.changes.search import Gained, Step, impossible, laid_out, search
+from estimation.changes.search import SURE, Gained, Step, impossible, laid_out, search
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -17,9 +17,6 @@ SCHEMA = "rig.diff/1"
 
 LEAST_RUNS = 4
 """Runs of each campaign: of fewer, 5 % of the choices of runs are less than one."""
-
-SURE = 0.9
-"""Share from which a single name is given; below it the verdict is a set."""
 
 IN_SET = 0.95
 """Share that a set of names covers."""
@@ -42,7 +39,8 @@ class Change:
         equation: Equation it is reported under.
         family: The effect.
         alternatives: Other names that explain it about as well.
-        confidence: Share of resampled sets of runs in which this name explains most.
+        confidence: Weight of this name among all that explain about as much, over resampled sets of
+            runs.
         p: Probability of a change this large where nothing changed, over all candidates.
         parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
         ci95: Parameter to the 95 % interval of that, over runs.

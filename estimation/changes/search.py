@@ -13,7 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.changes.candidates import Came, Candidate, Moved, candidates, columns_of
-from estimation.changes.regression import Laid, Products, Regression, gains, solved, squared_error
+from estimation.changes.regression import (
+    TINY,
+    Laid,
+    Products,
+    Regression,
+    gains,
+    solved,
+    squared_error,
+)
 from estimation.recording import FloatArray
 
 CHOICES = 299
@@ -21,6 +29,9 @@ CHOICES = 299
 
 LEVEL = 0.05
 """Probability of a wrong change where nothing changed."""
+
+SURE = 0.9
+"""Weight from which a single name is given; below it the verdict is a set."""
 
 REPLICATES = 200
 """Resampled sets of runs, for intervals and for how sure a name is."""
@@ -70,7 +81,8 @@ class Step:
     Attributes:
         best: The change.
         p: Share of random choices of runs with as large a gain of any candidate.
-        shares: Name to the share of resampled sets of runs in which it is the best, largest first.
+        shares: Name to its weight over resampled sets of runs, largest first. A name that explains
+            less than the best by `FORM` of it has 1/e of its weight: forms are not exact.
         spread: Amplitudes in the resampled sets, shape (replicates, k).
         alternatives: Name to its best candidate.
     """
@@ -141,6 +153,9 @@ def search(
             break
         pool = [one for _, one in ranked[:KEPT]]
         step = _resampled(regression, ranked, is_b, p, random)
+        # what the wrong form of the first change amounts to has no name that stands out
+        if steps and next(iter(step.shares.values()), 0.0) < SURE:
+            break
         steps.append(step)
         regression = grown
         pool = [one for one in pool if one.candidate.key != held.candidate.key]
@@ -229,9 +244,10 @@ def _resampled(
             continue
         gram = regression.gram(counts)
         found = [_one(gram, products, one, is_b, counts) for one, products in laid]
-        winner = max(range(len(found)), key=lambda k: found[k][0] - laid[k][0].usual)
-        name = laid[winner][0].family
-        wins[name] = wins.get(name, 0.0) + 1.0
+        gained = np.array([f[0] - one.usual for f, (one, _) in zip(found, laid, strict=True)])
+        weights = np.exp((gained - gained.max()) / max(FORM * gained.max(), TINY))
+        for (one, _), weight in zip(laid, weights / weights.sum(), strict=True):
+            wins[one.family] = wins.get(one.family, 0.0) + float(weight)
         spread.append(found[0][1])
     total = sum(wins.values()) or 1.0
     shares = dict(sorted(((n, w / total) for n, w in wins.items()), key=lambda pair: -pair[1]))
