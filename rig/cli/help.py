@@ -5,7 +5,7 @@ from typing import Any
 from typer.core import TyperGroup
 
 GROUPS = {
-    "Begin": ("demo", "config", "doctor", "devices", "selftest", "udev", "firmware"),
+    "Begin": ("demo", "config", "machine", "doctor", "devices", "selftest", "udev", "firmware"),
     "At the rig": (
         "live",
         "record",
@@ -17,7 +17,7 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("campaigns", "log", "replay"),
+    "Recordings": ("campaigns", "import", "log", "replay"),
     "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }

@@ -26,9 +26,11 @@ from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
 from rig.cli.help import GroupedHelp
+from rig.cli.import_ import import_
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
+from rig.cli.machine import machine_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
@@ -66,7 +68,9 @@ app.command()(diagnose)
 app.command()(loop)
 app.command()(effects)
 app.command()(campaigns)
+app.command("import")(import_)
 app.add_typer(log_app, name="log")
+app.add_typer(machine_app, name="machine")
 app.add_typer(grasper_app, name="grasper")
 app.add_typer(study_app, name="study")
 app.add_typer(config_app, name="config")

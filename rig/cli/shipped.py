@@ -23,7 +23,17 @@ def protocol_names() -> list[str]:
 
 def model_names() -> list[str]:
     """Return the names of the shipped declared models."""
-    return _names(Path(estimation.__file__).parent / "models")
+    from estimation.plant_equations import equations
+    from estimation.plant_file import shipped_plant
+
+    own = [equation.name for equation in equations(shipped_plant("reference"))]
+    return sorted([*_names(Path(estimation.__file__).parent / "models"), *own])
+
+
+def machine_names() -> list[str]:
+    """Return the names of the shipped machines."""
+    examples = Path(rig.__file__).parent / "machines" / "examples"
+    return sorted(_names(Path(estimation.__file__).parent / "machines") + _names(examples))
 
 
 def _matching(names: list[str], start: str) -> list[str]:
@@ -64,6 +74,11 @@ def complete_config(incomplete: str) -> list[str]:
 def complete_protocol(incomplete: str) -> list[str]:
     """Complete a protocol: a shipped name or a file."""
     return _matching(protocol_names(), incomplete)
+
+
+def complete_machine(incomplete: str) -> list[str]:
+    """Complete a machine: a shipped name or a file."""
+    return _matching(machine_names(), incomplete)
 
 
 def complete_model(incomplete: str) -> list[str]:

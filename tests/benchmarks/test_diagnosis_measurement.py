@@ -26,7 +26,7 @@ from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import FAMILIES
+from estimation.diagnosis.result import FAMILIES
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect

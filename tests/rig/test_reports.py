@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from html.parser import HTMLParser
 from io import StringIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from jinja2 import UndefinedError
 from estimation.diagnosis.result import Value
 from estimation.effects import catalogue
 from estimation.fitting import fit
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from estimation.residual import largest_structure
 from rig.output import figures
 from rig.output.binning import binned
@@ -66,7 +67,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
     runs = campaign(lambda angle, speed, load: 2e-3 * np.sin(7 * angle))
-    model = fit(read(shipped()["motor"]), runs)
+    model = fit(read(Path("motor")), runs)
     return {
         "study": page(run_study(Source(runs, "a <b> & c", measured=False))),
         "first_look": first_look(
