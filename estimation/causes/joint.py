@@ -28,7 +28,7 @@ Scale = Literal["each", "first", "none"]
 TINY = 1e-300
 
 MOST_CHANGE = 2.0
-"""Factor by which the largest linear term of an equation may change beside a cause."""
+"""Factor by which the largest linear term of an equation may change next to a cause."""
 
 NOISE_TAKEN = 0.8
 """Share of the known noise that is taken off the cross-products of a fit: with all of it a column
@@ -200,8 +200,8 @@ class Joint:
     ) -> FloatArray:
         """Return the error that is missing because a noisy reading got a smaller amplitude.
 
-        A cause that stands in for a noisy reading removes that reading's noise. This is no merit
-        of the cause: what it removes so is put back.
+        A cause that stands in for a noisy reading removes that reading's noise. The
+        error that it removes so is put back.
 
         Args:
             part: Of the regression.
@@ -470,7 +470,7 @@ class Joint:
 
         Args:
             laid: The cause.
-            base: Parameters of the base beside it, shape (base,).
+            base: Parameters of the base next to it, shape (base,).
             amplitudes: Of the cause, shape (k,).
         """
         now = self._whole(base) - self._taken_off(laid) @ amplitudes

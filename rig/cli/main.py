@@ -14,9 +14,11 @@ from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
 from rig.cli.campaigns import campaigns
 from rig.cli.clear import clear
+from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
+from rig.cli.diff import diff
 from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.effects import effects
 from rig.cli.estimator import estimator_app
@@ -65,10 +67,11 @@ app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(diff)
 app.command()(loop)
 app.command()(effects)
-app.command()(campaigns)
 app.command("import")(import_)
+app.command()(campaigns)
 app.add_typer(log_app, name="log")
 app.add_typer(machine_app, name="machine")
 app.add_typer(grasper_app, name="grasper")
@@ -77,6 +80,7 @@ app.add_typer(config_app, name="config")
 app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
+app.command()(commission)
 app.command()(reference)
 app.command()(stop)
 app.command()(clear)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from estimation.causes.functions import Function
 from estimation.causes.verdict import VARIABLE_OF_ROLE, Answer, Kept
+from estimation.derived import zero_phase_channels
 from estimation.model import Model
 from estimation.recording import FloatArray
 
@@ -83,7 +84,9 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
             continue
         (places, old), (_, new) = sides[0], sides[1]
         clock = refit.recordings[run].time_s
-        read = {c: v for c in wanted if (v := refit.channel(after, run, c)) is not None}
+        # a cause that no model file holds is no term of the equation: its channels are read here
+        filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
+        read = {channel: filtered[channel][places] for channel in wanted}
         time_s = clock[places] - clock[0]
         runs.append(RunTrace(run, time_s, measured, old - old.mean(), new - new.mean(), read))
     return EquationTraces(refit.model, tuple(runs))

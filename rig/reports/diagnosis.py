@@ -114,7 +114,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> Card:
         facts.append(("Depends on", variables))
     equations = " and ".join([finding.balance, *finding.also_in])
     facts.append(("Equation", equations))
-    if finding.place:
+    if finding.place not in ("", finding.balance):
         facts.append(("Place", finding.place))
     whole = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
     if 0 < len(finding.runs_affected) < whole:

@@ -64,6 +64,7 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
         "motor: error of each held-out test run",
         "motor: measured and estimated",
         "Parameters of the findings",
+        "Probability of each name",
         "Declared parameters: motor",
         "What to check",
         "Next experiment",

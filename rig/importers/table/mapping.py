@@ -18,6 +18,7 @@ import tomllib
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -32,6 +33,9 @@ from rig.importers.table.units import NotAUnitError, conversion, read_unit
 TIME = "time_s"
 DATE = "iso8601"
 """Unit of a time column that holds dates."""
+
+EXAMPLES = Path(str(files("rig"))) / "machines" / "examples"
+"""Folder of the shipped machine files; `--machine` takes their names."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
@@ -103,6 +107,7 @@ class Runs(_Section):
         at_s: Times since the start of the file, s.
         lap_s: Length of a lap, s.
         start_s: What is before this time since the start of the file is left out, s.
+        tail_s: What is within this time of the end of the file is left out, s.
         least_s: Shorter parts are left out, s; half a lap if laps are cut.
     """
 
@@ -114,6 +119,7 @@ class Runs(_Section):
     at_s: tuple[FiniteFloat, ...] = ()
     lap_s: Positive | None = None
     start_s: FiniteFloat = 0.0
+    tail_s: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     least_s: Annotated[FiniteFloat, Field(ge=0)] | None = None
 
 
@@ -205,12 +211,14 @@ def read_mapping(file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, 
     """Read the mapping of a machine's file and of the command line, which comes first.
 
     Args:
-        file: The machine's file, or None.
+        file: The machine's file, the name of a shipped one, or None.
         flags: For each entry of the command line its path below `[data]`, value and words.
 
     Raises:
         UsageError: A file is not there or not TOML, a key is unknown or wrong, a unit does not fit.
     """
+    if file is not None and not file.exists() and (EXAMPLES / f"{file}.toml").exists():
+        file = EXAMPLES / f"{file}.toml"
     text, content = _content(file) if file else ("", {})
     words: dict[tuple[str, ...], str] = {}
     for path, value, typed in flags:
@@ -237,7 +245,10 @@ def _content(file: Path) -> tuple[str, dict[str, Any]]:
         text = file.read_text("utf-8")
         content = tomllib.loads(text)
     except FileNotFoundError as error:
-        raise UsageError(f"There is no machine file {file}.", fix="Check the path.") from error
+        shipped = ", ".join(sorted(path.stem for path in EXAMPLES.glob("*.toml")))
+        raise UsageError(
+            f"There is no machine file {file}.", f"Shipped: {shipped}.", "Check the path."
+        ) from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         hint = ""
         if "overwrite" in str(error):

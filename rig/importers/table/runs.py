@@ -61,13 +61,14 @@ def _edges(samples: Samples, mapping: Mapping) -> list[int]:
         marked = _cutting(samples, mapping, "mark", rules.mark) != 0
         begins[1:] |= marked[1:] & ~marked[:-1]
     first = int(np.searchsorted(since_s, rules.start_s)) if rules.start_s > 0 else 0
+    end = int(np.searchsorted(since_s, since_s[-1] - rules.tail_s, side="right"))
     begins[:first] = False
     at = [*rules.at_s]
     if rules.lap_s is not None:
-        laps = np.arange(rules.start_s, since_s[-1], rules.lap_s)
+        laps = np.arange(rules.start_s, since_s[-1] - rules.tail_s, rules.lap_s)
         at += laps.tolist()
     begins[[k for k in np.searchsorted(since_s, np.array(at) - 1e-9) if k < len(begins)]] = True
-    return sorted({first, *np.flatnonzero(begins).tolist(), len(time_s)})
+    return sorted({first, *np.flatnonzero(begins[:end]).tolist(), max(first, end)})
 
 
 def _cutting(samples: Samples, mapping: Mapping, rule: str, name: str) -> NDArray[np.generic]:
