@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo test test-unit test-long lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo demo-real test test-unit test-long lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -24,6 +24,15 @@ setup: $(VENV)/.installed firmware
 
 demo: setup
 	$(BIN)/rig demo
+
+# the same on measured data: a folder or archive of recordings; DATA=FOLDER. EQUATION="" for all
+EQUATION ?= gearbox
+demo-real: setup
+	@test -n "$(DATA)" || { echo "name the recordings: make demo-real DATA=FOLDER; public ones:" \
+	"git clone https://github.com/MRDLab/mis-tool-characterization" >&2; exit 2; }
+	$(BIN)/rig diagnose "$(DATA)" $(if $(EQUATION),--balance $(EQUATION)) --quick \
+	  --report logs/demo-real --ledger logs/demo-real/looks.jsonl
+	@echo "Open the page:"; echo "  $(BIN)/python -m webbrowser logs/demo-real/diagnosis.html"
 
 PYTEST := $(BIN)/python -m pytest -q -n auto --dist worksteal
 

@@ -1,25 +1,23 @@
 """How the cost of a diagnosis grows with samples and effects; `docs/figures/diagnosis_cost.py`.
 
-Timed is what a search is made of: filter the runs, lay out the columns of the catalogue, and score
-every candidate on every run left out. It is processor time, since other work on the machine would
-bend a line of wall-clock times.
+Timed are the parts of a search: filter the runs, fit the declared equation, lay out the columns of
+every candidate, and score each on every run and condition left out. It is processor time: other
+work on the machine changes wall-clock times.
 """
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from benchmarks.ratio import Ratio
 from estimation import model_file
-from estimation.campaign import Campaign
-from estimation.diagnosis.balance import lay_out
-from estimation.diagnosis.candidate import Candidate, pool
-from estimation.diagnosis.design import prepare, tables
-from estimation.diagnosis.evidence import leave_one_run_out
-from estimation.diagnosis.instruments import instruments, projection
-from estimation.fitting import fit
-from estimation.model import Model
+from estimation.causes.equations import lay_out
+from estimation.causes.folds import folds_of
+from estimation.causes.instruments import add_instruments
+from estimation.causes.joint import Joint
+from estimation.causes.numbers import DEFAULT
+from estimation.causes.search import candidates, evaluate
 from estimation.recording import Recording
 from rig.simulation.campaign import simulate_reference_campaign
 
@@ -50,19 +48,12 @@ class Cost:
 
 def costs_over_samples() -> list[Cost]:
     """Time the whole catalogue on runs of `SECONDS`."""
-    whole = _tried()
-    return [_cost(tuple(r.slice_time(0.0, s) for r in _recordings()), whole) for s in SECONDS]
+    return [_cost(tuple(r.slice_time(0.0, s) for r in _recordings()), 1.0) for s in SECONDS]
 
 
 def costs_over_effects() -> list[Cost]:
-    """Time `SHARES` of the catalogue on whole runs; two draws of each, since some are dear."""
-    whole, costs = _tried(), []
-    for share in SHARES:
-        step = round(1.0 / share)
-        draws = [_cost(_recordings(), whole[first::step]) for first in sorted({0, step // 2})]
-        mean = sum(one.seconds for one in draws) / len(draws)
-        costs.append(replace(draws[0], seconds=mean))
-    return costs
+    """Time `SHARES` of the candidates on whole runs."""
+    return [_cost(_recordings(), share) for share in SHARES]
 
 
 def measure() -> list[Ratio]:
@@ -86,34 +77,19 @@ def _recordings() -> tuple[Recording, ...]:
     return tuple(simulate_reference_campaign(protocol="diagnosis").evidence)[::2]
 
 
-@cache
-def _fitted() -> Model:
-    declared = model_file.read(Path("motor"))
-    return fit(declared, Campaign.of(_recordings()), bootstrap=0)
-
-
-def _tried() -> list[Candidate]:
-    return pool(_fitted(), _measured())
-
-
-def _measured() -> list[str]:
-    return sorted(set.intersection(*({*r.columns} for r in _recordings())))
-
-
-def _cost(recordings: tuple[Recording, ...], tried: list[Candidate]) -> Cost:
-    model = _fitted()
-    channels = [model.target, *model.channels, *instruments(_measured())]
-    channels += [channel for c in tried for _, channel in c.channels]
-    wanted = list(dict.fromkeys(channels))
+def _cost(recordings: tuple[Recording, ...], share: float) -> Cost:
+    model = model_file.read(Path("motor"))
+    step, tried = round(1.0 / share), 0
 
     def search() -> None:
-        runs = [prepare(recording, wanted, model) for recording in recordings]
-        told = projection(runs, tried, model.target)
-        balance = lay_out(model, [told(run) for run in runs])
-        table = tables(balance.runs, tried, balance.demean)
-        aims = [residual[:, None] for residual in balance.left(balance.terms)]
-        sizes = [len(candidate.effect.amplitudes) for candidate in tried]
-        leave_one_run_out(balance.base(balance.terms), table, sizes, aims)
+        nonlocal tried
+        names = [r.name for r in recordings]
+        layout = lay_out([model], recordings, names)
+        add_instruments(layout, names)
+        joint = Joint(layout)
+        pool = candidates(layout, joint)[::step]
+        evaluate(joint, pool, folds_of(layout), DEFAULT)
+        tried = len(pool)
 
     search()  # compiles
     seconds = []
@@ -121,4 +97,4 @@ def _cost(recordings: tuple[Recording, ...], tried: list[Candidate]) -> Cost:
         began = time.process_time()
         search()
         seconds.append(time.process_time() - began)
-    return Cost(sum(map(len, recordings)), len(tried), min(seconds))
+    return Cost(sum(map(len, recordings)), tried, min(seconds))

@@ -28,6 +28,7 @@ UNIT_BY_SUFFIX: dict[str, str] = {
     "a": "A",
     "v": "V",
     "k": "K",
+    "kg": "kg",
 }
 """Unit symbol of each name suffix; the longest suffix that matches wins."""
 

@@ -7,10 +7,9 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
-from estimation.derived import settled_places
 from estimation.estimator import Estimator, Recipe
 from estimation.fitting import fit
-from estimation.model import Model, balance_channels, estimate
+from estimation.model import Model, balance_channels, estimate, settled
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
 
@@ -52,7 +51,7 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
         fitted = fit(declared, split.train, bootstrap=0)
         for recording in split.test:
             run = balance_channels(fitted, recording)
-            places = settled_places(run, fitted.low_pass, samples=fitted.samples)
+            places = settled(fitted, run)
             error = run[fitted.target] - estimate(fitted, run)
             errors[recording.name] = error[places]
     whole = np.concatenate(list(errors.values()))

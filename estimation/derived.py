@@ -1,4 +1,4 @@
-"""Derived channels: speeds, accelerations, the twist of the gearbox.
+"""Derived channels: speeds, accelerations, combinations of a machine's channels.
 
 A derived channel is requested by name. `X_velocity_rad_s` and `X_acceleration_rad_s2` are the first
 and second derivative of `X_angle_rad`, and so in metres of `X_position_m`; `X_rate_n_m_s` is the
@@ -6,10 +6,8 @@ first of `X_n_m`; `X_travel_rad` is the increase of that angle since its lowest 
 `TRAVEL_WINDOW_S`, the state of hysteresis after a reversal, and `X_turned_s` the time since that
 value; `X_rise_a` is the increase of the channel `X_a` (any unit) since the motor's angle was
 lowest, and `X_fall_a` its difference to its highest value of that window; `X_20ms_ago_a` is its
-value 20 ms earlier, `X_acceleration_20ms_ago_rad_s2` the derivative at that time;
-`gearbox_differential_rad` is the motor's angle divided by the gear ratio minus the spindle's;
-`motor_load_n_m` is the spindle's torque projected from the current, `cable_load_n_m` the same from
-the torque at the jaw, `cable_angle_rad` the jaw's angle from the spindle's and that torque;
+value 20 ms earlier, `X_acceleration_20ms_ago_rad_s2` the derivative at that time; a machine's own
+combinations of channels, such as the bend of its gearbox, are in `estimation.signals`;
 `campaign_time_s` is the time since the campaign's first run began, added to the measured channels
 by `Campaign.timed`, and live the time since the first sample. Offline they come from a zero-phase
 filter and a noise-robust derivative, live from a causal filter and backward differences: the same
@@ -35,37 +33,9 @@ from estimation.filters import (
 )
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SLOWEST_RAD_S, SPINDLE_SPEED, Samples, closing, in_motion
+from estimation.rest import SPINDLE_SPEED, Samples, closing, in_motion
+from estimation.signals import Combination, Signals, reference
 from estimation.window import ALIKE, lowest, since_lowest
-
-GEAR_RATIO = 35.0
-"""Motor turns a spindle turn, planetary gearhead of the reference rig (O'Neill et al. 2018)."""
-
-GEARBOX = "gearbox_differential_rad"
-
-MOTOR_LOAD = "motor_load_n_m"
-"""The spindle's torque predicted from the motor side: nominal torque constant times current, minus
-nominal Coulomb friction. It is a regressor, not an estimate: it replaces the torque sensor where
-that sensor is the target, since noise shared by both sides of an equation looks like an effect."""
-
-LOAD_N_M_A, LOAD_FRICTION_N_M, LOAD_WIDTH_RAD_S = 0.897, 0.0294, 5.0
-"""Regression of proximal torque on current and direction while moving, 49 runs of the public data
-set MRDLab/mis-tool-characterization; the width is of the filter's smear at a reversal."""
-
-CABLE_LOAD = "cable_load_n_m"
-"""The spindle's torque predicted from the cable side in the same way: nominal ratio times the
-distal torque, and nominal Coulomb friction."""
-
-CABLE_RATIO, CABLE_FRICTION_N_M, CABLE_WIDTH_RAD_S = 2.62, 0.060, 0.15
-"""Regression of proximal on distal torque and direction while moving, runs of the same data."""
-
-CABLE_ANGLE = "cable_angle_rad"
-"""The jaw's angle predicted from the cable side: nominal ratio times the spindle's angle minus the
-distal torque divided by the nominal stiffness. It replaces the jaw's encoder where that is the
-target."""
-
-CABLE_TURN, CABLE_YIELD_RAD_N_M = 0.934, 3.56
-"""Regression of the jaw's angle on the spindle's and the distal torque, runs of the same data."""
 
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
@@ -89,22 +59,26 @@ CLOCKS = ("time_s", CAMPAIGN_TIME)
 Operator = Callable[[FloatArray], FloatArray]
 
 
-def measured_channels(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the measured channels that the named channels are computed from, sorted."""
+def measured_channels(names: Iterable[str], signals: Signals | None = None) -> tuple[str, ...]:
+    """Return the measured channels that the named channels are computed from, sorted.
+
+    Args:
+        names: Channels, measured or derived.
+        signals: The machine's derived channels; the reference rig's when None.
+    """
     needed: set[str] = set()
+    known = signals or reference()
     for name in names:
-        if name == GEARBOX:
-            needed |= {"motor_angle_rad", "spindle_angle_rad"}
+        if (combination := known.combination(name)) is not None:
+            needed |= {share.channel for share in combination.shares}
+            if combination.direction is not None:
+                needed.add(origin_of(combination.direction.speed)[0])
         elif name.endswith((TRAVEL, TURNED)):
             needed.add(_turning(name))
         elif FALL in name:
             needed.add(_plain(name))
         elif RISE in name:
             needed |= {_plain(name), TURNING}
-        elif name == MOTOR_LOAD:
-            needed |= {"motor_current_a", "motor_angle_rad"}
-        elif name in (CABLE_LOAD, CABLE_ANGLE):
-            needed |= {"distal_torque_n_m", "spindle_angle_rad"}
         elif name != "time_s":
             needed.add(origin_of(_now(name))[0])
     return tuple(sorted(needed))
@@ -162,6 +136,7 @@ def _derive(
     names: Iterable[str],
     sample_rate_hz: float,
     derivative: Operator,
+    signals: Signals,
     tracked: Mapping[str, FloatArray] | None = None,
 ) -> dict[str, FloatArray]:
     """Return the named channels, from filtered ones without gaps.
@@ -171,6 +146,7 @@ def _derive(
         names: Channels wanted.
         sample_rate_hz: Their rate.
         derivative: How they are differentiated.
+        signals: The machine's derived channels.
         tracked: Angle to itself and its two derivatives, shape (n, 3), where they are known.
     """
     window = _window(sample_rate_hz)
@@ -187,10 +163,8 @@ def _derive(
 
     channels: dict[str, FloatArray] = {}
     for name in names:
-        if name == GEARBOX:
-            channels[name] = (
-                filtered["motor_angle_rad"] / GEAR_RATIO - filtered["spindle_angle_rad"]
-            )
+        if (combination := signals.combination(name)) is not None:
+            channels[name] = _combined(combination, filtered, differentiated)
         elif name.endswith(TRAVEL):
             channels[name] = since_lowest(filtered[_turning(name)], window)
         elif name.endswith(TURNED):
@@ -203,21 +177,20 @@ def _derive(
             channels[name] = channel - channel[lowest(filtered[TURNING], window, ALIKE)]
         elif (ago := AGO.match(name)) is not None:
             channels[name] = _delayed(differentiated(_now(name)), ago["ms"], sample_rate_hz)
-        elif name == MOTOR_LOAD:
-            direction = np.tanh(derivative(filtered["motor_angle_rad"]) / LOAD_WIDTH_RAD_S)
-            channels[name] = (
-                LOAD_N_M_A * filtered["motor_current_a"] - LOAD_FRICTION_N_M * direction
-            )
-        elif name == CABLE_LOAD:
-            direction = np.tanh(derivative(filtered["spindle_angle_rad"]) / CABLE_WIDTH_RAD_S)
-            carried = CABLE_RATIO * filtered["distal_torque_n_m"]
-            channels[name] = carried + CABLE_FRICTION_N_M * direction
-        elif name == CABLE_ANGLE:
-            stretch = CABLE_YIELD_RAD_N_M * filtered["distal_torque_n_m"]
-            channels[name] = CABLE_TURN * filtered["spindle_angle_rad"] - stretch
         else:
             channels[name] = differentiated(name)
     return channels
+
+
+def _combined(
+    combination: Combination,
+    filtered: Mapping[str, FloatArray],
+    differentiated: Callable[[str], FloatArray],
+) -> FloatArray:
+    parts = [share.times * filtered[share.channel] / share.over for share in combination.shares]
+    if (turn := combination.direction) is not None:
+        parts.append(turn.size * np.tanh(differentiated(turn.speed) / turn.width))
+    return np.asarray(sum(parts[1:], start=parts[0]))
 
 
 def _delayed(values: FloatArray, ms: str, sample_rate_hz: float) -> FloatArray:
@@ -227,7 +200,11 @@ def _delayed(values: FloatArray, ms: str, sample_rate_hz: float) -> FloatArray:
 
 
 def settled_places(
-    channels: Recording, low_pass: LowPass, step: int = 1, samples: Samples = "all"
+    channels: Recording,
+    low_pass: LowPass,
+    step: int = 1,
+    samples: Samples = "all",
+    signals: Signals | None = None,
 ) -> NDArray[np.intp]:
     """Return the places of every n-th sample that is valid and away from the ends of its run.
 
@@ -238,6 +215,7 @@ def settled_places(
         low_pass: The filter applied to them.
         step: Keep every n-th sample.
         samples: Which samples; motion is determined from the speeds among the channels.
+        signals: The machine's speeds of standstill; the reference rig's when None.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
@@ -245,7 +223,7 @@ def settled_places(
     inner[max(len(inner) - edge, 0) :] = False
     if samples == "motion":
         valid = inner.copy()
-        for speed, slowest in SLOWEST_RAD_S.items():
+        for speed, slowest in (signals or reference()).rest.items():
             if speed in channels:
                 inner &= in_motion(channels[speed], valid, channels.sample_rate_hz, slowest)
     if samples == "closing":
@@ -254,7 +232,10 @@ def settled_places(
 
 
 def zero_phase_channels(
-    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER
+    recording: Recording,
+    names: Iterable[str],
+    low_pass: LowPass = PAPER,
+    signals: Signals | None = None,
 ) -> Recording:
     """Return a recording of the named channels, filtered without lag and differentiated.
 
@@ -262,14 +243,16 @@ def zero_phase_channels(
         recording: Measured channels.
         names: Channels wanted, measured or derived; `time_s` is always there.
         low_pass: Filter of every measured channel.
+        signals: The machine's derived channels; the reference rig's when None.
 
     Raises:
         MissingChannelError: A measured channel is not in the recording.
         FilterError: The run cannot be filtered.
     """
     names = list(dict.fromkeys(names))
+    signals = signals or reference()
     wanted = [name for name in names if name not in CLOCKS]
-    measured = {name: recording[name] for name in measured_channels(wanted)}
+    measured = {name: recording[name] for name in measured_channels(wanted, signals)}
     filtered = filter_recording(replace(recording, columns=measured), low_pass)
     period_s = 1.0 / recording.sample_rate_hz
     ticks = recording.ticks
@@ -282,6 +265,7 @@ def zero_phase_channels(
         wanted,
         recording.sample_rate_hz,
         lambda values: np.asarray(holoborodko_derivative(values, period_s)),
+        signals,
     )
     columns = {name: values[ticks] for name, values in derived.items()}
     if CAMPAIGN_TIME in names:
@@ -322,9 +306,12 @@ class CausalChannels:
         sample_rate_hz: float,
         low_pass: LowPass = PAPER,
         tracked: bool = False,
+        signals: Signals | None = None,
     ) -> None:
         self.names = tuple(dict.fromkeys(names))
-        self.measured = measured_channels(name for name in self.names if name not in CLOCKS)
+        self._signals = signals or reference()
+        wanted = [name for name in self.names if name not in CLOCKS]
+        self.measured = measured_channels(wanted, self._signals)
         self._rate_hz = sample_rate_hz
         self._filter = CausalFilter(sample_rate_hz, low_pass)
         self._first_time_s: float | None = None
@@ -397,6 +384,7 @@ class CausalChannels:
             [name for name in self.names if name not in CLOCKS],
             self._rate_hz,
             self._backward,
+            self._signals,
             self._track(filled, first),
         )
         at = ticks[1:] + self._kept - 1  # tick 1 is the first row after the history
@@ -426,7 +414,11 @@ class CausalChannels:
 
 
 def causal_channels(
-    recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER, tracked: bool = False
+    recording: Recording,
+    names: Iterable[str],
+    low_pass: LowPass = PAPER,
+    tracked: bool = False,
+    signals: Signals | None = None,
 ) -> Recording:
     """Return a recording of the named channels as they would have come live.
 
@@ -435,12 +427,13 @@ def causal_channels(
         names: Channels wanted, measured or derived.
         low_pass: Filter of every measured channel.
         tracked: Take speeds and accelerations from a Kalman filter, see `CausalChannels`.
+        signals: The machine's derived channels; the reference rig's when None.
 
     Raises:
         MissingChannelError: A measured channel is not in the recording.
     """
     wanted = [name for name in dict.fromkeys(names) if name != "time_s"]
-    source = CausalChannels(wanted, recording.sample_rate_hz, low_pass, tracked)
+    source = CausalChannels(wanted, recording.sample_rate_hz, low_pass, tracked, signals)
     clocks = [name for name in wanted if name == CAMPAIGN_TIME]
     measured = {name: recording[name] for name in (*source.measured, *clocks)}
     return replace(recording, columns=source.step(recording.time_s, measured))

@@ -1,5 +1,8 @@
 """Errors of the `estimation` package."""
 
+import difflib
+from collections.abc import Sequence
+
 
 class EstimationError(Exception):
     """Base of every error this room raises on purpose.
@@ -31,3 +34,9 @@ class MissingExtraError(EstimationError):
 
 class UnknownNameError(EstimationError):
     """What was named does not exist: a slip of whoever typed it."""
+
+
+def nearest(name: str, allowed: Sequence[str]) -> str:
+    """Return a suggestion of the probable name; all names when none is near."""
+    near = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
+    return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(allowed)}."

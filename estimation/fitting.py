@@ -7,13 +7,14 @@ column, and the model's own offset becomes the mean over the runs.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
 from estimation.campaign import Campaign
-from estimation.derived import CAMPAIGN_TIME, settled_places
+from estimation.derived import CAMPAIGN_TIME
 from estimation.effects import Parameter, Remembering
 from estimation.errors import EstimationError
 from estimation.model import (
@@ -23,6 +24,7 @@ from estimation.model import (
     Term,
     balance_channels,
     estimate,
+    settled,
     with_values,
 )
 from estimation.recording import FloatArray, Recording
@@ -30,13 +32,15 @@ from estimation.within_bounds import solve_within
 
 OFFSET = "sensor.offset"
 
+Shapes = Literal["search", "near", "keep"]
+
 
 class FitError(EstimationError):
     """The model's parameters are not identifiable from the campaign."""
 
 
 @dataclass(frozen=True)
-class _Run:
+class FitRun:
     """A run's filtered channels, whole for effects with memory, and the samples of the fit."""
 
     whole: Recording
@@ -55,7 +59,7 @@ class _Problem:
     """A model laid out for fitting: its runs and which columns are which."""
 
     model: Model
-    runs: list[_Run]
+    runs: list[FitRun]
     free: NDArray[np.intp]  # columns that least squares solves for
     offset: int | None  # column of the model's own offset when run offsets replace it
     names: list[str]  # of all columns
@@ -68,7 +72,7 @@ class _Problem:
         """Shape parameters of all terms, in order."""
         return [p for term in self.model.terms for p in term.effect.shape]
 
-    def columns(self, run: _Run, shape: Sequence[float]) -> FloatArray:
+    def columns(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
         """Return all signed columns of a run, shape (n, columns)."""
         blocks = []
         rest = list(shape)
@@ -77,7 +81,7 @@ class _Problem:
             blocks.append(run.columns(term, own))
         return np.column_stack(blocks) * self.signs
 
-    def gram(self, run: _Run, shape: Sequence[float]) -> FloatArray:
+    def gram(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
         """Return the cross-products of free columns and target of one run."""
         table = np.column_stack(
             [self.columns(run, shape)[:, self.free], run.thin[self.model.target]]
@@ -96,6 +100,7 @@ def fit(
     every: int | None = None,
     bootstrap: int = 200,
     seed: int = 0,
+    shapes: Shapes = "search",
 ) -> Model:
     """Fit a model on the runs of a campaign that are not excluded.
 
@@ -106,6 +111,7 @@ def fit(
         every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
         bootstrap: Number of resamplings of runs behind the spreads; 0 for none.
         seed: Seed of the resampling.
+        shapes: Search shape parameters over their whole range, near their values, or keep them.
 
     Returns:
         The model with values, spreads and evidence. Spreads are to first order in all parameters,
@@ -117,8 +123,11 @@ def fit(
     """
     if run_offsets is not None:
         model = replace(model, run_offsets=run_offsets)
-    problem = _problem(model, _prepared(model, campaign, every))
-    shape = _search_shape(problem)
+    problem = _problem(model, prepared(model, campaign, every))
+    if shapes == "keep":
+        shape = [x for term in model.terms for x in term.numbers(term.effect.shape)]
+    else:
+        shape = _search_shape(problem, everywhere=shapes == "search")
     grams = [problem.gram(run, shape) for run in problem.runs]
     amplitudes = _solve(problem, np.sum(grams, axis=0))
     offset = _mean_offset(problem, shape, amplitudes)
@@ -141,19 +150,29 @@ def evidence_of(fitted: Model, campaign: Campaign, seed: int = 0) -> Evidence:
         FitError: No valid sample.
         MissingChannelError: A run lacks a channel of the model.
     """
-    return _evidence(fitted, _prepared(fitted, campaign, None), seed)
+    return _evidence(fitted, prepared(fitted, campaign, None), seed)
 
 
-def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]:
-    """Read the runs and find every n-th valid sample of them."""
+def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list[FitRun]:
+    """Read the runs and find every n-th valid sample of them that a fit counts.
+
+    Args:
+        model: The model.
+        campaign: The runs.
+        every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
+
+    Raises:
+        FitError: No valid sample.
+        MissingChannelError: A run lacks a channel of the model.
+    """
     runs = []
     timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
     for recording in timed.evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
-        places = settled_places(whole, model.low_pass, step, model.samples)
+        places = settled(model, whole, step)
         if places.size:
-            runs.append(_Run(whole, places, whole.at(places)))
+            runs.append(FitRun(whole, places, whole.at(places)))
     if not runs:
         raise FitError(
             f"No valid samples to fit model {model.name!r}.",
@@ -164,7 +183,7 @@ def _prepared(model: Model, campaign: Campaign, every: int | None) -> list[_Run]
     return runs
 
 
-def _problem(model: Model, runs: list[_Run]) -> _Problem:
+def _problem(model: Model, runs: list[FitRun]) -> _Problem:
     parameters = [(term, p) for term in model.terms for p in term.effect.amplitudes]
     names = [f"{term.effect.id}.{p.name}" for term, p in parameters]
     offset = names.index(f"{OFFSET}.offset") if f"{OFFSET}.offset" in names else None
@@ -221,8 +240,11 @@ def _error_share(problem: _Problem, shape: Sequence[float]) -> float:
     return float(vector @ gram @ vector / max(gram[-1, -1], np.finfo(float).tiny))
 
 
-def _search_shape(problem: _Problem) -> list[float]:
-    """Return the shape parameters: a grid along each, twice round, then a bounded descent."""
+def _search_shape(problem: _Problem, everywhere: bool = True) -> list[float]:
+    """Return the shape parameters: a grid along each, twice round, then a bounded descent.
+
+    Unless everywhere, the descent alone, from the known values.
+    """
     parameters = problem.shape_parameters
     if not parameters:
         return []
@@ -243,7 +265,8 @@ def _search_shape(problem: _Problem) -> list[float]:
             return 1.0
 
     grids = [[_scaled(p, float(x)) for x in p.grid()] for p in parameters]
-    for _ in range(2 if len(parameters) > 1 else 1):
+    rounds = (2 if len(parameters) > 1 else 1) if everywhere else 0
+    for _ in range(rounds):
         for k, grid in enumerate(grids):
             tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
@@ -288,7 +311,7 @@ def _mean_offset(problem: _Problem, shape: Sequence[float], free: FloatArray) ->
     return float(np.mean([_run_offset(problem, run, shape, free) for run in problem.runs]))
 
 
-def _run_offset(problem: _Problem, run: _Run, shape: Sequence[float], free: FloatArray) -> float:
+def _run_offset(problem: _Problem, run: FitRun, shape: Sequence[float], free: FloatArray) -> float:
     left = run.thin[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free
     return float(left.mean() * problem.signs[problem.offset or 0])
 
@@ -347,7 +370,7 @@ def _bootstrap(
 
 
 def _slopes(
-    problem: _Problem, run: _Run, shape: list[float], free: FloatArray, step: float = 1e-3
+    problem: _Problem, run: FitRun, shape: list[float], free: FloatArray, step: float = 1e-3
 ) -> FloatArray:
     """Return the derivative of the estimate by each shape on its scale, shape (n, shapes)."""
     slopes = np.empty((run.places.size, len(shape)))
@@ -402,7 +425,7 @@ def interval95(value: float, replicates: FloatArray) -> tuple[float, float]:
     return min(float(low), float(value)), max(float(high), float(value))
 
 
-def _evidence(fitted: Model, runs: list[_Run], seed: int) -> Evidence:
+def _evidence(fitted: Model, runs: list[FitRun], seed: int) -> Evidence:
     targets = [run.whole[fitted.target][run.places] for run in runs]
     errors = [
         target - estimate(fitted, run.whole)[run.places]

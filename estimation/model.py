@@ -4,21 +4,22 @@ What is declared, what is fitted, what a residual search adds and what runs live
 object. A parameter without a value is one that has not been fitted yet.
 """
 
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import derived
 from estimation.channels import unit_of
 from estimation.effects import Effect, Parameter
-from estimation.errors import EstimationError
+from estimation.errors import EstimationError, nearest
 from estimation.filters import PAPER, LowPass
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED, Samples
+from estimation.signals import Signals, reference
 from estimation.units import evaluate
 
 BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw", "jaw_1", "jaw_2")
@@ -158,7 +159,8 @@ class Model:
 
     Attributes:
         name: Short name.
-        balance: Id of the equation, see `BALANCES`.
+        balance: Id of the equation: one of `BALANCES`, `joint.N`, `calibration.NAME`, or one of a
+            machine of one's own.
         target: Channel that is estimated.
         terms: The effects.
         description: Description and origin.
@@ -168,6 +170,7 @@ class Model:
             is held within a run.
         counted: Which samples count, or None for what suits the effects; see `samples`.
         evidence: Data and errors of the fit, or None for a declared model.
+        signals: Derived channels and speeds of standstill of the machine that it is of.
     """
 
     name: str
@@ -179,16 +182,14 @@ class Model:
     run_offsets: bool = True
     counted: Samples | None = None
     evidence: Evidence | None = None
+    signals: Signals = field(default_factory=reference)
 
     def __post_init__(self) -> None:
         unit_of(self.target)
-        if self.balance not in BALANCES and not re.fullmatch(
-            r"joint\.\d+|calibration\.\S+", self.balance
-        ):
+        if not re.fullmatch(r"[A-Za-z]\w*(\.\S+)?", self.balance):
             raise ModelError(
-                f"Unknown equation {self.balance!r}.",
-                f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME.",
-                nearest(self.balance, BALANCES),
+                f"{self.balance!r} is not a name of an equation.",
+                fix="Use letters, digits and underscores, such as motor or joint.3.",
             )
         if not self.terms:
             raise ModelError(f"The model {self.name!r} has no effect.", "It estimates nothing.")
@@ -221,12 +222,6 @@ class Model:
         return all(p.name in term.values for term in self.terms for p in term.parameters)
 
 
-def nearest(name: str, allowed: Sequence[str]) -> str:
-    """Return a suggestion of the probable name; empty when none is near."""
-    near = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
-    return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(allowed)}."
-
-
 def balance_channels(model: Model, recording: Recording, causal: bool = False) -> Recording:
     """Return the model's channels and its target, filtered alike.
 
@@ -239,11 +234,20 @@ def balance_channels(model: Model, recording: Recording, causal: bool = False) -
         MissingChannelError: The recording lacks a channel.
         FilterError: The run cannot be filtered.
     """
-    source = derived.causal_channels if causal else derived.zero_phase_channels
     wanted = [*model.channels, model.target]
     if model.samples == "closing":
         wanted.append(SPINDLE_SPEED)
-    return source(recording, wanted, model.low_pass)
+    return _filtered(model, recording, wanted, causal)
+
+
+def _filtered(model: Model, recording: Recording, wanted: Sequence[str], causal: bool) -> Recording:
+    source = derived.causal_channels if causal else derived.zero_phase_channels
+    return source(recording, wanted, model.low_pass, signals=model.signals)
+
+
+def settled(model: Model, channels: Recording, step: int = 1) -> NDArray[np.intp]:
+    """Return the places of every n-th sample that counts for a model, see `settled_places`."""
+    return derived.settled_places(channels, model.low_pass, step, model.samples, model.signals)
 
 
 def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> FloatArray:
@@ -276,8 +280,7 @@ def predict(model: Model, recording: Recording, causal: bool = False) -> FloatAr
         NotFittedError: A parameter has no value.
         MissingChannelError: The recording lacks a channel.
     """
-    source = derived.causal_channels if causal else derived.zero_phase_channels
-    return estimate(model, source(recording, model.channels, model.low_pass))
+    return estimate(model, _filtered(model, recording, model.channels, causal))
 
 
 def with_values(

@@ -11,36 +11,52 @@ sign = -1
 channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
+A model of another machine than the reference rig states that machine's derived channels and its
+speeds of standstill under `[[signals.derived]]` and `[signals.rest]`.
+
 A file of several equations contains each under `[[models]]`, with `[models.processing]`,
-`[[models.effects]]` and `[models.fit]`, and has the schema `rig.models/1`.
+`[[models.effects]]`, `[models.signals]` and `[models.fit]`, and has the schema `rig.models/1`.
 """
 
 import difflib
-import json
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import cast, get_args
 
 from estimation.effects import effect
-from estimation.errors import EstimationError
+from estimation.errors import EstimationError, nearest
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
-from estimation.model import Estimate, Evidence, Model, ModelError, Term, nearest
-from estimation.model_table import ModelFileError, NoModelError, Table
+from estimation.model import BALANCES, Estimate, Evidence, Model, ModelError, Term
+from estimation.model_table import ModelFileError, NoModelError
+from estimation.plant_file import shipped_plant
+from estimation.plant_models import declared
 from estimation.rest import Samples
+from estimation.signals import Signals, combination_lines, read_combinations, reference
+from estimation.toml_table import Table
+from estimation.toml_table import value_text as _value
 
 SCHEMA = "rig.model/1"
 SEVERAL = "rig.models/1"
 
 
 def shipped() -> dict[str, Path]:
-    """Return the declared models that come with the project, by name."""
+    """Return the files of declared models that come with the project, by name."""
     folder = Path(str(files("estimation"))) / "models"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def names() -> list[str]:
+    """Return the names of all shipped models: files, and equations of the reference rig."""
+    return sorted([*shipped(), *(model.balance for model in reference_rig())])
+
+
+def reference_rig() -> list[Model]:
+    """Return the equations of the reference rig, declared and not fitted."""
+    return declared(shipped_plant("reference"))
 
 
 def read(path: Path) -> Model:
@@ -56,7 +72,7 @@ def read_all(path: Path) -> list[Model]:
     """Read every model of a model file.
 
     Args:
-        path: The file, or the name of a model from `shipped`.
+        path: The file, or the name of a model from `names`.
 
     Raises:
         NoModelError: There is no such file and no such name; it is a ModelFileError, too.
@@ -64,18 +80,21 @@ def read_all(path: Path) -> list[Model]:
     """
     known = shipped()
     place = known.get(str(path), path)
+    own = [model for model in reference_rig() if model.balance == str(path)]
+    if own:
+        return own
     if not place.exists():
-        near = difflib.get_close_matches(str(path), known, n=1)
+        near = difflib.get_close_matches(str(path), names(), n=1)
         raise NoModelError(
             f"There is no model {str(path)!r}: neither a file nor a shipped model.",
-            f"Shipped: {', '.join(known)}.",
+            f"Shipped: {', '.join(names())}.",
             f"Did you mean {near[0]!r}?" if near else "Name a model file, or one of these.",
         )
     try:
         text = place.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ModelFileError(
-            f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(known)}."
+            f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(names())}."
         ) from error
     return parse_all(text, str(place))
 
@@ -100,7 +119,7 @@ def parse_all(text: str, where: str = "model") -> list[Model]:
         ModelFileError: The text is not TOML, or a key is unknown, missing or wrong.
     """
     try:
-        top = Table(tomllib.loads(text), where)
+        top = Table(tomllib.loads(text), where, ModelFileError)
         schema = top.take("schema", str)
         if schema == SCHEMA:
             return [_model(top)]
@@ -123,9 +142,10 @@ def _model(top: Table) -> Model:
     processing = top.table("processing")
     evidence = top.table("fit")
     target = top.take("target", str)
+    signals = _signals(top)
     model = Model(
         name=top.take("name", str),
-        balance=top.take("balance", str),
+        balance=_balance(top, signals),
         target=target,
         description=top.take("description", str, ""),
         terms=tuple(_term(entry, target) for entry in top.tables("effects")),
@@ -136,10 +156,37 @@ def _model(top: Table) -> Model:
         run_offsets=processing.take("run_offsets", bool, True),
         counted=_counted(processing),
         evidence=_evidence(evidence) if evidence.content else None,
+        signals=signals,
     )
     for table in (top, processing, evidence):
         table.finish()
     return model
+
+
+def _signals(top: Table) -> Signals:
+    """Return a model's own derived channels and speeds of standstill, or the reference rig's."""
+    if "signals" not in top.content:
+        return reference()
+    table = top.table("signals")
+    rest = table.table("rest")
+    slowest = {speed: rest.number(speed) for speed in rest.content}
+    found = Signals(read_combinations(table.tables("derived", [])), slowest)
+    table.finish()
+    return found
+
+
+def _balance(top: Table, signals: Signals) -> str:
+    """Return the name of a model's equation; of the reference rig it is one of those known."""
+    name: str = top.take("balance", str)
+    kind = name.partition(".")[0]
+    if signals == reference() and kind not in (*BALANCES, "joint", "calibration"):
+        raise ModelFileError(
+            f"{top.where}: unknown equation {name!r}.",
+            f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME; a machine file has its"
+            " own.",
+            nearest(name, BALANCES),
+        )
+    return name
 
 
 def write(model: Model, path: Path) -> None:
@@ -184,6 +231,10 @@ def _lines(model: Model, within: str = "") -> list[str]:
     ]
     if model.counted is not None:
         lines.append(f"samples = {_value(model.counted)}")
+    if model.signals != reference():
+        lines += ["", f"[{within}signals.rest]"]
+        lines += [f"{speed} = {_value(slow)}" for speed, slow in model.signals.rest.items()]
+        lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
     for term in model.terms:
         lines += [
             "",
@@ -212,21 +263,6 @@ def _lines(model: Model, within: str = "") -> list[str]:
         if model.evidence.made_at:
             lines.append(f"made_at = {_value(model.evidence.made_at)}")
     return lines
-
-
-def _value(value: Any) -> str:
-    """Return a value as TOML; a JSON string is a TOML basic string but for DEL."""
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ModelError(f"A model file cannot hold the value {value}.")
-    return repr(value)
 
 
 def _term(entry: Table, target: str) -> Term:

@@ -17,9 +17,9 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
-from estimation.derived import measured_channels, settled_places, zero_phase_channels
+from estimation.derived import measured_channels, zero_phase_channels
 from estimation.errors import EstimationError
-from estimation.model import Model, estimate
+from estimation.model import Model, estimate, settled
 from estimation.recording import FloatArray, Recording
 
 VARIABLES: dict[str, str] = {
@@ -123,13 +123,15 @@ def residuals(model: Model, campaign: Campaign, rate_hz: float = RATE_HZ) -> lis
     found = []
     for recording in campaign.evidence:
         there = [
-            c for c in VARIABLES.values() if set(measured_channels([c])) <= {*recording.columns}
+            c
+            for c in VARIABLES.values()
+            if set(measured_channels([c], model.signals)) <= {*recording.columns}
         ]
         channels = zero_phase_channels(
-            recording, [*model.channels, model.target, *there], model.low_pass
+            recording, [*model.channels, model.target, *there], model.low_pass, model.signals
         )
         step = max(1, int(recording.sample_rate_hz / rate_hz))
-        places = settled_places(channels, model.low_pass, step, model.samples)
+        places = settled(model, channels, step)
         estimated = estimate(model, channels)[places]
         run = channels.at(places)
         found.append(RunResidual(run, estimated, run[model.target] - estimated))

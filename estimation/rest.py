@@ -22,11 +22,6 @@ SPINDLE_SPEED = "spindle_velocity_rad_s"
 Samples = Literal["all", "motion", "closing"]
 """Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
 
-SLOWEST_RAD_S = {SPEED: 0.7, SPINDLE_SPEED: 0.02}
-"""Speeds that friction depends on, and the threshold of standstill of each. While the gearbox winds
-up the motor turns and the spindle stands still: an equation is static when the speed of its own
-friction is below the threshold."""
-
 CLOSING_RAD_S, TRIM_S = 0.25, 1.0
 """Filtered spindle speed from which a sample counts as closing, and the part omitted at the start
 and at the end of each run (O'Neill et al. 2018, section II.C)."""
@@ -40,19 +35,19 @@ def in_motion(
     speed: FloatArray,
     valid: NDArray[np.bool_],
     sample_rate_hz: float,
-    slowest_rad_s: float = SLOWEST_RAD_S[SPEED],
+    slowest: float,
 ) -> NDArray[np.bool_]:
     """Return which samples of a run are away from rest, shape (n,).
 
     Args:
-        speed: Filtered speed, rad/s, shape (n,).
+        speed: Filtered speed, shape (n,).
         valid: Samples whose speed can be trusted, shape (n,).
         sample_rate_hz: Rate of the samples.
-        slowest_rad_s: Speed below which it is at rest; the motor's unless stated.
+        slowest: Speed below which it is at rest, in the unit of the speed.
     """
     size = np.abs(speed)
     usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
-    rest = (size < max(slowest_rad_s, REST_SHARE * usual)).astype(np.uint8)
+    rest = (size < max(slowest, REST_SHARE * usual)).astype(np.uint8)
     reach = 2 * round(REST_REACH_S * sample_rate_hz) + 1
     return np.asarray(ndimage.maximum_filter1d(rest, reach) == 0)
 

@@ -29,7 +29,9 @@ class Stream:
             FilterError: The model's filter does not fit the rate.
         """
         self.model = model
-        self._source = CausalChannels(model.channels, sample_rate_hz, model.low_pass)
+        self._source = CausalChannels(
+            model.channels, sample_rate_hz, model.low_pass, signals=model.signals
+        )
         self._weights = [np.array(term.weights) for term in model.terms]
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]

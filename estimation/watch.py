@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.derived import settled_places
-from estimation.model import Model, balance_channels, estimate
+from estimation.model import Model, balance_channels, estimate, settled
 from estimation.recording import Recording
 
 SLACK = 0.5
@@ -119,7 +118,7 @@ def _begin(rising: Sequence[tuple[str, float]]) -> str:
 def run_error(model: Model, recording: Recording) -> float | None:
     """Return a model's error on one run as its fit counts it, or None without a usable sample."""
     channels = balance_channels(model, recording)
-    places = settled_places(channels, model.low_pass, samples=model.samples)
+    places = settled(model, channels)
     if places.size == 0:
         return None
     error = (channels[model.target] - estimate(model, channels))[places]

@@ -86,6 +86,37 @@ ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
 }
 """Exit code of each other room's errors; the first class that fits counts."""
 
+PAGE = "docs/troubleshooting.md"
+"""The page of symptoms, in the source tree and on the documentation site."""
+
+ANCHORS: dict[str, str] = {
+    "rig.SafetyTripError": "the-rig-stops",
+    "drivers.DisarmUnconfirmedError": "the-rig-stops",
+    "drivers.DriveFaultError": "the-rig-stops",
+    "drivers.DriverError": "the-rig-does-not-answer",
+    "calibration.UnfitCalibrationError": "a-calibration-must-not-be-used",
+    "calibration.StoreError": "a-calibration-must-not-be-used",
+    "calibration.UnknownNameError": "a-command-is-refused",
+    "calibration.CalibrationError": "a-calibration-is-refused",
+    "estimation.OutputError": "an-output-is-refused",
+    "estimation.UnknownNameError": "a-command-is-refused",
+    "estimation.EstimationError": "recordings-or-a-model-do-not-fit",
+    "rig.DataError": "a-log-is-refused",
+    "rig.UsageError": "a-command-is-refused",
+    "rig.RigError": "the-rig-does-not-answer",
+}
+"""Room and class of an error to the section of the page; the nearest base of a class counts."""
+
+A_BUG = "a-fault-in-rig-itself"
+"""Section for an error that nobody raised on purpose."""
+
+
+def anchor_of(kind: type[Exception]) -> str:
+    """Return the section of the troubleshooting page for a kind of error."""
+    names = (f"{base.__module__.partition('.')[0]}.{base.__name__}" for base in kind.__mro__)
+    return next((ANCHORS[name] for name in names if name in ANCHORS), A_BUG)
+
+
 KNOWN_ERRORS: tuple[type[Exception], ...] = (RigError, *ROOM_EXIT_CODES)
 
 

@@ -6,7 +6,7 @@ commute. Wrist motors behind a coupling get channels of their own angles: their 
 function of those and acts on several joints.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +75,20 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
         _, _, directions = np.linalg.svd(felt, full_matrices=False)
         corrections[k, arm.shared] = root @ directions[:CORRECTIONS].T
     return SharedFit(found.values, corrections)
+
+
+def laid_out(
+    arm: ArmBalances, recordings: Sequence[Recording], train: Collection[str]
+) -> list[Recording]:
+    """Return an arm's runs with the shared link torque, fitted on training runs.
+
+    Args:
+        arm: The arm.
+        recordings: Its runs.
+        train: Names of the training runs; others are not used in the fit.
+    """
+    fitted = shared_fit(arm, [run for run in recordings if run.name in train])
+    return with_links(arm, recordings, fitted)
 
 
 def with_links(

@@ -35,8 +35,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimation.bank.fitting import Shape
-from estimation.derived import GEAR_RATIO, TRAVEL_WINDOW_S, ago_of, fall_of, rise_of
+from estimation.derived import TRAVEL_WINDOW_S, ago_of, fall_of, rise_of
+from estimation.plant_file import shipped_plant
 from estimation.recording import FloatArray
+
+GEAR_RATIO = next(
+    joint.ratio for joint in shipped_plant("reference").transmissions if joint.ratio is not None
+)
+"""Motor turns a spindle turn of the reference rig: it scales the states of speed and ripple."""
 
 LAGS_MS = (5, 10, 20, 40, 80, 150, 300, 480)
 LAGS = tuple(f"l{ms}" for ms in LAGS_MS)

@@ -17,8 +17,6 @@ from scipy import ndimage
 from estimation.campaign import Campaign
 from estimation.derived import (
     CAMPAIGN_TIME,
-    GEAR_RATIO,
-    GEARBOX,
     measured_channels,
     origin_of,
     zero_phase_channels,
@@ -29,7 +27,8 @@ from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording, shared_columns
-from estimation.rest import SLOWEST_RAD_S, in_motion
+from estimation.rest import in_motion
+from estimation.signals import Signals
 
 SERIES_PER_CUTOFF = 5.0
 """Samples kept for each period of the filter's cutoff, for effects with memory."""
@@ -195,12 +194,14 @@ class Layout:
         runs: The runs, in the order they were recorded.
         measured: Channels that every run has.
         independent: Pairs of an effort and an equation that has it from other sensors than its own.
+        undecided: Declared equation that is not laid out to the reason.
     """
 
     equations: Mapping[str, Equation]
     runs: Sequence[RunSignals]
     measured: tuple[str, ...]
     independent: set[tuple[str, str]] = field(default_factory=set)
+    undecided: Mapping[str, str] = field(default_factory=dict)
 
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
@@ -222,40 +223,68 @@ def lay_out(
         LayoutError: A run has no sample to regress on.
         FitError: An equation cannot be identified.
     """
-    timed = _on_one_clock(recordings)
+    timed = on_one_clock(recordings)
     campaign = Campaign.of([r for r in timed if r.name in set(train)])
     measured = tuple(n for n in shared_columns(timed) if n != CAMPAIGN_TIME)
-    equations = {}
+    equations: dict[str, Equation] = {}
+    undecided: dict[str, EstimationError] = {}
     for model in models:
-        if set(measured_channels([*model.channels, model.target])) <= {*measured, "time_s"}:
+        needed = set(measured_channels([*model.channels, model.target], model.signals))
+        try:
+            if lacking := needed - {*measured, "time_s", CAMPAIGN_TIME}:
+                raise LayoutError(
+                    f"Some run has no {', '.join(sorted(lacking))}.",
+                    f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
+                    "Record it, or declare an equation of channels that were recorded.",
+                )
             equations[model.balance] = _equation(fit(model, campaign, bootstrap=0, every=None))
+        except EstimationError as error:
+            undecided[model.balance] = error
     if not equations:
-        raise LayoutError(
-            "No declared equation can be written with these channels.",
-            f"The runs have {', '.join(measured)}.",
-            "Declare an equation of channels that were recorded.",
-        )
-    return Layout(equations, [_signals(r, equations, measured) for r in timed], measured)
+        raise next(iter(undecided.values()))
+    runs = [_signals(r, equations, measured) for r in timed]
+    reasons = {name: str(error) for name, error in undecided.items()}
+    return Layout(equations, runs, measured, undecided=reasons)
 
 
-def sensitivity(name: str, measured: str) -> tuple[float, int] | None:
+def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
+    """Return other runs with the equations of a layout, for what a cause would do there.
+
+    A run without enough samples of some equation is left out.
+
+    Raises:
+        LayoutError: All of them are.
+    """
+    runs, lost = [], None
+    for recording in on_one_clock(recordings):
+        try:
+            runs.append(_signals(recording, layout.equations, layout.measured))
+        except LayoutError as error:
+            lost = error
+    if lost is not None and not runs:
+        raise lost
+    return Layout(layout.equations, runs, layout.measured)
+
+
+def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:
     """Return how a channel follows an error of a measured one: (gain, times differentiated).
 
     Args:
         name: Measured or derived channel.
         measured: Measured channel whose reading is wrong.
+        signals: The machine's derived channels.
 
     Returns:
         None where the channel does not read it.
     """
-    if name == GEARBOX:
-        gains = {"motor_angle_rad": 1.0 / GEAR_RATIO, "spindle_angle_rad": -1.0}
-        return (gains[measured], 0) if measured in gains else None
+    if (combination := signals.combination(name)) is not None:
+        gain = combination.gain(measured)
+        return (gain, 0) if gain else None
     source, times = origin_of(name)
     return (1.0, times) if source == measured else None
 
 
-def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
+def on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     """Return the runs with the campaign's time; where no start is known they follow one another."""
     known = Campaign.of(recordings).timed()
     timed = list(known.evidence)
@@ -293,8 +322,8 @@ def _signals(
         for rate in rates
     ]
     wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
-    low_pass = models[0].low_pass
-    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass)
+    low_pass, signals = models[0].low_pass, models[0].signals
+    filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
     rate_hz = recording.sample_rate_hz
     step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
     edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
@@ -302,7 +331,8 @@ def _signals(
     spoilt[:edge] = True
     spoilt[max(len(spoilt) - edge, 0) :] = True
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
-    random = zero_phase_channels(_white_noise(recording, wanted), wanted, low_pass)
+    reading = measured_channels((n for n in wanted if n != CAMPAIGN_TIME), signals)
+    random = zero_phase_channels(_white_noise(recording, reading), wanted, low_pass, signals)
     noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
@@ -314,7 +344,7 @@ def _signals(
     for equation in equations.values():
         moving = np.ones(len(valid), bool)
         if equation.speed and equation.model.counted != "all":
-            slowest = SLOWEST_RAD_S.get(equation.speed, 0.0)
+            slowest = equation.model.signals.rest.get(equation.speed, 0.0)
             moving = in_motion(channels[equation.speed], valid, rate_hz, slowest)
         used[equation.name] = np.flatnonzero(moving[grid])
         if len(used[equation.name]) < 20:
@@ -327,10 +357,9 @@ def _signals(
     return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
 
 
-def _white_noise(recording: Recording, names: Sequence[str]) -> Recording:
+def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:
     """Return a recording of white noise, as wide in each channel as that channel's own."""
     random = np.random.default_rng(0)
-    measured = measured_channels(n for n in names if n != CAMPAIGN_TIME)
     return recording.with_columns(
         **{n: _noise_width(recording[n]) * random.standard_normal(len(recording)) for n in measured}
     )

@@ -21,7 +21,7 @@ def folds_of(layout: Layout) -> list[list[list[int]]]:
     """
     runs = layout.runs
     families = [[[k] for k in range(len(runs))]]
-    found = [_levels(values) for values in _conditions(layout)]
+    found = [_levels(values) for values in _conditions(layout).values()]
     unique: list[list[list[int]]] = []
     for levels in found:
         if levels and levels not in unique:
@@ -29,18 +29,26 @@ def folds_of(layout: Layout) -> list[list[list[int]]]:
     return families + unique
 
 
-def _conditions(layout: Layout) -> list[list[float]]:
-    out = []
+def unvaried(layout: Layout) -> list[str]:
+    """Return the channels of the conditions that have too few levels for folds by level."""
+    return [name for name, values in _conditions(layout).items() if not _levels(values)]
+
+
+def _conditions(layout: Layout) -> dict[str, list[float]]:
+    """Return channel to the level of that condition in each run."""
+    out = {}
     for equation in layout.equations.values():
         if equation.of_angle:
             continue
         for name in (*equation.channels, equation.target):
             if name.endswith(("_n_m", "_n")):
-                out.append([float(r.on_grid(name).mean()) for r in layout.runs])
+                out[name] = [float(r.on_grid(name).mean()) for r in layout.runs]
                 break
     speeds = [e.speed for e in layout.equations.values() if e.speed]
     if speeds:
-        out.append([float(np.percentile(np.abs(r.on_grid(speeds[0])), 95)) for r in layout.runs])
+        out[speeds[0]] = [
+            float(np.percentile(np.abs(r.on_grid(speeds[0])), 95)) for r in layout.runs
+        ]
     return out
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
 from estimation.derived import CAMPAIGN_TIME, measured_channels
+from estimation.signals import Signals
 
 Kind = Literal["loss", "actuator", "deflection", "torque sensor", "angle sensor"]
 
@@ -72,11 +73,19 @@ def _angles(layout: Layout) -> list[str]:
     No other channel is ever read: another recorded channel may be a copy of a target.
     """
     read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
-    names = [n for n in measured_channels(read) if n.endswith(ANGLES) and n in layout.measured]
+    names = [n for n in measured_channels(read, _signals(layout)) if n.endswith(ANGLES)]
+    names = [n for n in names if n in layout.measured]
     return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
 
 
+def _signals(layout: Layout) -> Signals:
+    return next(iter(layout.equations.values())).model.signals
+
+
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:
+    """Return the channels of an angle's motion; none where no angle is read."""
+    if not angle:
+        return {}
     base = next(a for a in ANGLES if angle.endswith(a))
     speed, acceleration = RATES[base]
     stem = angle.removesuffix(base)
@@ -88,30 +97,37 @@ def _motion(angle: str) -> dict[str, tuple[str, ...]]:
 
 
 def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str, ...]]:
-    return {
+    """Return the roles of clocks, and those of angles as far as any is read."""
+    roles: dict[str, tuple[str, ...]] = {
         "clock": ("time_s",),
         "elapsed": (CAMPAIGN_TIME,),
         "campaign_clock": (CAMPAIGN_TIME,),
-        "motor_angle": tuple(layout_angles[:1]),
-        **dict.fromkeys(("position", "stop", "tilt"), (position,)),
-        # a harmonic of the only shaft there is has one name
-        "output_angle": (position,) if len(layout_angles) > 1 else (),
     }
+    if layout_angles:
+        roles["motor_angle"] = tuple(layout_angles[:1])
+    if position:
+        roles |= dict.fromkeys(("position", "stop", "tilt"), (position,))
+    if len(layout_angles) > 1:  # a harmonic of the only shaft there is has one name
+        roles["output_angle"] = (position,)
+    return roles
 
 
 def _position(angles: Sequence[str], own: str) -> str:
     """Return the angle that the place's shaft or its output turns by."""
     slow = [a for a in angles if a != angles[0]] or list(angles)
-    return own if own in slow else slow[0]
+    return own if own in slow else next(iter(slow), "")
 
 
 def _own_angle(equation: Equation, angles: Sequence[str]) -> str:
     for angle in angles:
         if equation.speed in _motion(angle)["speed"]:
             return angle
+    if not angles:
+        return ""
     if equation.of_angle:
         inside = [a for a in angles if a in equation.channels]
-        inside += [a for a in angles if sensitivity(equation.target, a) is not None]
+        known = equation.model.signals
+        inside += [a for a in angles if sensitivity(equation.target, a, known) is not None]
         return inside[-1] if inside else angles[-1]
     return angles[0]
 
@@ -141,7 +157,7 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
     term = next(t for t in equation.terms if t.effect.id == "motor.torque_constant")
     current = term.channels["source"]
-    roles = _shared(angles, _position(angles, angles[0])) | {
+    roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
         "current": (current,),
         "drive": (current,),
         "reading": (current,),
@@ -167,11 +183,11 @@ def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
 def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:
     enters = []
     for equation in layout.equations.values():
-        found = sensitivity(equation.target, channel)
+        found = sensitivity(equation.target, channel, equation.model.signals)
         if found is not None:
             enters.append(Entry(equation.name, found[0], found[1]))
         for name, weight in equation.channels.items():
-            found = sensitivity(name, channel)
+            found = sensitivity(name, channel, equation.model.signals)
             if found is not None:
                 enters.append(Entry(equation.name, -weight * found[0], found[1]))
     if not enters:

@@ -20,6 +20,9 @@ AT_ONCE = 3000
 """Candidates times squared columns in one block: keeps its memory small."""
 
 MOST_CAUSES = 3
+NOTHING = 1e-12
+"""Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
+
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
 
@@ -376,7 +379,7 @@ def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
 def laid_out(
     layout: Layout, joint: Joint, cause: Source | Function, acts: tuple[bool, ...] | None = None
 ) -> Candidate | None:
-    """Return a cause laid out on the runs in which it acts; None where it is not finite.
+    """Return a cause laid out on the runs in which it acts; None where it shows nowhere.
 
     Args:
         layout: The runs.
@@ -394,6 +397,8 @@ def laid_out(
         columns.append(own)
     unit: Scale = "none" if isinstance(cause, Function) else "first" if cause.bend else "each"
     laid = joint.laid(columns, unit)
+    if float(laid.size.min()) < NOTHING:
+        return None
     noise = [cause.noise(run) for run in layout.runs]
     if acts is not None:
         noise = [

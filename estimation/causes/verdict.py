@@ -4,21 +4,25 @@ The test runs take no part in the search. They are opened once, when every hypot
 """
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from estimation.causes.equations import Layout, lay_out
+from estimation.causes.equations import Layout, lay_out, on_one_clock
+from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function, names
+from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
-from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.search import Candidate, Found, Scored, laid_out, search
-from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
-from estimation.diagnosis.split import Sealed
-from estimation.model import Model
-from estimation.recording import FloatArray, Recording
+from estimation.causes.refits import Refits
+from estimation.causes.search import Candidate, Found, Scored, search
+from estimation.diagnosis.audit import audit
+from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.model import Model, Term
+from estimation.recording import Recording
 
 SURE = 0.9
 """Probability from which a single name is given; below it the verdict is a set."""
@@ -64,12 +68,59 @@ class Probability:
     best: Scored
 
 
+@dataclass(frozen=True)
+class Kept:
+    """A cause that the test runs confirmed.
+
+    Attributes:
+        scored: The cause.
+        likely: The probabilities of the families in its place.
+        ranked: Every candidate in its place, given the other causes, best first.
+    """
+
+    scored: Scored
+    likely: Sequence[Probability]
+    ranked: Sequence[Scored]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A diagnosis with what a report, a model file and the next experiment need.
+
+    Attributes:
+        diagnosis: The diagnosis.
+        layout: The equations on all runs.
+        found: The search on the training runs.
+        kept: The cause of each finding.
+        refits: The equations before and after.
+        models: The models with the causes that a file can hold.
+    """
+
+    diagnosis: Diagnosis
+    layout: Layout
+    found: Found
+    kept: tuple[Kept, ...]
+    refits: Refits
+    models: tuple[Model, ...]
+
+
 def diagnose(
     recordings: Sequence[Recording],
     models: Sequence[Model],
     sealed: Sealed,
     numbers: Numbers = DEFAULT,
 ) -> Diagnosis:
+    """Identify what the declared equations lack; see `answer`."""
+    return answer(recordings, models, sealed, numbers).diagnosis
+
+
+def answer(
+    recordings: Sequence[Recording],
+    models: Sequence[Model],
+    sealed: Sealed,
+    numbers: Numbers = DEFAULT,
+    on_stage: Callable[[str], None] = lambda _: None,
+) -> Answer:
     """Identify what the declared equations lack.
 
     Args:
@@ -77,32 +128,40 @@ def diagnose(
         models: Declared equations.
         sealed: Which runs train and which test.
         numbers: What decides.
+        on_stage: Called with what begins, in words.
 
     Raises:
         LayoutError: No equation can be laid out on these runs.
         FitError: A declared equation cannot be identified.
     """
     began = time.perf_counter()
-    layout = lay_out(models, recordings, sealed.discover)
+    on_stage("fitting the declared equations")
+    timed = on_one_clock(recordings)
+    layout = lay_out(models, timed, sealed.discover)
     add_instruments(layout, sealed.discover)
-    found = search(layout.select(sealed.discover), numbers)
-    whole = _Test(layout, sealed, numbers)
-    findings = _findings(found, whole, sealed, numbers)
-    return Diagnosis(
+    on_stage("searching the training runs for what they lack")
+    with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
+        found = search(layout.select(sealed.discover), numbers)
+    on_stage("opening the held-out test runs")
+    refits = Refits(layout, timed, sealed, numbers)
+    kept, findings, notes = _judged(found, HeldOut(layout, sealed, numbers), refits)
+    written = refits.models()
+    findings = [
+        replace(f, parameters=_parameters(k.scored, f.balance, written))
+        for k, f in zip(kept, findings, strict=True)
+    ]
+    diagnosis = Diagnosis(
         findings=tuple(findings),
-        errors=whole.errors([f.scored.candidate for f in whole.kept]),
+        errors=refits.errors(),
         unit={name: e.model.unit for name, e in layout.equations.items()},
         noise_floor=dict.fromkeys(layout.equations),
-        moved={},
+        moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
-        undecided={
-            m.balance: "its channels were not recorded"
-            for m in models
-            if m.balance not in layout.equations
-        },
-        notes=tuple(whole.notes),
+        undecided=dict(layout.undecided),
+        notes=(*_limits(timed, layout, sealed), *notes),
         seconds=time.perf_counter() - began,
     )
+    return Answer(diagnosis, layout, found, tuple(kept), refits, tuple(written))
 
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
@@ -121,143 +180,76 @@ def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Pro
     )
 
 
-@dataclass(frozen=True)
-class _Kept:
-    scored: Scored
-    likely: Sequence[Probability]
-
-
-class _Test:
-    """The test runs, opened once: errors there before and after each cause."""
-
-    def __init__(self, layout: Layout, sealed: Sealed, numbers: Numbers) -> None:
-        self.layout, self.numbers = layout, numbers
-        self.joint = Joint(layout, numbers)
-        self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
-        self.kept: list[_Kept] = []
-        self.notes: list[str] = []
-
-    def beside(self, joint: Joint, candidate: Candidate) -> Joint:
-        """Return a regression with a cause; one of open runs acts in none of those."""
-        acts = None
-        if candidate.acts is not None:
-            acts = tuple(on is True for on in self._state(candidate).values())
-        laid = laid_out(self.layout, self.joint, candidate.cause, acts)
-        return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
-
-    def _state(self, candidate: Candidate) -> Mapping[str, bool | None]:
-        """Return whether a cause acts in each run; None where the training runs do not decide.
-
-        A test run between a run in which the cause acts and one in which it does not is open.
-        """
-        order = [run.name for run in self.layout.runs]
-        if candidate.acts is None:
-            return dict.fromkeys(order, True)
-        train = [r for k, r in enumerate(order) if k not in self.at]
-        known = dict(zip(train, candidate.acts, strict=True))
-        out: dict[str, bool | None] = {}
-        for k, name in enumerate(order):
-            before = [known[n] for n in order[: k + 1] if n in known][-1:]
-            after = [known[n] for n in order[k:] if n in known][:1]
-            around = {*before, *after}
-            out[name] = around.pop() if len(around) == 1 else None
-        return out
-
-    def runs_affected(self, candidate: Candidate) -> tuple[str, ...]:
-        """Return the runs in which a cause acts."""
-        return tuple(name for name, acts in self._state(candidate).items() if acts)
-
-    def squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
-        """Return the squared error of each test run, fitted on the training runs alone."""
-        joint = self.joint
-        for cause in causes:
-            joint = self.beside(joint, cause)
-        (errors,) = joint.base_errors([[self.at]])
-        return {p: values[self.at] for p, values in errors.items()}
-
-    def gain(self, before: Sequence[Candidate], cause: Candidate) -> float:
-        """Return the score of one more cause on the test runs."""
-        old, new = self.squared(before), self.squared([*before, cause])
-        state = self._state(cause)
-        told = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is not None]
-        if not told:
-            return 0.0
-        total = 0.0
-        for p, samples in self.joint.samples.items():
-            pair = [e[p][told].sum() / samples[self.at][told].sum() for e in (old, new)]
-            total += float(self.joint.log_ratio(p, *pair))
-        return total
-
-    def rmse(self, causes: Sequence[Candidate], equation: str) -> float:
-        """Return the root mean square error within test runs of one equation."""
-        part = (equation, "within")
-        samples = self.joint.samples[part][self.at].sum()
-        return float(np.sqrt(self.squared(causes)[part].sum() / samples))
-
-    def errors(self, causes: Sequence[Candidate]) -> dict[str, Error]:
-        """Return the errors of every equation before and after the causes."""
-        before, after = self.squared([]), self.squared(causes)
-        out = {}
-        for name in self.layout.equations:
-            within, between = (name, "within"), (name, "between")
-            samples = self.joint.samples[within][self.at]
-            pairs = []
-            for squares in (before, after):
-                inner = squares[within].sum() / samples.sum()
-                outer = inner + squares[between].mean()
-                pairs.append((float(np.sqrt(inner)), float(np.sqrt(outer))))
-            runs = [self.layout.runs[k].name for k in self.at]
-            by_run = [
-                dict(zip(runs, np.sqrt(s[within] / samples).tolist(), strict=True))
-                for s in (before, after)
-            ]
-            out[name] = Error(
-                pairs[0][0],
-                pairs[1][0],
-                pairs[0][1],
-                pairs[1][1],
-                (float("nan"), float("nan")),
-                by_run[0],
-                by_run[1],
-            )
-        return out
-
-
-def _findings(found: Found, test: _Test, sealed: Sealed, numbers: Numbers) -> list[Finding]:
+def _judged(
+    found: Found, held_out: HeldOut, refits: Refits
+) -> tuple[list[Kept], list[Finding], list[str]]:
+    """Return the causes that the test runs confirm, their findings, and notes on the others."""
+    numbers, sealed = refits.numbers, refits.sealed
+    kept: list[Kept] = []
     findings: list[Finding] = []
-    before: list[Candidate] = []
+    notes: list[str] = []
     for scored, ranked in zip(found.causes, found.conditional, strict=True):
-        gain = test.gain(before, scored.candidate)
-        evidence = float(np.exp(min(numbers.sharpness * gain, 300.0)))
-        likely = family_probabilities(ranked, numbers)
-        if evidence < numbers.kept_evidence:
-            cause = scored.candidate.cause
-            test.notes.append(
+        cause = scored.candidate.cause
+        gain = held_out.gain([k.scored.candidate for k in kept], scored.candidate)
+        if float(np.exp(min(numbers.sharpness * gain, 300.0))) < numbers.kept_evidence:
+            notes.append(
                 f"{cause.family} ({cause.place.name}) was found in the training runs and not"
                 " confirmed on the test runs."
             )
             continue
-        findings.append(_finding(scored, likely, before, test, may_name=sealed.may_name))
-        before.append(scored.candidate)
-        test.kept.append(_Kept(scored, likely))
-    return findings
+        one = Kept(scored, family_probabilities(ranked, numbers), ranked)
+        acts_in = held_out.acts_in(scored.candidate)
+        open_runs = [name for name, acts in acts_in.items() if acts is None]
+        if open_runs:
+            notes.append(
+                f"{', '.join(open_runs)}: the training runs do not show whether {cause.family} acts"
+                " there; not counted in the errors."
+            )
+        home = cause.place.home
+        refits.open |= {*open_runs}
+        before, by_run_before = refits.rmse(home)
+        refits.add(scored.candidate, acts_in)
+        after, by_run_after = refits.rmse(home)
+        finding = _named(one, sealed.may_name)
+        findings.append(
+            replace(
+                finding,
+                rmse_before=before,
+                rmse_after=after,
+                runs_improved=sum(by_run_after[n] < x for n, x in by_run_before.items()),
+                runs_total=len(by_run_before),
+                runs_affected=tuple(name for name, acts in acts_in.items() if acts),
+            )
+        )
+        kept.append(one)
+        part = refits.parts[home][-1]
+        if not part.is_written:
+            notes.append(_unwritten(scored.candidate))
+    return kept, findings, notes
 
 
-def _finding(
-    scored: Scored,
-    likely: Sequence[Probability],
-    before: Sequence[Candidate],
-    test: _Test,
-    may_name: bool,
-) -> Finding:
-    candidate, cause = scored.candidate, scored.candidate.cause
+def _unwritten(candidate: Candidate) -> str:
+    cause = candidate.cause
+    if candidate.acts is not None:
+        why = "it acts in some of the runs only"
+    elif isinstance(cause, Function):
+        why = "its form is unknown"
+    else:
+        why = f"it needs a reading that no model of {cause.place.home} may use"
+    return f"{cause.place.home}: {cause.family} is reported and not added to the model file; {why}."
+
+
+def _named(one: Kept, may_name: bool) -> Finding:
+    """Return the claim of a cause, without its errors."""
+    cause = one.scored.candidate.cause
     home = cause.place.home
-    lead, covered, others = likely[0], likely[0].share, []
-    for one in likely[1:]:
-        if covered >= (SURE if not others else IN_SET):
+    lead, covered = one.likely[0], one.likely[0].share
+    others: list[str] = []
+    for likely in one.likely[1:]:
+        if covered >= (IN_SET if others else SURE):
             break
-        covered += one.share
-        others.append(one.family)
+        covered += likely.share
+        others.append(likely.family)
     unknown = isinstance(lead.best.candidate.cause, Function)
     if not may_name:
         verdict = "something_missing"
@@ -265,22 +257,22 @@ def _finding(
         verdict = "depends_on"
     else:
         verdict = "identified" if lead.share >= SURE else "one_of"
-    old, new = test.squared(before), test.squared([*before, candidate])
-    part = (home, "within")
     return Finding(
         balance=home,
         also_in=tuple(dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)),
+        place=cause.place.name,
         family=lead.family if may_name else "unknown",
         verdict=verdict,
-        alternatives=tuple(others),
+        alternatives=tuple(others) if may_name else (),
+        probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]}
+        if may_name
+        else {},
         depends_on=_variables(lead.best.candidate),
         confidence=None if unknown or not may_name else round(lead.share, 4),
-        parameters=_parameters(scored),
-        rmse_before=test.rmse(before, home),
-        rmse_after=test.rmse([*before, candidate], home),
-        runs_improved=int((new[part] < old[part]).sum()),
-        runs_total=len(test.at),
-        runs_affected=test.runs_affected(candidate),
+        rmse_before=float("nan"),
+        rmse_after=float("nan"),
+        runs_improved=0,
+        runs_total=0,
     )
 
 
@@ -299,11 +291,53 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _parameters(scored: Scored) -> dict[str, Value]:
+def _parameters(scored: Scored, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
+    """Return amplitudes and shape of a named cause from the written model of its home equation.
+
+    Of a cause that no file holds, the shape alone.
+    """
     cause = scored.candidate.cause
     if isinstance(cause, Function):
         return {}
+    model = next(m for m in written if m.balance == home)
+    shape = tuple(map(float, cause.shape))
+    for term in model.terms:
+        same = term.effect.id == cause.effect.id
+        if same and tuple(term.numbers(term.effect.shape)) == shape:
+            return {
+                p.name: Value(known.value, term.unit(p, model.target), known.ci95)
+                for p in term.parameters
+                for known in [term.values[p.name]]
+            }
+    units = Term(cause.effect, channels=dict(cause.channels))
     return {
-        p.name: Value(float(x), p.unit, None)
-        for p, x in zip(cause.effect.shape, cause.shape, strict=True)
+        p.name: Value(x, units.unit(p, model.target), None)
+        for p, x in zip(cause.effect.shape, shape, strict=True)
     }
+
+
+def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
+    """Return the declared parameters before and after the findings."""
+    out = {}
+    for old, new in zip(before.terms, after.terms, strict=False):
+        for p in old.parameters:
+            key = f"{old.effect.id}.{p.name}"
+            out[key] = {"before": old.values[p.name].value, "after": new.values[p.name].value}
+    return out
+
+
+def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
+    """Return the limits of these runs, one sentence each."""
+    training = [r for r in recordings if r.name in sealed.discover]
+    found = audit(training)
+    if not sealed.may_name:
+        found.append(
+            f"{len(sealed.discover)} training runs: with fewer than {LEAST_TO_NAME} no effect is"
+            " named."
+        )
+    found += [
+        f"All training runs are at one level of {condition}: an effect that depends on it cannot"
+        " be distinguished from one that does not."
+        for condition in unvaried(layout.select(sealed.discover))
+    ]
+    return found

@@ -1,4 +1,4 @@
-"""What a diagnosis says: verdict, findings, errors before and after. Contract `rig.diagnosis/1`."""
+"""The result of a diagnosis: verdict, findings, errors. Contract `rig.diagnosis/1`."""
 
 import math
 from collections.abc import Mapping
@@ -9,8 +9,54 @@ from estimation.diagnosis.split import Sealed
 
 SCHEMA = "rig.diagnosis/1"
 
+UNKNOWN = "unknown"
+
 VERDICTS = ("identified", "one_of", "depends_on", "something_missing", "nothing_missing")
 """From the strongest claim to none; the verdict of a diagnosis is its weakest finding's."""
+
+FAMILIES = [
+    "friction.coulomb",
+    "friction.coulomb_asymmetry",
+    "friction.viscous",
+    "friction.viscous_asymmetry",
+    "friction.drag",
+    "friction.stribeck",
+    "friction.dwell",
+    "friction.load",
+    "friction.load_viscous",
+    "friction.capstan",
+    "friction.position",
+    "friction.warmup",
+    "hysteresis.presliding",
+    "hysteresis.bouc_wen",
+    "spring.position",
+    "spring.end_stop",
+    "gravity.payload",
+    "ripple.motor",
+    "ripple.output",
+    "ripple.current",
+    "eccentric.load",
+    "motor.saturation",
+    "motor.thermal",
+    "motor.electrical",
+    "transmission.backlash",
+    "transmission.stiffening",
+    "transmission.relaxation",
+    "compliance.link",
+    "coupling.kinematic",
+    "coupling.torque",
+    "sensor.gain_nonlinear",
+    "sensor.drift",
+    "sensor.creep",
+    "sensor.crosstalk",
+    "sensor.delay",
+    "sensor.lag",
+    "sensor.encoder_inl",
+    "inertia.missing",
+    "change.step",
+    "unknown",
+]
+"""Ids of families that a diagnosis may report; fixed, since other tools read them."""
 
 VARIABLES = [
     "velocity",
@@ -41,43 +87,26 @@ class Value:
     ci95: tuple[float, float] | None
 
 
-@dataclass(frozen=True, slots=True)
-class Stated:
-    """A formula that stands for an effect without a name.
-
-    Attributes:
-        text: The formula in SI units, amplitudes fitted.
-        gain: Share of squared error it removes on discovery runs left out.
-        rmse_after: Error on the confirm runs with it, the one that a model file holds; None for the
-            others, which are as good on the discovery runs.
-    """
-
-    text: str
-    gain: float
-    rmse_after: float | None
-
-
 @dataclass(frozen=True)
 class Finding:
     """One cause.
 
     Attributes:
-        balance: Balance of its origin.
-        also_in: Other balances that the same cause shows in.
-        formulas: Formulas of `depends_on` that do about equally well; the first one is written.
-        form: Formula beside a named effect, of what its equation leaves of its own cause; empty
-            without one. What is left after the finding, and its model, count it.
+        balance: Equation it is reported under.
+        also_in: Other equations that the same cause enters.
+        place: Where in the machine it acts: an equation, `torque at CHANNEL` or `sensor CHANNEL`.
         family: Id of the effect, or `unknown`.
         verdict: What is claimed of it.
-        alternatives: Families it cannot be told from on these runs.
+        alternatives: Families that these runs cannot distinguish from it.
+        probabilities: Family to its probability, for the family and its alternatives.
         depends_on: Variables it depends on.
         confidence: Probability that the name is right, or None without a name.
         parameters: Name to value.
-        rmse_before: Error on the confirm runs before this finding, after those found earlier.
+        rmse_before: Error on the test runs before this finding, after those found earlier.
         rmse_after: The same after it.
-        runs_improved: Confirm runs whose error it lowers.
-        runs_total: Confirm runs.
-        runs_affected: All runs whose error it lowers by a hundredth and more.
+        runs_improved: Test runs whose error it lowers.
+        runs_total: Test runs.
+        runs_affected: Runs in which it acts.
     """
 
     balance: str
@@ -93,22 +122,22 @@ class Finding:
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)
     also_in: tuple[str, ...] = ()
-    formulas: tuple[Stated, ...] = ()
-    form: str = ""
+    place: str = ""
+    probabilities: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Errors on the confirm runs, pooled over their samples, in the unit of the target.
+    """Errors on the test runs, pooled over their samples, in the unit of the target.
 
     Attributes:
         before: Root mean square, each run's mean removed, declared model.
         after: The same with the findings.
         with_means_before: Root mean square with the means left in, declared model.
         with_means_after: The same with the findings.
-        ratio_ci95: 95 % interval of after / before, a bootstrap over the confirm runs.
-        by_run_before: Confirm run to its error before.
-        by_run_after: Confirm run to its error after.
+        ratio_ci95: 95 % interval of after / before, a bootstrap over the test runs.
+        by_run_before: Test run to its error before.
+        by_run_after: Test run to its error after.
     """
 
     before: float
@@ -126,16 +155,17 @@ class Diagnosis:
 
     Attributes:
         findings: In the order found; empty when nothing is missing.
-        errors: Balance to its errors on the confirm runs.
-        unit: Balance to the unit symbol of its target.
-        noise_floor: Balance to the error that no model can go below, None where it is not known.
-        moved: Balance to declared parameter to its value before and after the findings.
+        errors: Equation to its errors on the test runs.
+        unit: Equation to the unit symbol of its target.
+        noise_floor: Equation to the error that no model can go below, None where it is not known.
+        moved: Equation to declared parameter to its value before and after the findings.
         sealed: The split.
-        undecided: Balance to why nothing could be said about it.
+        undecided: Equation to the reason why it could not be decided.
         notes: Limits of this diagnosis, in words.
-        exploratory: Whether the confirm runs had been opened before.
+        exploratory: Whether the test runs had been used before.
         seconds: How long it took.
-        next_experiment: The experiment that tells rivals apart best, plain JSON types, or None.
+        next_experiment: The experiment that separates the alternatives best, plain JSON types, or
+            None.
     """
 
     findings: tuple[Finding, ...]
@@ -189,9 +219,11 @@ class Diagnosis:
 ORDER = [
     "balance",
     "also_in",
+    "place",
     "family",
     "verdict",
     "alternatives",
+    "probabilities",
     "depends_on",
     "confidence",
     "parameters",
@@ -209,8 +241,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         # an interval with an end that is not known is none
         if known["ci95"] is not None and not all(map(math.isfinite, known["ci95"])):
             known["ci95"] = None
-    optional = [name for name in ("formulas", "form") if fields[name]]
-    return {name: fields[name] for name in [*ORDER, *optional]}
+    return {name: fields[name] for name in ORDER}
 
 
 def _plain(value: Any) -> Any:

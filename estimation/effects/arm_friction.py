@@ -20,5 +20,4 @@ class ArmFriction(Proportional):
     id = "arm.friction"
     roles: ClassVar = {"direction": "joint_1_direction_ratio"}
     amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
-    confused_with = ("friction.coulomb", "friction.stribeck", "hysteresis.presliding")
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"

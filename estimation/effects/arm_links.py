@@ -20,5 +20,4 @@ class ArmLinks(Proportional):
     id = "arm.links"
     roles: ClassVar = {"links": "joint_1_links_torque_n_m"}
     amplitudes = (Parameter("share", "target / links", "factor on the torque of all joints' fit"),)
-    confused_with = ("inertia.missing", "gravity.payload", "spring.position")
     told_apart_by = "another path, with the other joints moving"

@@ -22,5 +22,4 @@ class ArmLinksChange(Proportional):
     amplitudes = (
         Parameter("errors", "target / change", "standard errors of the shared fit", -3.0, 3.0),
     )
-    confused_with = ("arm.links", "gravity.payload", "spring.position")
     told_apart_by = "another path, with the other joints moving"

@@ -40,5 +40,4 @@ class FrictionStep(Remembering):
     )
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("friction.warmup", "sensor.drift", "motor.thermal")
     told_apart_by = "the run repeated twice as long"

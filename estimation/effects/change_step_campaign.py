@@ -29,7 +29,6 @@ class CampaignFrictionStep(Pointwise):
         Parameter("since", "campaign_clock", "time of the change", 20.0, 2e4, points=20),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 0.1, 10.0, points=2),
     )
-    confused_with = ("friction.warmup", "sensor.drift")
     told_apart_by = "the first run repeated at the end"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

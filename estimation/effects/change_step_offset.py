@@ -44,5 +44,4 @@ class OffsetStep(Remembering):
     shape = (Parameter("since", "clock", "time of the change in its run", 0.5, 60.0, points=33),)
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("sensor.drift", "sensor.creep")
     told_apart_by = "the unloaded sensor before and after, and the run repeated twice as long"

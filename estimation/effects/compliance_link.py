@@ -22,5 +22,4 @@ class LinkCompliance(Proportional):
     balances: ClassVar = {"gearbox": 1, "stretch": -1}
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("compliance", "target / load", "deflection per unit of load", 0.0),)
-    confused_with = ("transmission.stiffening", "transmission.backlash")
     told_apart_by = "a slow ramp of the load through zero to both ends of its range"

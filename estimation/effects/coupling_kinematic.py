@@ -23,5 +23,4 @@ class KinematicCoupling(Proportional):
     amplitudes = (
         Parameter("ratio", "target / other_angle", "angle or torque per radian of the other"),
     )
-    confused_with = ("spring.position", "sensor.encoder_inl")
     told_apart_by = "the other joint moved alone"

@@ -28,7 +28,6 @@ class BowedCoupling(Pointwise):
         Parameter("ratio", "target / other_angle", "angle per radian of the other joint"),
         Parameter("bow", "target / other_angle / other_angle", "angle per radian squared of it"),
     )
-    confused_with = ("spring.position", "sensor.encoder_inl")
     told_apart_by = "the other joint moved alone"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

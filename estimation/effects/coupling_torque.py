@@ -19,5 +19,4 @@ class TorqueCoupling(Proportional):
     balances: ClassVar = {"joint": 1, "grasp": 1, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"other_torque": "joint_1_torque_n_m"}
     amplitudes = (Parameter("ratio", "target / other_torque", "fraction of the other's torque"),)
-    confused_with = ("sensor.crosstalk", "coupling.kinematic")
     told_apart_by = "the other joint loaded alone, with this one at rest and moving"

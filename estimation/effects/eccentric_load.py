@@ -27,13 +27,6 @@ class EccentricLoad(Pointwise):
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )
     shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
-    confused_with = (
-        "ripple.current",
-        "ripple.output",
-        "coupling.kinematic",
-        "sensor.gain_nonlinear",
-        "friction.position",
-    )
     told_apart_by = "the same sweep against two loads"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -66,18 +66,7 @@ class Effect(ABC):
         roles: Role of each input, and its default channel.
         amplitudes: Linear parameters, one per column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
-        projected_roles: Roles for which a search uses a signal predicted from the other sensors
-            instead of the measured one, because the columns could otherwise fit its noise. A model
-            in use reads the measured signal.
-        confused_with: Ids of effects that are similar when the excitation is poor.
         told_apart_by: The experiment that distinguishes them.
-        same_as: Families that only that experiment distinguishes from it. Where both read the same
-            channels, each is reported with the other.
-        other_below: Shape parameters at whose lower bound it becomes another effect.
-        bends: Roles along which the true functional form may differ from the equation: effects are
-            compared after relaxing their form there.
-        any_function_of: Variables for which any function belongs to this effect: a non-parametric
-            model of them is not a different effect.
         at_rest: Whether it describes standstill. A search tries it where static samples count.
     """
 
@@ -87,14 +76,8 @@ class Effect(ABC):
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
-    projected_roles: ClassVar[tuple[str, ...]] = ()
-    confused_with: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
-    same_as: ClassVar[tuple[str, ...]] = ()
     at_rest: ClassVar[bool] = False
-    other_below: ClassVar[tuple[str, ...]] = ()
-    bends: ClassVar[tuple[str, ...]] = ()
-    any_function_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         """Set the family to the id by default."""

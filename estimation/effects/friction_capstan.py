@@ -30,9 +30,6 @@ class Capstan(Pointwise):
         Parameter("wrap", "1", "coefficient of friction times angle of wrap", 0.03, 3.0, points=4),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
-    confused_with = ("friction.load", "friction.position")
-    same_as = ("friction.load",)  # the ratio can absorb the difference of the two directions
-    bends = ("load",)
     told_apart_by = "the same motion at another wrap angle, such as another pose of the wrist"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

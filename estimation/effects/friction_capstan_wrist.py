@@ -33,7 +33,6 @@ class WristCapstan(Pointwise):
         Parameter("friction", "1 / other_angle", "coefficient of friction", 0.03, 1.0, points=4),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
-    confused_with = ("friction.load", "friction.position")
     told_apart_by = "the same motion in several poses of the wrist"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -33,7 +33,6 @@ class CoulombFriction(Effect):
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
-    confused_with = ("friction.stribeck", "hysteresis.presliding")
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:

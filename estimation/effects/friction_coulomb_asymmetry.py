@@ -24,7 +24,6 @@ class CoulombAsymmetry(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("asymmetry", "target", "half the loss of closing minus opening"),)
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
-    confused_with = ("sensor.offset", "gravity.payload")
     told_apart_by = "standstill periods, and slow motion in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -22,8 +22,6 @@ class Drag(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("drag", "target / speed / speed", "loss at one rad/s", lower=0.0),)
-    confused_with = ("friction.viscous", "sensor.delay")
-    bends = ("speed",)
     told_apart_by = "a staircase of constant speeds up to the highest"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

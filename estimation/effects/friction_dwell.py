@@ -48,5 +48,4 @@ class Dwell(Remembering):
     )
     walk = _walk
     rest = (0.0, 0.0, 1.0)
-    confused_with = ("friction.stribeck", "hysteresis.presliding", "friction.warmup")
     told_apart_by = "the same motion after pauses of several lengths"

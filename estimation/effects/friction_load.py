@@ -24,9 +24,6 @@ class LoadFriction(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "motor_load_n_m"}
     amplitudes = (Parameter("friction", "target / load", "loss per unit of load", lower=0.0),)
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
-    confused_with = ("friction.position", "friction.capstan", "friction.load_viscous")
-    same_as = ("friction.capstan",)
-    bends = ("load",)
     told_apart_by = "the same motion against two stiffnesses, and free"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

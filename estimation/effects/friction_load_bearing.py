@@ -73,12 +73,4 @@ class LoadedBearing(Remembering):
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0)
     at_rest = True
-    confused_with = (
-        "friction.load_viscous",
-        "friction.position",
-        "friction.coulomb",
-        "friction.drag",
-        "hysteresis.presliding",
-        "sensor.lag",
-    )
     told_apart_by = "holds of two and of thirty seconds at several loads"

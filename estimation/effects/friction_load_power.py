@@ -34,9 +34,6 @@ class PowerLoadFriction(Pointwise):
         Parameter("exponent", "1", "power of the load", 0.5, 2.5, points=5),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),
     )
-    confused_with = ("friction.position", "friction.capstan", "friction.load_viscous")
-    same_as = ("friction.capstan",)
-    bends = ("load",)
     told_apart_by = "the same motion against three stiffnesses, and free"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

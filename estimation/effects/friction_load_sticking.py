@@ -41,11 +41,4 @@ class StickingLoadFriction(Remembering):
     walk = _walk
     rest = REST
     at_rest = True
-    confused_with = (
-        "friction.coulomb",
-        "friction.load_viscous",
-        "friction.position",
-        "friction.capstan",
-        "hysteresis.presliding",
-    )
     told_apart_by = "the same motion at two loads, with pauses"

@@ -24,8 +24,6 @@ class LoadViscousFriction(Pointwise):
     amplitudes = (
         Parameter("damping", "target / load / speed", "damping per unit of load", lower=0.0),
     )
-    confused_with = ("friction.load", "friction.viscous")
-    bends = ("load", "speed")
     told_apart_by = "a staircase of speeds at two loads"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

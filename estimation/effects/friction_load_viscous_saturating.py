@@ -27,10 +27,7 @@ class SaturatingLoadViscousFriction(Pointwise):
         Parameter("damping", "target / load / speed", "damping per unit of load", lower=0.0),
     )
     shape = (Parameter("knee", "speed", "speed at which half remains", 0.1, 500.0, points=9),)
-    confused_with = ("friction.load", "friction.viscous")
-    bends = ("load", "speed")
     told_apart_by = "a staircase of speeds at two loads"
-    other_below = ("knee",)
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
         """Return one value or one array per amplitude."""

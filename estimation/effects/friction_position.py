@@ -30,8 +30,6 @@ class PositionFriction(Pointwise):
         Parameter("twist", "target / position / position / position", "cubic change with position"),
     )
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
-    confused_with = ("friction.load", "friction.capstan", "spring.position")
-    bends = ("position",)
     told_apart_by = "a slow sweep without load, in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -51,11 +51,4 @@ class StickingPositionFriction(Remembering):
     walk = _walk
     rest = REST
     at_rest = True
-    confused_with = (
-        "friction.coulomb",
-        "friction.load",
-        "friction.coulomb_asymmetry",
-        "spring.position",
-        "hysteresis.presliding",
-    )
     told_apart_by = "slow sweeps over the whole travel, at two loads, with pauses"

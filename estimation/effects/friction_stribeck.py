@@ -29,8 +29,6 @@ class Stribeck(Pointwise):
         Parameter("fall", "speed", "speed at which 37 % remains", 1e-2, 1e2),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),
     )
-    confused_with = ("friction.coulomb", "hysteresis.presliding", "sensor.delay")
-    bends = ("speed",)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

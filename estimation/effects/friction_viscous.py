@@ -27,5 +27,4 @@ class ViscousFriction(Proportional):
     }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("damping", "target / speed", "loss per rad/s", lower=0.0),)
-    confused_with = ("friction.drag", "sensor.delay")
     told_apart_by = "a staircase of constant speeds in both directions"

@@ -25,8 +25,6 @@ class ViscousAsymmetry(Pointwise):
     amplitudes = (
         Parameter("asymmetry", "target / speed", "half the damping of closing minus opening"),
     )
-    confused_with = ("friction.coulomb_asymmetry", "friction.drag")
-    bends = ("speed",)
     told_apart_by = "a staircase of constant speeds in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -43,5 +43,4 @@ class Warmup(Remembering):
     )
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("change.step", "friction.dwell", "sensor.drift", "motor.thermal")
     told_apart_by = "the first run repeated at the end, and again after a night"

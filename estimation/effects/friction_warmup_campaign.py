@@ -29,7 +29,6 @@ class CampaignWarmup(Pointwise):
         Parameter("time", "campaign_clock", "time after which 37 % remains", 30, 2e4, points=6),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
-    confused_with = ("change.step", "sensor.drift", "motor.thermal")
     told_apart_by = "the first run repeated at the end, and again after a night"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -26,7 +26,6 @@ class Payload(Pointwise):
         Parameter("sine", "target", "torque with the sine of the angle"),
         Parameter("cosine", "target", "torque with its cosine"),
     )
-    confused_with = ("spring.position", "sensor.offset")
     told_apart_by = "the same slow sweep with the rig tilted"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -79,5 +79,4 @@ class BoucWen(Remembering):
     )
     walk = walk_loop
     rest = (0.0, 0.0, 0.0)
-    confused_with = ("hysteresis.presliding", "friction.coulomb", "transmission.backlash")
     told_apart_by = "reversals of shrinking amplitude, one inside the other"

@@ -44,5 +44,4 @@ class Twist(Remembering):
     )
     walk = _walk
     rest = (0.0, 0.0, 0.0)
-    confused_with = ("hysteresis.presliding", "transmission.backlash", "transmission.relaxation")
     told_apart_by = "loads of slowly growing and shrinking amplitude, and the same ten times slower"

@@ -47,11 +47,4 @@ class Presliding(Remembering):
     shape = (Parameter("reach", "travel", "travel to reach 63 %", 1e-3, 1e1),)
     walk = _walk
     rest = (0.0, 0.0, 0.0)
-    confused_with = (
-        "friction.coulomb",
-        "friction.stribeck",
-        "hysteresis.bouc_wen",
-        "transmission.backlash",
-        "transmission.relaxation",
-    )
     told_apart_by = "reversals of very small amplitude, and the same ten times slower"

@@ -47,11 +47,4 @@ class LuGre(Remembering):
     )
     walk = _walk
     rest = (0.0, 0.0, 0.0)
-    confused_with = (
-        "friction.coulomb",
-        "friction.stribeck",
-        "hysteresis.bouc_wen",
-        "transmission.backlash",
-        "transmission.relaxation",
-    )
     told_apart_by = "reversals of very small amplitude, and a staircase of slow speeds"

@@ -53,11 +53,4 @@ class MaxwellSlip(Remembering):
     shape = (Parameter("reach", "travel", "travel until the first slides", 3e-4, 3.0, points=13),)
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0, 0.0)
-    confused_with = (
-        "friction.coulomb",
-        "friction.stribeck",
-        "hysteresis.bouc_wen",
-        "transmission.backlash",
-        "transmission.relaxation",
-    )
     told_apart_by = "reversals of shrinking amplitude, and the same ten times slower"

@@ -26,5 +26,4 @@ class Inertia(Proportional):
     }
     roles: ClassVar = {"acceleration": "motor_acceleration_rad_s2"}
     amplitudes = (Parameter("inertia", "target / acceleration", "moment of inertia", lower=0.0),)
-    confused_with = ("sensor.delay", "sensor.lag")
     told_apart_by = "the same motion at twice the frequency"

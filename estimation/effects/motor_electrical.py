@@ -30,6 +30,4 @@ class ElectricalLag(Remembering):
     shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 5e-2, points=6),)
     walk = behind
     rest = AT_REST
-    projected_roles = ("current",)
-    confused_with = ("sensor.delay", "sensor.lag", "inertia.missing")
     told_apart_by = "a fast chirp of the current against a blocked spindle, and in free motion"

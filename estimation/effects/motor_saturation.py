@@ -25,8 +25,6 @@ class Saturation(Pointwise):
         Parameter("gain", "target / current", "torque constant at small currents", lower=0.0),
     )
     shape = (Parameter("knee", "current", "current at which it saturates", 0.05, 5.0),)
-    confused_with = ("sensor.gain_nonlinear", "friction.load")
-    bends = ("current",)
     told_apart_by = "stall at several currents of both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -23,8 +23,6 @@ class CubicSaturation(Pointwise):
             "loss", "target / current / current / current", "loss for one cubic unit", lower=0.0
         ),
     )
-    confused_with = ("sensor.gain_nonlinear", "friction.load")
-    bends = ("current",)
     told_apart_by = "stall at several currents of both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

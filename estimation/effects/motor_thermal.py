@@ -48,5 +48,4 @@ class ThermalLoss(Remembering):
     shape = (Parameter("time_constant", "clock", "thermal time constant", 0.3, 300.0, points=8),)
     walk = _walk
     rest = (0.0, 0.0, 0.0, 0.0)
-    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
     told_apart_by = "a run repeated immediately, and again after the motor has cooled"

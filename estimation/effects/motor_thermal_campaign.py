@@ -25,7 +25,6 @@ class CampaignWarming(Pointwise):
         Parameter("loss", "target / current", "fall of the torque constant, warm", lower=0.0),
     )
     shape = (Parameter("time", "campaign_clock", "thermal time constant", 30, 2e4, points=6),)
-    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift")
     told_apart_by = "the first run once more at the end, and once more after the motor has cooled"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

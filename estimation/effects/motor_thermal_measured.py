@@ -32,7 +32,6 @@ class MeasuredThermalLoss(Pointwise):
             lower=0.0,
         ),
     )
-    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
     told_apart_by = "a run repeated immediately, and again after the motor has cooled"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

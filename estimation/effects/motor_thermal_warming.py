@@ -40,5 +40,4 @@ class WarmingLoss(Remembering):
     shape = (Parameter("time_constant", "clock", "thermal time constant", 0.5, 100.0, points=6),)
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("motor.saturation", "friction.warmup", "sensor.drift", "sensor.creep")
     told_apart_by = "a run repeated immediately, and again after the motor has cooled"

@@ -22,7 +22,6 @@ class Offset(Effect):
     id = "sensor.offset"
     roles: ClassVar = {"clock": "time_s"}
     amplitudes = (Parameter("offset", "target", "the constant"),)
-    confused_with = ("sensor.drift", "friction.coulomb_asymmetry")
     told_apart_by = "the unloaded sensor at standstill before and after a run"
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:

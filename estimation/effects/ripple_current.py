@@ -29,7 +29,6 @@ class CurrentRipple(Pointwise):
         Parameter("cosine", "target / current", "amplitude of the cosine"),
     )
     shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
-    confused_with = ("ripple.motor", "eccentric.load")
     told_apart_by = "the same slow sweep at two currents"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -23,13 +23,11 @@ class MotorRipple(Pointwise):
     id = "ripple.motor"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
-    any_function_of = ("motor_angle",)
     amplitudes = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
     shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
-    confused_with = ("ripple.output", "ripple.current", "sensor.encoder_inl")
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

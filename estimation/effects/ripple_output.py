@@ -37,14 +37,6 @@ class OutputRipple(Pointwise):
     )
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=63),)
-    confused_with = (
-        "ripple.motor",
-        "sensor.encoder_inl",
-        "eccentric.load",
-        "coupling.kinematic",
-        "spring.position",
-        "gravity.payload",
-    )
     told_apart_by = "a sweep at a slow constant speed over several turns, and under another load"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

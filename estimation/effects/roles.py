@@ -11,8 +11,12 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
-from estimation.derived import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.effects.effect import Effect
+
+MOTOR_LOAD, CABLE_LOAD, CABLE_ANGLE = "motor_load_n_m", "cable_load_n_m", "cable_angle_rad"
+"""Loads and an angle of the reference rig that nominal constants predict from one sensor. Each
+replaces the sensor that is the target, since noise shared by both sides of an equation looks like
+an effect."""
 
 JOINTS = range(1, 8)
 """Joints of the arm that may act on one another."""
@@ -181,7 +185,7 @@ def _known(kind: str, number: str) -> list[Mapping[str, tuple[str, ...]]]:
             return [CHANNELS[PARTS[number]]]
         return [_ENCODER if number == "encoder" else _SENSOR]
     if kind not in (*AXES, *MOTORS):
-        return [CHANNELS[kind]]
+        return [CHANNELS[kind]] if kind in CHANNELS else []
     own = _of_axis(kind)
     if kind not in CHANNELS:
         return [own]

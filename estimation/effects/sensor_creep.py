@@ -42,12 +42,4 @@ class SensorCreep(Remembering):
     )
     walk = _walk
     rest = AT_REST
-    confused_with = (
-        "sensor.drift",
-        "sensor.lag",
-        "sensor.gain_nonlinear",
-        "transmission.relaxation",
-        "motor.thermal",
-        "friction.warmup",
-    )
     told_apart_by = "a weight hung on the sensor for a minute, and taken off for a minute"

@@ -24,6 +24,4 @@ class Crosstalk(Proportional):
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1}
     roles: ClassVar = {"other_reading": "motor_current_a"}
     amplitudes = (Parameter("share", "target / other_reading", "reading added per unit of it"),)
-    projected_roles = ("other_reading",)  # an unmodelled effect is in the other reading too
-    confused_with = ("friction.load", "spring.position", "coupling.torque", "gravity.payload")
     told_apart_by = "the other quantity moved while the sensor is unloaded"

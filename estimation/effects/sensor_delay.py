@@ -75,12 +75,4 @@ class SensorDelay(Remembering):
     shape = (Parameter("delay", "clock", "transport delay", 2e-4, 5e-2, points=6),)
     walk = _walk
     rest = (0.0,) * (_VALUES + PLACES)
-    projected_roles = ("reading",)
-    confused_with = (
-        "sensor.lag",
-        "motor.electrical",
-        "inertia.missing",
-        "friction.viscous",
-        "friction.stribeck",
-    )
     told_apart_by = "a chirp: the delay's phase grows with frequency, its gain does not fall"

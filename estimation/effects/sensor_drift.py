@@ -20,5 +20,4 @@ class Drift(Proportional):
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"elapsed": "time_s"}
     amplitudes = (Parameter("rate", "target / elapsed", "change of the zero per second"),)
-    confused_with = ("sensor.creep", "friction.warmup", "motor.thermal", "change.step")
     told_apart_by = "the unloaded sensor at standstill before, during and after a run"

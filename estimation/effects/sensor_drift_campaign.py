@@ -22,7 +22,6 @@ class CampaignDrift(Pointwise):
     roles: ClassVar = {"campaign_clock": "campaign_time_s"}
     amplitudes = (Parameter("drift", "target", "zero when warm less zero when cold"),)
     shape = (Parameter("time", "campaign_clock", "time until 63 % of it", 30, 2e4, points=6),)
-    confused_with = ("sensor.creep", "friction.warmup", "motor.thermal", "change.step")
     told_apart_by = "the unloaded sensor at rest before, during and after a campaign"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -38,5 +38,4 @@ class SettlingDrift(Remembering):
     shape = (Parameter("time_constant", "clock", "time to reach 63 %", 0.5, 100.0, points=6),)
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("sensor.creep", "friction.warmup", "motor.thermal", "change.step")
     told_apart_by = "the unloaded sensor at standstill before, during and after a run"

@@ -38,5 +38,4 @@ class LogarithmicDrift(Remembering):
     shape = (Parameter("onset", "clock", "time when the change slows", 0.05, 50.0, points=4),)
     walk = _walk
     rest = (0.0, 0.0)
-    confused_with = ("sensor.creep", "friction.warmup", "motor.thermal", "change.step")
     told_apart_by = "the unloaded sensor at standstill before, during and after a run"

@@ -35,7 +35,6 @@ class EncoderNonlinearity(Pointwise):
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=32),)
-    confused_with = ("ripple.motor", "ripple.output", "coupling.kinematic", "eccentric.load")
     told_apart_by = (
         "a slow sweep without load, repeated with the other sensor turned by half a turn"
     )

@@ -26,14 +26,6 @@ class NonlinearGain(Pointwise):
         Parameter("square", "target / reading / reading", "quadratic term"),
         Parameter("cube", "target / reading / reading / reading", "cubic term"),
     )
-    confused_with = (
-        "motor.saturation",
-        "transmission.stiffening",
-        "friction.load",
-        "spring.position",
-        "sensor.creep",
-    )
-    bends = ("reading",)
     told_apart_by = "reference weights over the sensor's whole range, both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -36,13 +36,4 @@ class SensorLag(Remembering):
     shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 0.2, points=6),)
     walk = behind
     rest = AT_REST
-    projected_roles = ("reading",)
-    confused_with = (
-        "sensor.delay",
-        "sensor.creep",
-        "motor.electrical",
-        "inertia.missing",
-        "friction.viscous",
-        "transmission.relaxation",
-    )
     told_apart_by = "a chirp: the lag's gain falls with frequency"

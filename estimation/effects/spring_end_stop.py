@@ -25,7 +25,6 @@ class EndStop(Pointwise):
     roles: ClassVar = {"stop": "jaw_angle_rad"}
     amplitudes = (Parameter("stiffness", "target / stop", "torque per radian beyond", lower=0.0),)
     shape = (Parameter("onset", "stop", "angle of first contact", -0.7, 2.5, True, 41),)
-    confused_with = ("spring.position", "gravity.payload", "transmission.stiffening")
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

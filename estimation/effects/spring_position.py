@@ -20,5 +20,4 @@ class PositionSpring(Proportional):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
     amplitudes = (Parameter("stiffness", "target / position", "torque per radian"),)
-    confused_with = ("transmission.stiffening", "gravity.payload", "friction.position")
     told_apart_by = "a slow free sweep without load, in both directions"

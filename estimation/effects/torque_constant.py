@@ -19,5 +19,4 @@ class TorqueConstant(Proportional):
     id = "motor.torque_constant"
     roles: ClassVar = {"source": "motor_current_a"}
     amplitudes = (Parameter("gain", "target / source", "torque per unit of the source"),)
-    confused_with = ("motor.saturation", "friction.load")
     told_apart_by = "stall at several currents of both signs"

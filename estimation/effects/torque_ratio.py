@@ -18,5 +18,4 @@ class TorqueRatio(Proportional):
     id = "transmission.ratio"
     roles: ClassVar = {"load": "distal_torque_n_m"}
     amplitudes = (Parameter("ratio", "target / load", "torque here per unit of torque there"),)
-    confused_with = ("friction.load", "friction.capstan")
     told_apart_by = "loading and unloading at the same slow speed"

@@ -29,7 +29,6 @@ class Backlash(Pointwise):
         Parameter("width", "load", "load at which the tanh reaches 76 %", 5e-4, 0.015, points=6),
         Parameter("middle", "load", "load in the middle", -0.1, 0.1, True, points=7),
     )
-    confused_with = ("hysteresis.presliding", "transmission.stiffening", "friction.coulomb")
     told_apart_by = "a load that passes slowly through zero, in both directions"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

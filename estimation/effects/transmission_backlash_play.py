@@ -37,5 +37,4 @@ class Play(Remembering):
     shape = (Parameter("reach", "travel", "half the travel that crosses it", 1e-3, 0.5),)
     walk = _walk
     rest = (0.0, 0.0, 0.0)
-    confused_with = ("hysteresis.presliding", "hysteresis.bouc_wen", "friction.coulomb")
     told_apart_by = "slow reversals under a load of constant sign"

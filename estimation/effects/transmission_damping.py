@@ -22,5 +22,4 @@ class TransmissionDamping(Proportional):
     id = "transmission.damping"
     roles: ClassVar = {"rate": "proximal_torque_rate_n_m_s"}
     amplitudes = (Parameter("damping", "target / rate", "deflection per unit of rate", 0.0),)
-    confused_with = ("sensor.delay", "sensor.lag", "transmission.relaxation")
     told_apart_by = "steps of the load: a delay is visible at any rate, damping only while it rises"

@@ -68,5 +68,4 @@ class Relaxation(Remembering):
     )
     walk = walk_lag
     rest = (0.0, 0.0, 0.0, 0.0)
-    confused_with = ("hysteresis.presliding", "sensor.creep", "sensor.drift", "sensor.lag")
     told_apart_by = "a step of load that is held three times as long"

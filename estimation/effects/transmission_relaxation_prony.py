@@ -29,5 +29,4 @@ class Prony(Remembering):
     shape = (Parameter("time", "clock", "time of the fast part", 0.02, 5.0, points=9), SETTLED)
     walk = walk_lag
     rest = (0.0, 0.0, 0.0, 0.0, 0.0)
-    confused_with = ("hysteresis.presliding", "sensor.creep", "sensor.drift", "sensor.lag")
     told_apart_by = "a step of load that is held three times as long"

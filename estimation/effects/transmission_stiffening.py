@@ -25,8 +25,6 @@ class Stiffening(Pointwise):
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("compliance", "target / load", "compliance lost at load", lower=0.0),)
     shape = (Parameter("knee", "load", "load at the knee", 0.02, 1.0, points=9),)
-    other_below = ("knee",)  # a knee at zero load is backlash
-    confused_with = ("transmission.backlash", "sensor.gain_nonlinear", "spring.end_stop")
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

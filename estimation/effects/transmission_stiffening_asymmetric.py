@@ -26,7 +26,6 @@ class AsymmetricStiffness(Pointwise):
     amplitudes = (
         Parameter("asymmetry", "target / load", "half the compliance of closing minus opening"),
     )
-    confused_with = ("transmission.backlash", "sensor.gain_nonlinear")
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

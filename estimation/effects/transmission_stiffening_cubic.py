@@ -23,7 +23,6 @@ class CubicStiffening(Pointwise):
     amplitudes = (
         Parameter("bend", "target / load / load / load", "deflection lost at one unit of load"),
     )
-    confused_with = ("transmission.backlash", "sensor.gain_nonlinear", "spring.end_stop")
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -15,8 +15,6 @@ from estimation.derived import (
     ACCELERATION,
     AGO,
     FALL,
-    GEAR_RATIO,
-    GEARBOX,
     RISE,
     TRAVEL,
     TRAVEL_WINDOW_S,
@@ -31,6 +29,7 @@ from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
+from estimation.signals import reference
 from estimation.window import ALIKE
 
 TURNING_TRAVEL, TURNING_TURNED = (
@@ -152,9 +151,12 @@ def _channel(
     def turned() -> str:
         return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
-    if channel == GEARBOX:
-        motor, spindle = place("motor_angle_rad"), place("spindle_angle_rad")
-        value = f"value[{motor}] / {GEAR_RATIO} - value[{spindle}]"
+    combination = reference().combination(channel)
+    if combination is not None and combination.direction is None:
+        value = " + ".join(
+            f"{share.times!r} * value[{place(share.channel)}] / {share.over!r}"
+            for share in combination.shares
+        )
     elif channel in windows:
         rises = channel.endswith(TRAVEL)
         source = channel.replace(TRAVEL, "_angle_rad") if rises else channel.replace(FALL, "_")
@@ -207,8 +209,8 @@ def _bank(estimator: BankEstimator) -> str:
         "ACCELERATION": f"{states.ACCELERATION_SCALE_RAD_S2}f",
         "SLOWEST": f"{states.SLOWEST_RAD_S}f",
         "LIGHTEST": f"{states.LIGHTEST}f",
-        "GEAR": f"{GEAR_RATIO}f",
-        "TURN": f"{GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
+        "GEAR": f"{states.GEAR_RATIO}f",
+        "TURN": f"{states.GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
         "WRIST_ORDERS": str(bank.wrist_orders),
         "WRIST_POWERS": str(states.WRIST_POWERS),
         "WRIST_TURN": f"{2 * np.pi / states.WRIST_PERIOD_RAD:.9g}f",

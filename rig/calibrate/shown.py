@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibration.linear import CalibrationSet
-from calibration.procedure import Measurement, Procedure, Result
+from calibration.procedure import Measurement, Procedure, Result, Step
 from calibration.record import CalibrationRecord
 from estimation.channels import UnknownUnitError, unit_of
 
@@ -30,6 +30,45 @@ def reading(procedure: Procedure, measured: Sequence[Measurement], lines: Calibr
     return ", ".join([f"{len(recording)} samples", *parts])
 
 
+SET_UP_S = 30.0
+"""Time allowed for what a person does before a step."""
+
+
+def announced(procedure: Procedure) -> list[str]:
+    """Return what a session needs, how long it takes and what moves, a line each."""
+    steps = procedure.steps()
+    own = [step.instruction for step in steps if step.instruction]
+    measured_s = sum(_seconds(step) for step in steps)
+    minutes = (measured_s + SET_UP_S * len(own)) / 60
+    devices = " and ".join(name.replace("_", " ") for name in procedure.devices)
+    lines = [
+        f"Calibration of {procedure.kind}: {len(steps)} steps with the {devices},"
+        f" {len(own)} of them set up by hand; about {max(1, round(minutes))} min.",
+        _moving(steps),
+    ]
+    return lines + [f"  {text}" for text in dict.fromkeys(own)]
+
+
+def _seconds(step: Step) -> float:
+    target = step.target_angle_rad
+    return step.duration_s if target is None else len(target) / 1000.0
+
+
+def _moving(steps: Sequence[Step]) -> str:
+    """Return the sentence on motion and load of the steps."""
+    angles = [s.target_angle_rad for s in steps if s.target_angle_rad is not None]
+    loads = [s.load_command_a for s in steps if s.load_command_a is not None]
+    if not angles and not loads:
+        return "The rig does not move by itself."
+    parts = []
+    if angles:
+        low, high = min(map(np.min, angles)), max(map(np.max, angles))
+        parts.append(f"the spindle turns between {low:.2f} and {high:.2f} rad")
+    if loads and (most := max(float(np.abs(load).max()) for load in loads)) > 0:
+        parts.append(f"the load motor pulls with up to {most:.2f} A")
+    return f"The rig moves by itself: {', '.join(parts)}. Keep hands off while it does."
+
+
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit, in thousandths or millionths where that reads better."""
     if unit == "1" or not unit:
@@ -44,7 +83,7 @@ def parameter_lines(result: Result | CalibrationRecord) -> list[str]:
     deviations = [row[k] ** 0.5 for k, row in enumerate(result.fit.covariance)]
     lines = []
     for k, (name, value) in enumerate(result.fit.parameters.items()):
-        unit = _unit_of_parameter(name, result)
+        unit = parameter_unit(name, result)
         spread = f" +- {with_unit(deviations[k], unit)}" if deviations else ""
         lines.append(f"{name} {with_unit(value, unit)}{spread}")
     if result.fit.residual_rms is not None:
@@ -53,7 +92,7 @@ def parameter_lines(result: Result | CalibrationRecord) -> list[str]:
     return lines
 
 
-def _unit_of_parameter(name: str, result: Result | CalibrationRecord) -> str:
+def parameter_unit(name: str, result: Result | CalibrationRecord) -> str:
     """Return the unit of a parameter: of a line's slope and zero from what it reads and gives."""
     if name == "slope":
         read = _unit(result.input) or "count"

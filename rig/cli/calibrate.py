@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.calibrate_check import check
 from rig.cli.help import GroupedHelp
 from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.output.console import JsonFlag
@@ -72,6 +73,9 @@ class Keeping:
     ] = False
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None
     json: JsonFlag = False
+
+
+calibrate_app.command("check")(check)
 
 
 def session(make: "Callable[..., Procedure]") -> None:

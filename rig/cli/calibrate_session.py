@@ -10,6 +10,7 @@ from rig.output.console import emit_json, remarks, results
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
     from calibration.procedure import Answer, Operator, Procedure, Step
+    from calibration.store import CalibrationStore
     from drivers.device import Device
     from rig.calibrate.run import Kept
     from rig.cli.calibrate import Keeping
@@ -30,6 +31,7 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
     from calibration.store import CalibrationStore
     from rig.calibrate.raw import read_raw
     from rig.calibrate.run import Signature, keep
+    from rig.calibrate.shown import announced
     from rig.errors import UsageError
 
     if not how.operator.strip():
@@ -46,6 +48,8 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
                 f"{how.raw} holds a calibration of {kind}.", fix=f"Type `rig calibrate {kind}`."
             )
     else:
+        for line in announced(procedure):
+            remarks().print(line, markup=False)
         lines = settings.calibration_set()
         measurements = _measure(procedure, settings, how)
     own = settings.store or settings.default_store
@@ -61,10 +65,11 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         notes=how.notes,
     )
     kept = keep(procedure, measurements, lines, signature, store, folder)
+    page = _write_page(kept, store)
     if how.use:
         for digest in kept.records:
             store.use(digest, _now(), how.operator)
-    _show(kept, how, store.folder)
+    _show(kept, how, store, page)
 
 
 def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "Keeping") -> None:
@@ -244,8 +249,18 @@ def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def _show(kept: "Kept", how: "Keeping", store: Path) -> None:
+def _write_page(kept: "Kept", store: "CalibrationStore") -> Path:
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
+    from rig.reports.calibration import page
+
+    text = page(kept.records, kept.conclusion, store.records(), Provenance.now(0))
+    return write_report(kept.folder / "calibration.html", text)
+
+
+def _show(kept: "Kept", how: "Keeping", store: "CalibrationStore", page: Path) -> None:
     from rig.calibrate.shown import found_line, parameter_lines
+    from rig.reports.calibration import alarms
 
     screen = results(how.json)
     for digest, record in kept.records.items():
@@ -255,14 +270,21 @@ def _show(kept: "Kept", how: "Keeping", store: Path) -> None:
     for name, found in kept.conclusion.found.items():
         screen.print(f"  {found_line(name, found)}", markup=False)
     screen.print("Good: the data passed every check of this kind of calibration.")
+    drifted = alarms(kept.records.values(), store.records())
+    for line in drifted:
+        screen.print(f"ALARM: {line}", markup=False)
     screen.print(f"Raw logs: {kept.folder}", markup=False)
+    screen.print(f"Page: {page}", markup=False)
     if not how.use:
         for digest in kept.records:
             by = shlex.quote(how.operator)
-            screen.print(f"Use it: rig cal use {digest} --by {by} --store {store}", markup=False)
+            screen.print(
+                f"Use it: rig cal use {digest} --by {by} --store {store.folder}", markup=False
+            )
     if how.json:
         records = {
             digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
             for digest, r in kept.records.items()
         }
-        emit_json({"folder": kept.folder, "records": records, "found": kept.conclusion.found})
+        whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
+        emit_json({**whole, "page": page, "drifted": drifted})

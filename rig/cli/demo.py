@@ -61,6 +61,7 @@ def _told(result: "Demo") -> list[str]:
         *sentences(result.diagnosis),
         "",
         f"Report: {result.report}",
+        "",
         "This was the quick form: one equation, tested against permuted residuals only. The full",
         "form also tests against simulated nulls of the complete model. It uses the same test runs",
         "again, so its result is marked as exploratory:",
@@ -69,4 +70,6 @@ def _told(result: "Demo") -> list[str]:
         f"  rig replay {logs} --model {result.model}",
         "To choose and record further experiments automatically, until the effect is unique:",
         "  rig loop --sim",
+        "Open the page:",
+        f"  rig campaigns --open --root {result.folder}",
     ]

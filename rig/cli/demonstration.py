@@ -5,6 +5,7 @@ chain: frames from the board, its driver, calibration, one log a run. What the d
 given are those logs and nothing else.
 """
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,16 +16,19 @@ from estimation.campaign import Campaign
 from estimation.cross_validation import HeldOutError, held_out_error
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import evidence, split
+from estimation.files import write_text_atomic
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.residual import Structure, largest_structure
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
+from rig.campaigns.index import DIAGNOSIS
 from rig.configuration.config import Config, load_config
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import remember, run_diagnosis
 from rig.diagnosis.written import written_models
 from rig.importers.registry import open_campaign
+from rig.output.console import plain
 from rig.output.provenance import Provenance
 from rig.output.render import write_report
 from rig.protocols.protocol import load_protocol
@@ -119,8 +123,10 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     )
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write_all(written_models(done), model_path)
-    page = diagnosis_page.page(done, Provenance.now(seed))
-    report = write_report(folder / "diagnosis.html", page)
+    page = diagnosis_page.page(done.diagnosis, done.traces(), Provenance.now(seed))
+    kept = logs / DIAGNOSIS
+    report = write_report(kept.with_suffix(".html"), page)
+    write_text_atomic(kept, json.dumps(plain(done.diagnosis.to_json()), indent=2) + "\n")
     remember(done, looks)
     return Demo(
         folder,

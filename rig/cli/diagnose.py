@@ -6,18 +6,28 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.shipped import model_names
+from rig.cli.machine_option import MachineOption
+from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
 def diagnose(
-    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+        ),
+    ],
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", "-m", help=f"Declared model: a file, or one of {', '.join(model_names())}."
+            "--model",
+            "-m",
+            help=f"Declared model: a file, or one of {', '.join(model_names())}.",
+            autocompletion=complete_model,
         ),
     ] = None,
+    machine: MachineOption = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: JsonFlag = False,
     json_out: Annotated[
@@ -29,9 +39,7 @@ def diagnose(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A first answer in seconds, without simulated nulls.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")] = False,
     scheduler: Annotated[
         str | None,
         typer.Option(help="Address of a Dask scheduler."),
@@ -70,7 +78,7 @@ def diagnose(
     working = remarks()
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
-        asked = subject(path, model, balance, format_)
+        asked = subject(path, model, balance, format_, machine)
         say_left_out(path, asked.campaign)
         done = run_diagnosis(
             asked.campaign,
@@ -89,7 +97,7 @@ def diagnose(
         model_file.write_all(written_models(done), model_out)
         written.append(f"Model: {model_out}")
     if page_file is not None:
-        write_report(page_file, page(done, Provenance.now(seed)))
+        write_report(page_file, page(done.diagnosis, done.traces(), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))

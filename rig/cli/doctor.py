@@ -1,6 +1,7 @@
 """`rig doctor | devices | udev | selftest`: what is there, and is it in order."""
 
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -8,17 +9,28 @@ from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 
-def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+def doctor(
+    config: ConfigOption = None,
+    sim: SimFlag = False,
+    bundle: Annotated[
+        Path | None,
+        typer.Option(help="Write one archive (.zip) for a question to a colleague; no secrets."),
+    ] = None,
+    json: JsonFlag = False,
+) -> int:
     """Check the rig for faults and suggest the next command.
 
-    Exit code 1 when something must be put right, 0 when there are at most warnings.
+    Exit code 1 when something must be put right, 0 when there are at most warnings. The archive of
+    --bundle holds versions, findings, configuration, calibrations in use and the check of the
+    newest campaign; no samples, no environment, no credentials and no name of a user.
     """
     from rig.doctor.examine import examine
     from rig.doctor.finding import Level, worst
 
     screen = results(json)
     found = []
-    for finding in examine(chosen_rig(config, sim)):
+    settings = chosen_rig(config, sim)
+    for finding in examine(settings):
         found.append(finding)
         screen.print(
             f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}", markup=False
@@ -26,8 +38,13 @@ def doctor(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = F
         if finding.fix:
             screen.print(f"{'':8}fix: {finding.fix}", markup=False)
     grave = worst(found)
+    if bundle is not None:
+        from rig.doctor.bundle import write_bundle
+
+        names = write_bundle(bundle, settings, found)
+        screen.print(f"Wrote {bundle}: {', '.join(names)}.")
     if json:
-        emit_json({"level": grave, "findings": found})
+        emit_json({"level": grave, "findings": found, "bundle": bundle})
     return 1 if grave is Level.ERROR else 0
 
 

@@ -60,7 +60,6 @@ def _described(one: "Effect") -> dict[str, Any]:
         "equations": list(one.balances),
         "inputs": dict(one.roles),
         "parameters": [*one.amplitudes, *one.shape],
-        "confused_with": one.confused_with,
         "told_apart_by": one.told_apart_by,
     }
 
@@ -78,7 +77,5 @@ def _show(one: "Effect") -> None:
     channels = ", ".join(f"{role} = {channel}" for role, channel in one.roles.items())
     screen.print(f"reads: {channels or 'nothing'}")
     screen.print(f"searched in: {', '.join(one.balances) or 'no equation; it is declared only'}")
-    if one.confused_with:
-        screen.print(f"confused with: {', '.join(one.confused_with)}")
     if one.told_apart_by:
         screen.print(f"distinguished by: {one.told_apart_by}")

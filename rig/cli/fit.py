@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.shipped import complete_model, model_names
+from rig.cli.machine_option import MachineOption
+from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
 if TYPE_CHECKING:
@@ -113,17 +114,24 @@ def fit_network(
 
 
 def fit(
-    path: Annotated[Path, typer.Argument(help="Recordings: a file, folder or archive.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+        ),
+    ],
     model: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--model",
             "-m",
             help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
-            " products of physical states, `network` for a network with some of them as inputs.",
+            " products of physical states, `network` for a network with some of them as inputs. If"
+            " none: grip, or with --machine all equations of the machine.",
             autocompletion=complete_model,
         ),
-    ] = "grip",
+    ] = None,
+    machine: MachineOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File of the fitted model.")
     ] = None,
@@ -150,13 +158,12 @@ def fit(
     from estimation import model_file
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
-    from rig.importers.registry import open_campaign
-    from rig.live.estimator import models_in_use
+    from rig.machines.recordings import open_recordings
     from rig.output.table import to_rich
     from rig.reports.first_look import parameter_table
 
     screen = results(json_)
-    campaign = open_campaign(path, format_)
+    campaign = open_recordings(path, machine, format_)
     say_left_out(path, campaign)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
@@ -164,7 +171,7 @@ def fit(
     if model == "network":
         fit_network(campaign, target, surrogate, folds, seed, out, json_)
         return
-    models = models_in_use(Path(model))
+    models = declared_models(model, machine)
     folds = min(folds, len(campaign.evidence))
     done = []
     with progress() as bar:
@@ -188,6 +195,24 @@ def fit(
     if json_:
         told = [_told(fitted, error, out) for fitted, error in done]
         emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
+
+
+def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
+    """Return the models to fit: of a machine its equations, or the one of that name.
+
+    Raises:
+        ModelFileError: The model cannot be read.
+        PlantFileError: The machine cannot be read.
+    """
+    from estimation.plant_models import declared
+    from rig.live.estimator import models_in_use
+    from rig.machines.shipped import read_machine
+
+    if machine is None:
+        return models_in_use(Path(model or "grip"))
+    own = declared(read_machine(machine))
+    named = [one for one in own if model in (None, one.balance)]
+    return named or models_in_use(Path(str(model)))
 
 
 def _dated(model: "Model") -> "Model":

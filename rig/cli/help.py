@@ -5,7 +5,17 @@ from typing import Any
 from typer.core import TyperGroup
 
 GROUPS = {
-    "Begin": ("demo", "config", "doctor", "devices", "selftest", "commission", "udev", "firmware"),
+    "Begin": (
+        "demo",
+        "config",
+        "machine",
+        "doctor",
+        "devices",
+        "selftest",
+        "commission",
+        "udev",
+        "firmware",
+    ),
     "At the rig": (
         "live",
         "record",
@@ -17,8 +27,8 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("log", "replay"),
-    "Models": ("fit", "diagnose", "loop", "effects", "adapt", "estimator", "export"),
+    "Recordings": ("campaigns", "import", "log", "replay"),
+    "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

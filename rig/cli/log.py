@@ -28,13 +28,20 @@ OneLog = Annotated[Path, typer.Argument(help="A log.")]
 
 @log_app.command()
 def info(path: LogOrFolder, json: JsonFlag = False) -> None:
-    """Show the content of a log: run, conditions, streams, rates, marks, attachments."""
+    """Show what a log lost, then run, conditions, streams, rates, marks and attachments."""
     from rig.log.reader import read_log
 
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
     if json:
         emit_json({"logs": found})
         return
+    if len(found) > 1:
+        lossy = [log for log in found if log["problems"]]
+        results(json).print(
+            f"{len(found)} logs, {len(lossy)} of them not complete."
+            if lossy
+            else f"{len(found)} logs, nothing lost."
+        )
     for log in found:
         _show_info(log)
 
@@ -243,9 +250,10 @@ def _logs(path: Path) -> list[Path]:
 
 def _described(log: "LogFile") -> dict[str, Any]:
     """Return the result of `info` for a log."""
-    from rig.log.check import stream_time_s
+    from rig.log.check import report_on, stream_time_s
     from rig.log.convert import exclusion
 
+    report = report_on(log)
     topics = []
     for name, topic in log.topics.items():
         time_s = stream_time_s(topic)
@@ -273,6 +281,8 @@ def _described(log: "LogFile") -> dict[str, Any]:
         "attachments": {item.name: len(item.data) for item in log.attachments},
         "excluded": exclusion(log),
         "damaged": bool(log.damage),
+        "lost": {t.topic: t.expected - t.received for t in report.topics},
+        "problems": report.problems,
     }
 
 
@@ -281,7 +291,8 @@ def _show_info(log: dict[str, Any]) -> None:
 
     screen = results(json=False)
     run, end = log["run"], log["end"]
-    screen.print(f"{log['path']}  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
+    screen.print(f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}")
+    screen.print(f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
     if run is not None:
         conditions = ", ".join(f"{name} = {value}" for name, value in run.conditions.items())
         screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions or '-'}")

@@ -29,7 +29,7 @@ def loop(
     seed: Annotated[
         int | None, typer.Option(help="Random seed; taken from the clock by default.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Without simulated nulls.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")] = False,
     workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
     json: JsonFlag = False,
@@ -86,7 +86,8 @@ def loop(
             for line in sentences(one.done.diagnosis):
                 screen.print(line, markup=False)
             report = folder / f"round-{one.number}"
-            where = write_report(report / "diagnosis.html", page(one.done, Provenance.now(number)))
+            text = page(one.done.diagnosis, one.done.traces(), Provenance.now(number))
+            where = write_report(report / "diagnosis.html", text)
             screen.print(f"Report: {where}", markup=False)
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)
             bar.start()

@@ -12,11 +12,13 @@ from rig import __version__
 from rig.cli.adapt import adapt
 from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
+from rig.cli.campaigns import campaigns
 from rig.cli.clear import clear
 from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
+from rig.cli.diff import diff
 from rig.cli.doctor import devices, doctor, selftest, udev
 from rig.cli.effects import effects
 from rig.cli.estimator import estimator_app
@@ -26,9 +28,11 @@ from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
 from rig.cli.help import GroupedHelp
+from rig.cli.import_ import import_
 from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
+from rig.cli.machine import machine_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
@@ -42,7 +46,7 @@ app = typer.Typer(
     name="rig",
     help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
     cls=GroupedHelp,
-    no_args_is_help=True,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help keeps the start instant
@@ -63,9 +67,13 @@ app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(cal_app, name="cal")
 app.command()(diagnose)
+app.command()(diff)
 app.command()(loop)
 app.command()(effects)
+app.command("import")(import_)
+app.command()(campaigns)
 app.add_typer(log_app, name="log")
+app.add_typer(machine_app, name="machine")
 app.add_typer(grasper_app, name="grasper")
 app.add_typer(study_app, name="study")
 app.add_typer(config_app, name="config")
@@ -88,12 +96,17 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def options(
+    context: typer.Context,
     debug: Annotated[bool, typer.Option(help="Show the traceback of an error.")] = False,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
     """Take the options that stand before the verb; `main` reads them from the command line."""
+    if context.invoked_subcommand is None:
+        from rig.cli.next_steps import show_next_steps
+
+        show_next_steps()
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -121,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _report(error: Exception, words: list[str]) -> int:
     """Write an error for people to stderr, for machines to stdout, and return its exit code."""
-    from rig.errors import KNOWN_ERRORS, ExitCode, exit_code_of
+    from rig.errors import KNOWN_ERRORS, PAGE, ExitCode, anchor_of, exit_code_of
     from rig.output.console import emit_json
 
     if isinstance(error, typer.Abort):
@@ -148,9 +161,12 @@ def _report(error: Exception, words: list[str]) -> int:
         first, *more = text.splitlines() or [""]
         lines += [f"  {word}: {first}"] if first else []
         lines += [f"       {line}" for line in more]
+    more = f"{PAGE}#{anchor_of(type(error))}"
+    lines.append(f"  more: {more}")
     sys.stderr.write("\n".join(lines) + "\n")
     if "--json" in words:
-        emit_json({"error": {"what": what, "why": why, "fix": fix, "exit_code": int(code)}})
+        whole = {"what": what, "why": why, "fix": fix, "more": more, "exit_code": int(code)}
+        emit_json({"error": whole})
     if extra and "--json" not in words and offer(extra):
         sys.stderr.write("Installed. Type the command again.\n")
     return code

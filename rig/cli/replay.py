@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.machine_option import MachineOption
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def replay(
     any_instrument: Annotated[
         bool, typer.Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
+    machine: MachineOption = None,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of LOG; detected by default.")
     ] = None,
@@ -41,7 +43,6 @@ def replay(
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.
     """
     from rig.errors import ExitCode, UsageError
-    from rig.importers.registry import open_campaign
     from rig.live.estimator import half_widths_of, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
     from rig.live.model_status import with_model_status
@@ -49,13 +50,14 @@ def replay(
     from rig.live.replay import replay_blocks
     from rig.live.run import show
     from rig.live.watching import watched
+    from rig.machines.recordings import open_recordings
 
     if not 0 <= speed < math.inf:
         raise UsageError(
             f"A speed of {speed:g} shows nothing.",
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
-    recording = _choose(open_campaign(log, format_), run, quiet=json_)
+    recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
     estimators = _estimators(model, recording, any_instrument) if model else []
     usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(

@@ -9,6 +9,7 @@ import typer
 
 from rig.cli.help import GroupedHelp
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
+from rig.cli.study_machines import machine_studies
 from rig.output.console import JsonFlag, emit_json, progress, results, show_result
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ study_app = typer.Typer(
 
 
 study_app.add_typer(arm_studies)
+study_app.add_typer(machine_studies)
 
 
 @study_app.callback()

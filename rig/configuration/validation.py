@@ -41,7 +41,7 @@ def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -
 def line_of(text: str, path: Sequence[int | str]) -> int | None:
     """Return the line of TOML text where a key stands, from 1; of a missing key its table's.
 
-    None where neither is there.
+    A key inside an inline table stands where that table does. None where nothing is there.
 
     Args:
         text: The TOML.
@@ -57,14 +57,12 @@ def line_of(text: str, path: Sequence[int | str]) -> int | None:
                 arrays[tuple(table)] = arrays.get(tuple(table), -1) + 1
                 table.append(arrays[tuple(table)])
             own = table
-            if table == list(path[: len(table)]) and len(table) > depth:
-                nearest, depth = number, len(table)
         elif key := KEY.match(line):
             own = [*table, *(part.strip(" \"'") for part in key[1].split("."))]
         else:
             continue
-        if own == list(path):
-            return number
+        if own == list(path[: len(own)]) and len(own) > depth:
+            nearest, depth = number, len(own)
     return nearest
 
 

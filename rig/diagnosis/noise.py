@@ -1,18 +1,16 @@
-"""The noise floor of each balance: what differs between runs that were asked for twice.
+"""The noise floor of each equation: the difference between runs that repeat one another.
 
-Two runs of one motion and load hold the same physics, and so do two periods of one path; half of
-the variance of the difference of their residuals is what no model of these variables can explain.
+Two runs of one motion and load contain the same physics, and so do two periods of one path. Half of
+the variance of the difference of their residuals is unexplained by any model of these variables.
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.diagnosis.design import Run
-from estimation.diagnosis.frozen import Frozen
+from estimation.causes.refits import Refits
 from estimation.diagnosis.paths import path_of
-from estimation.diagnosis.story import Story
 from estimation.recording import FloatArray, Recording
 
 ASKED = ("target_angle_rad", "load_command_a")
@@ -44,33 +42,33 @@ def _asked_alike(one: Recording, other: Recording) -> bool:
     )
 
 
-def noise_floors(
-    stories: Mapping[str, Story], recordings: Sequence[Recording]
-) -> dict[str, float | None]:
-    """Return each balance's noise floor in its target's unit, None where nothing was repeated.
+def noise_floors(refits: Refits, recordings: Sequence[Recording]) -> dict[str, float | None]:
+    """Return each equation's noise floor in its target's unit, None where nothing was repeated.
 
     Args:
-        stories: Balance to its story, the confirm runs opened.
+        refits: The equations with the causes found.
         recordings: The runs.
     """
     pairs = repeats(recordings)
-    return {name: _floor(story, pairs) for name, story in stories.items()}
+    return {name: _floor(refits, name, pairs) for name in refits.of}
 
 
-def _floor(story: Story, pairs: Sequence[tuple[str, str]]) -> float | None:
-    runs = {run.name: run for run in (*story.balance.runs, *story.confirm)}
+def _floor(refits: Refits, equation: str, pairs: Sequence[tuple[str, str]]) -> float | None:
     squares, samples = 0.0, 0
     for one, other in pairs:
-        if one not in runs or other not in runs:
-            continue
-        difference = _difference(story.after, runs[one], runs[other])
+        difference = _difference(refits, equation, one, other)
         if difference.size >= LEAST:
             squares += 0.5 * float(np.sum((difference - difference.mean()) ** 2))
             samples += difference.size
     return float(np.sqrt(squares / samples)) if samples else None
 
 
-def _difference(model: Frozen, one: Run, other: Run) -> FloatArray:
+def _difference(refits: Refits, equation: str, one: str, other: str) -> FloatArray:
     """Return the difference of two residuals at the samples that both use."""
-    both = one.used & other.used
-    return model.error(one)[both[one.used]] - model.error(other)[both[other.used]]
+    solved = refits.after(equation)
+    found = [refits.of[equation].residuals(solved, name) for name in (one, other)]
+    if found[0] is None or found[1] is None:
+        return np.empty(0)
+    (first, left), (second, right) = found[0], found[1]
+    _, at, also = np.intersect1d(first, second, assume_unique=True, return_indices=True)
+    return np.asarray(left[at] - right[also])

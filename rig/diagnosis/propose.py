@@ -1,64 +1,72 @@
-"""The next experiment of a diagnosis: the menu played on the simulated twin, the best one taken."""
+"""The next experiment of a diagnosis: a menu played on the simulated rig, and the best of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from estimation.diagnosis.candidate import Candidate, projected
-from estimation.diagnosis.design import DesignError, Run, prepare, targets
-from estimation.diagnosis.instruments import projection as instrumented
-from estimation.diagnosis.next_experiment import Worth, beside, rivals_of, worth
-from estimation.diagnosis.result import Diagnosis, Finding
-from estimation.diagnosis.story import Story
-from estimation.diagnosis.twin import coarse
-from estimation.diagnosis.variables import PROJECTED, projection
+from estimation.causes.experiment import Question, question, separation
+from estimation.causes.verdict import Answer
+from estimation.derived import CAMPAIGN_TIME
+from estimation.diagnosis.result import Diagnosis
+from estimation.effects import catalogue
 from estimation.files import write_text_atomic
-from estimation.recording import Recording, shared_columns
+from estimation.recording import Recording
 from rig.configuration.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
+from rig.diagnosis.simulated import simulated_rig
 from rig.protocols.protocol import Protocol, protocol_toml
 from rig.simulation.twin import Twin
 
-CAMPAIGN_TIME = "campaign_time_s"
-
 SEED = 7_000_000
-"""Far from the seeds of the twins that prove a finding."""
+"""Seed of the simulated sensors' noise."""
+
+COST_PER_MINUTE = 0.01
+"""Separation that a minute at the rig must add: a hundredth of the noise's variance."""
+
+PAUSE_S = 60.0
+"""Time between runs of a new campaign."""
 
 
 def propose(
-    diagnosis: Diagnosis,
-    stories: Mapping[str, Story],
-    recordings: Sequence[Recording],
-    twin: Twin | None,
+    answer: Answer, recordings: Sequence[Recording], executor: Executor | None = None
 ) -> dict[str, Any] | None:
-    """Return the next experiment in plain JSON types, or None where every name is unique.
+    """Return the next experiment in plain JSON types, or None where every name is sure.
 
-    Without a twin, it is what the rivals themselves say tells them apart, in words, and no
-    protocol.
+    It is chosen for the first finding without a sure name. Where the rig cannot be simulated, the
+    experiments that the effects' files name are proposed, without a protocol.
 
     Args:
-        diagnosis: The answer.
-        stories: The stories behind it.
-        recordings: The runs.
-        twin: Simulates the declared models, or None.
+        answer: The diagnosis.
+        recordings: The runs, with the campaign's time.
+        executor: Plays experiments in parallel; None plays them here.
     """
-    measured = shared_columns(recordings)
-    for finding in diagnosis.findings:
-        story = stories[finding.balance]
-        rivals = rivals_of(story, finding, measured)
-        if len(rivals) < 2:
-            continue
-        if twin is None:
-            return _in_words(finding, rivals)
-        scored = _scored(story, finding, rivals, recordings, twin)
-        if scored:
-            return _described(finding, rivals, scored)
-    return None
+    asked = (question(answer, k) for k in range(len(answer.kept)))
+    found = next(((k, one) for k, one in enumerate(asked) if one is not None), None)
+    if found is None:
+        return None
+    place, hypotheses = found
+    balance = answer.diagnosis.findings[place].balance
+    names = [one.label for one in hypotheses.hypotheses]
+    train = [r for r in recordings if r.name in answer.diagnosis.sealed.discover]
+    declared = [equation.model for equation in answer.layout.equations.values()]
+    rig = simulated_rig(declared, train)
+    if rig is None:
+        return _by_hand(balance, names)
+    last_s = max(float(r[CAMPAIGN_TIME][-1]) for r in recordings)
+    offered = menu(room_of(recordings, load_config().reference_limits))
+    worth = partial(_worth, rig, hypotheses, last_s)
+    values = list(map(worth, offered) if executor is None else executor.map(worth, offered))
+    scored = [(p, v) for p, v in zip(offered, values, strict=True) if v is not None]
+    if not scored:
+        return _by_hand(balance, names)
+    scored.sort(key=lambda pair: COST_PER_MINUTE * _seconds(pair[0]) / 60.0 - pair[1])
+    return _described(balance, names, scored)
 
 
 def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
-    """Write the next experiment as a protocol file; return what to tell a person."""
+    """Write the next experiment as a protocol file; return the message for the user."""
     proposed = diagnosis.next_experiment
     if proposed is None:
         return "No next experiment: there are no competing hypotheses to distinguish."
@@ -68,65 +76,36 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
     return f"Next: rig record --protocol {path}"
 
 
-def _scored(
-    story: Story,
-    finding: Finding,
-    rivals: Sequence[Candidate],
-    recordings: Sequence[Recording],
-    twin: Twin,
-) -> list[tuple[Protocol, Worth]]:
-    limits = load_config().reference_limits
-    balance = story.balance
-    known = list(balance.runs[0].channels)
-    made = {"time_s", *PROJECTED.values(), *(projected(name) for name in known)}
-    others = beside(story, finding)
-    told = instrumented(balance.runs, [*others, *rivals], balance.model.target)
-    whole = projection(balance)
-    # old and new runs are thinned alike
-    old = [coarse(run) for run in balance.runs]
-    thin = replace(balance, runs=old, target=targets(old, balance.model), tables_of={})
-    scored = []
-    for protocol in menu(room_of(recordings, limits)):
-        plans = protocol.plans()
-        played = [twin.play(plan, SEED + k) for k, plan in enumerate(plans)]
-        if not within(played, limits):
-            continue
-        if CAMPAIGN_TIME in known:
-            played = _after(balance.runs, played)
-        wanted = [name for name in known if name not in made]
-        runs = []
-        for run in played:
-            try:
-                runs.append(coarse(whole(told(prepare(run, wanted, balance.model)))))
-            except DesignError:
-                continue  # a run that only rests tells nothing of this balance
-        if runs:
-            seconds = sum(plan.duration_s for plan in plans)
-            scored.append((protocol, worth(thin, others, rivals, protocol.name, runs, seconds)))
-    return sorted(scored, key=lambda pair: -pair[1].net)
+def _worth(rig: Twin, asked: Question, last_s: float, protocol: Protocol) -> float | None:
+    """Return the expected separation of an experiment; None beyond the limits of the rig."""
+    plans = protocol.plans()
+    played = [rig.play(plan, SEED + k) for k, plan in enumerate(plans)]
+    if not within(played, load_config().reference_limits):
+        return None
+    timed = []
+    for recording in played:
+        last_s += PAUSE_S
+        timed.append(recording.with_columns(**{CAMPAIGN_TIME: last_s + recording.time_s}))
+        last_s += float(recording.time_s[-1])
+    return separation(asked, timed)
 
 
-def _after(runs: Sequence[Run], played: Sequence[Recording]) -> list[Recording]:
-    """Return played runs on the campaign's clock, a minute apart behind the runs there are."""
-    last = max(float(run.channels[CAMPAIGN_TIME].max()) for run in runs)
-    return [
-        recording.with_columns(**{CAMPAIGN_TIME: last + 60.0 * (k + 1) + recording.time_s})
-        for k, recording in enumerate(played)
-    ]
+def _seconds(protocol: Protocol) -> float:
+    return sum(plan.duration_s for plan in protocol.plans())
 
 
 def _described(
-    finding: Finding, rivals: Sequence[Candidate], scored: Sequence[tuple[Protocol, Worth]]
+    balance: str, between: Sequence[str], scored: Sequence[tuple[Protocol, float]]
 ) -> dict[str, Any]:
     protocol, best = scored[0]
     return {
         "name": protocol.name,
         "description": protocol.description,
-        "balance": finding.balance,
-        "between": [rival.family for rival in rivals],
-        "discrimination": best.discrimination,
-        "others": {other.name: told.discrimination for other, told in scored[1:]},
-        "seconds": best.seconds,
+        "balance": balance,
+        "between": list(between),
+        "discrimination": best,
+        "others": {other.name: value for other, value in scored[1:]},
+        "seconds": _seconds(protocol),
         "protocol": {
             "name": protocol.name,
             "description": protocol.description,
@@ -135,13 +114,17 @@ def _described(
     }
 
 
-def _in_words(finding: Finding, rivals: Sequence[Candidate]) -> dict[str, Any]:
-    advice = dict.fromkeys(r.effect.told_apart_by for r in rivals if r.effect.told_apart_by)
+def _by_hand(balance: str, between: Sequence[str]) -> dict[str, Any] | None:
+    known: Mapping[str, Any] = catalogue()
+    advice = [known[name].told_apart_by for name in between if name in known]
+    described = "; ".join(dict.fromkeys(a for a in advice if a))
+    if not described:
+        return None
     return {
         "name": "by hand",
-        "description": "; ".join(advice),
-        "balance": finding.balance,
-        "between": [rival.family for rival in rivals],
+        "description": described,
+        "balance": balance,
+        "between": list(between),
         "discrimination": None,
         "others": {},
         "seconds": None,

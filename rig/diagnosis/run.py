@@ -1,7 +1,7 @@
-"""A diagnosis of a campaign: read the runs, seal the split, search, confirm.
+"""A diagnosis of a campaign: read the runs, split them, search, and open the test runs.
 
-The caller writes the files it was asked for, then calls `remember`, then shows the result: the
-held-out runs count as used once there is a result to see, and not before.
+The caller writes the requested files, then calls `remember`, then shows the result: the held-out
+runs count as used once there is a result to see, and not before.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,20 +9,20 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from estimation.arm.balances import balances_of
-from estimation.arm.twin import laid_out
+from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
+from estimation.causes.equations import on_one_clock
+from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.clock import steady
-from estimation.diagnosis.diagnose import diagnose
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import Sealed, evidence, split
-from estimation.diagnosis.story import Story
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.twins import Twins, twins_of
+from rig.diagnosis.traces import EquationTraces, traces
 
 Stage = Callable[[str], None]
 
@@ -32,27 +32,35 @@ class Diagnosed:
     """A diagnosis with what a report needs.
 
     Attributes:
-        diagnosis: The answer.
-        stories: Balance to the story behind it.
-        recordings: The runs.
+        diagnosis: The result.
+        answer: The equations, hypotheses and models behind it.
+        recordings: The runs, with the campaign's time.
         sealed: The split.
-        seen: Confirm runs that an earlier look held.
-        looked_at: All runs as they were read, for the ledger.
+        seen: Test runs that an earlier diagnosis used.
+        looked_at: All runs as they were read, for the access log.
     """
 
     diagnosis: Diagnosis
-    stories: dict[str, Story]
+    answer: Answer
     recordings: tuple[Recording, ...]
     sealed: Sealed
     seen: tuple[str, ...]
     looked_at: tuple[Recording, ...]
 
+    def traces(self) -> dict[str, EquationTraces]:
+        """Return the signals of each equation's runs, for a page to draw."""
+        declared, found = self.answer.layout.equations, self.answer.models
+        return {
+            m.balance: traces(self.recordings, self.sealed, declared[m.balance].model, m)
+            for m in found
+        }
+
 
 def remember(done: Diagnosed, ledger: Ledger) -> None:
-    """Write the runs of a diagnosis into the ledger: a later one on them is exploratory.
+    """Write the runs of a diagnosis into the access log: a later one on them is exploratory.
 
     Raises:
-        LedgerError: The ledger cannot be read or written.
+        LedgerError: The log cannot be read or written.
     """
     ledger.write(done.looked_at, done.sealed)
 
@@ -71,17 +79,17 @@ def run_diagnosis(
 
     Args:
         campaign: The recordings.
-        models: Declared models, one a balance.
-        ledger: Names the runs that earlier diagnoses used; it is not written here.
-        seed: Seed of the split and of everything random.
-        executor: Runs work in parallel.
-        quick: A first answer, held against surrogates only, without simulated twins.
-        on_stage: Told what begins.
+        models: Declared models, one an equation.
+        ledger: Log of the runs that earlier diagnoses used; it is not written here.
+        seed: Seed of the split and of intervals.
+        executor: Plays the experiments that may be proposed in parallel.
+        quick: Propose no next experiment.
+        on_stage: Called with what begins, in words.
 
     Raises:
-        LedgerError: The ledger cannot be read or written.
+        LedgerError: The log cannot be read or written.
         DataError: A recording cannot be read.
-        EstimationError: Nothing can be decided; says why.
+        EstimationError: Nothing can be decided; the reason is in the message.
     """
     ledger.check()
     on_stage("reading the recordings")
@@ -95,34 +103,25 @@ def run_diagnosis(
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
     arm = balances_of(recordings[0])
-    if arm is None:
-        on_stage("building the simulated twin of the declared models")
-        twins = twins_of(models, [r for r in recordings if r.name in sealed.discover])
-    else:
+    if arm is not None:
         on_stage("fitting the links that all joints share")
-        recordings, twin = laid_out(arm, recordings, sealed.discover)
-        twins = Twins(None, dict.fromkeys((m.balance for m in models), lambda *_: twin))
-    diagnosis, stories = diagnose(
-        recordings,
-        models,
-        sealed,
-        executor=executor,
-        twins=None if quick else twins.makers,
-        on_stage=on_stage,
-    )
-    notes = (*lost, *diagnosis.notes)
+        recordings = laid_out(arm, recordings, sealed.discover)
+    recordings = on_one_clock(recordings)
+    found = answer(recordings, models, sealed, on_stage=on_stage)
+    proposed = None
+    if not quick:
+        on_stage("choosing the experiment that separates the alternatives")
+        proposed = propose(found, recordings, executor)
+    notes = [*lost, *found.diagnosis.notes]
     if len(whole) == PATHS:
-        notes = (claim(sealed), *notes)
-    if twins.note:
-        notes = (*notes, twins.note)
+        notes.insert(0, claim(sealed))
     if seen:
-        notes = (*notes, f"Exploratory: seen by an earlier diagnosis: {', '.join(seen)}.")
-    on_stage("looking for the experiment that tells rivals apart")
+        notes.append(f"Exploratory: used by an earlier diagnosis: {', '.join(seen)}.")
     diagnosis = replace(
-        diagnosis,
+        found.diagnosis,
         exploratory=bool(seen),
-        notes=notes,
-        noise_floor=noise_floors(stories, recordings),
-        next_experiment=propose(diagnosis, stories, recordings, twins.twin),
+        notes=tuple(notes),
+        noise_floor=noise_floors(found.refits, recordings),
+        next_experiment=proposed,
     )
-    return Diagnosed(diagnosis, stories, tuple(recordings), sealed, seen, tuple(whole))
+    return Diagnosed(diagnosis, found, tuple(recordings), sealed, seen, tuple(whole))

@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from estimation.diagnosis.candidate import FAMILIES
-from estimation.diagnosis.result import SCHEMA, VARIABLES
+from estimation.diagnosis.result import FAMILIES, SCHEMA, VARIABLES
 
 FILE = "docs/schemas/rig.diagnosis-1.json"
 
@@ -32,22 +31,18 @@ class Parameter(_Strict):
     ci95: tuple[Number, Number] | None
 
 
-class Formula(_Strict):
-    """A formula of the variables that an effect without a name depends on."""
-
-    text: str
-    gain: Number
-    rmse_after: Number | None
-
-
 class Finding(_Strict):
     """One cause."""
 
     balance: Balance
     also_in: list[Balance]
+    place: str
+    """Where in the machine it acts."""
     family: Family
     verdict: Name
     alternatives: list[Family]
+    probabilities: dict[Family, Annotated[float, Field(ge=0, le=1)]]
+    """Of the family and its alternatives."""
     depends_on: list[Variable]
     confidence: Annotated[float, Field(ge=0, le=1)] | None
     parameters: dict[str, Parameter]
@@ -56,12 +51,6 @@ class Finding(_Strict):
     runs_improved: int
     runs_total: int
     runs_affected: list[str]
-    formulas: list[Formula] = []
-    """Formulas that do about equally well, the one that a model file holds first; may be left out.
-    """
-    form: str = ""
-    """Formula beside a named effect, of what its equation leaves of its own cause; may be left out.
-    """
 
 
 class Runs(_Strict):

@@ -8,13 +8,14 @@ from estimation import model_file
 from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
 from estimation.model import Model
+from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared
 from rig.calibrate.diagnose import declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
-
-REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
-"""Shipped models that together declare the reference rig, measured or simulated."""
+from rig.machines.moving import with_motion
+from rig.machines.recordings import open_recordings
+from rig.machines.shipped import read_machine
 
 WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
 """Those that declare the kinematics of a grasper with three degrees of freedom."""
@@ -41,6 +42,7 @@ def subject(
     model: Path | None = None,
     balance: str | None = None,
     format_name: str | None = None,
+    machine: Path | None = None,
 ) -> Subject:
     """Return the recordings at a path and what is declared of them.
 
@@ -52,12 +54,21 @@ def subject(
         model: A model file or the name of a shipped one.
         balance: Only this balance.
         format_name: Importer to use; guessed when None.
+        machine: A machine file or the name of a shipped machine: its equations are declared, and
+            foreign tables are read as it states.
 
     Raises:
         UsageError: The path does not exist, or there is no model of that balance.
+        PlantFileError: The machine file cannot be read.
         ModelFileError: The model cannot be read.
         DataError: The recordings cannot be read.
     """
+    if machine is not None:
+        if model is None:
+            models = _of(declared_of(read_machine(machine)), balance)
+        else:
+            models = declared_models(model, balance)
+        return Subject(with_motion(open_recordings(path, machine, format_name), models), models)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name), models)
@@ -76,7 +87,7 @@ def subject(
     for models in (_shipped(WRIST), model_file.read_all(GRASPER)):
         if {model.target for model in models} <= there:
             return Subject(campaign, _of(models, balance))
-    return Subject(campaign, _of(_shipped(REFERENCE_RIG), balance))
+    return Subject(campaign, _of(model_file.reference_rig(), balance))
 
 
 def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
@@ -96,7 +107,7 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
         UsageError: No model of that balance.
         ModelFileError: The file cannot be read.
     """
-    models = _shipped(REFERENCE_RIG) if path is None else model_file.read_all(path)
+    models = model_file.reference_rig() if path is None else model_file.read_all(path)
     return _of(models, balance)
 
 

@@ -74,19 +74,21 @@ def checked(recording: Recording) -> Recording:
         DataError: A pair differs by a factor, a sign or a shift in time.
     """
     for name, slope_name in pairs(recording):
-        found = relation(recording, name, slope_name)
-        fault = _fault(name, slope_name, found) if found else ""
-        if fault:
+        if found := fault(recording, name, slope_name):
             raise DataError(
-                f"{recording.source or recording.name}: {fault}.",
+                f"{recording.source or recording.name}: {found}.",
                 f"{slope_name} must be the time derivative of {name}. Either the sample rate, or a "
                 "scale, a sign or the order of columns is wrong; nothing of it was imported.",
-                "Correct the file, its sidecar or the stated sample rate.",
+                "Correct the file, the mapping of its columns or the stated sample rate.",
             )
     return recording
 
 
-def _fault(name: str, slope_name: str, found: Relation) -> str:
+def fault(recording: Recording, name: str, slope_name: str) -> str:
+    """Return how a channel and its stated derivative differ, in words; nothing if they agree."""
+    found = relation(recording, name, slope_name)
+    if found is None:
+        return ""
     if found.lag_is_shift:
         way = "after" if found.lag_s > 0 else "before"
         return f"{slope_name} comes {abs(1000 * found.lag_s):.0f} ms {way} the motion of {name}"

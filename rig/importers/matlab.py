@@ -8,17 +8,8 @@ hold one or the other. In a run,
 - a numeric scalar whose name ends in a unit is a condition (`load_command_a`),
 - text is a condition, except `notes`, which becomes the notes.
 
-Anything else is refused, with the list of what was found. Closing motion and torque are positive,
-and units are SI: the file follows these rules, or a sidecar `<file>.mat.toml` maps other names
-and then alone decides what is imported (`variable` may be `struct.field`):
-
-    sample_rate_hz = 1000               # where there is no time variable
-    [channels.spindle_angle_rad]
-    variable = "enc"
-    scale = -7.669904e-4                # default 1; value = scale * variable + offset
-    offset = 0.0                        # default 0, in the channel's unit
-    [conditions]
-    load_command_a = 0.2
+Anything else is refused, with the list of what was found; `rig import` maps other names and units.
+Closing motion and torque are positive, and units are SI.
 """
 
 from collections.abc import Mapping
@@ -30,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign, Run
-from estimation.channels import CHANNELS
+from estimation.channels import CHANNELS, UnknownUnitError, unit_of
 from estimation.recording import FloatArray, Recording, RecordingError
 from rig.errors import DataError
 from rig.importers.mat5 import Mat5Error, Unread, Value, read_mat5
-from rig.importers.matlab_sidecar import TIME, Sidecar, carries_unit, read_sidecar, sidecar_path
 
+TIME = "time_s"
 MAX_BYTES = 1 << 31
 HDF5_VERSION = b"MATLAB 7.3 MAT-file"
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"  # after the 512 bytes MATLAB puts before it
@@ -56,18 +47,16 @@ class MatlabImporter:
     """Importer of MATLAB files."""
 
     name = "matlab"
-    description = (
-        "MATLAB .mat (v5 to v7): vectors or structs named as channels, or with a .mat.toml"
-    )
+    description = "MATLAB .mat (v5 to v7): vectors or structs named as channels"
 
     def recognises(self, path: Path) -> bool:
-        """Whether the path is a `.mat` file, or a folder of nothing but these and sidecars.
+        """Whether the path is a `.mat` file, or a folder of nothing but these.
 
         A folder with other files is not recognised: name the format to import it.
         """
         if path.is_dir():
             names = [entry.name.lower() for entry in path.iterdir()]
-            if not all(name.endswith((".mat", ".mat.toml")) for name in names):
+            if not all(name.endswith(".mat") for name in names):
                 return False
         return bool(_files(path))
 
@@ -130,10 +119,7 @@ def _files(path: Path) -> list[Path]:
 
 def _contents(path: Path) -> dict[str, Content]:
     """Return the variables of each run of a file, by the name of its struct; "" is the file."""
-    variables = _variables(path)
-    sidecar = read_sidecar(path)
-    if sidecar is not None:
-        return {"": _mapped(path, variables, sidecar)}
+    variables = read_variables(path)
     if TIME in variables:
         return {"": _named(path, variables)}
     structs = {name: v for name, v in variables.items() if isinstance(v, dict) and TIME in v}
@@ -142,7 +128,12 @@ def _contents(path: Path) -> dict[str, Content]:
     return {name: _named(path, fields) for name, fields in structs.items()}
 
 
-def _variables(path: Path) -> dict[str, Value]:
+def read_variables(path: Path) -> dict[str, Value]:
+    """Return the variables of a MATLAB file of versions 5 to 7 by name.
+
+    Raises:
+        DataError: It cannot be read, is damaged, or is of version 7.3.
+    """
     try:
         if path.stat().st_size > MAX_BYTES:
             raise DataError(f"{path} has more than {MAX_BYTES >> 30} GB.")
@@ -188,27 +179,13 @@ def _named(path: Path, values: Values) -> Content:
     return content
 
 
-def _mapped(path: Path, variables: Values, sidecar: Sidecar) -> Content:
-    """Take what a sidecar names, scaled."""
-    columns = {}
-    for name, channel in sidecar.channels.items():
-        value: object = variables
-        for key in channel.variable.split("."):
-            value = value.get(key) if isinstance(value, dict) else None
-        if not isinstance(value, np.ndarray) or value.ndim != 1:
-            raise DataError(
-                f"{path}: {channel.variable!r}, which the sidecar maps to {name}, is not a numeric "
-                "vector of this file.",
-                f"Found: {_listing(variables)}.",
-                f"Correct `variable` in {sidecar_path(path).name}.",
-            )
-        columns[name] = channel.scale * _finite(path, name, value) + channel.offset
-    lengths = {name: values.size for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        raise DataError(f"{path}: the channels differ in length: {lengths}.")
-    if sidecar.sample_rate_hz is not None:
-        columns[TIME] = np.arange(next(iter(lengths.values()))) / sidecar.sample_rate_hz
-    return Content(columns, dict(sidecar.conditions))
+def carries_unit(name: str) -> bool:
+    """Whether a name ends in a unit, as a channel's must."""
+    try:
+        unit_of(name)
+    except UnknownUnitError:
+        return False
+    return True
 
 
 def _finite(path: Path, name: str, values: NDArray[np.generic]) -> FloatArray:
@@ -243,5 +220,5 @@ def _unknown(path: Path, values: Values, wrong: list[str]) -> DataError:
         + (f"; not understood: {', '.join(wrong)}." if wrong else "."),
         f"Found: {_listing(values)}. Expected time_s and vectors of its length named as channels "
         f"with units ({', '.join(CHANNELS)}), at the top or in scalar structs.",
-        f"Rename them, or map them in {sidecar_path(path).name}.",
+        "Rename them, or map them: rig import FILE --column motor_angle_rad=NAME:deg.",
     )

@@ -12,6 +12,7 @@ from estimation.estimators.bank import BankEstimator, BankStepper
 from estimation.estimators.network import NetworkEstimator, NetworkStepper
 from estimation.model import Model
 from estimation.recording import MissingChannelError
+from estimation.signals import reference
 from estimation.stream import Stream
 from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
@@ -99,11 +100,16 @@ def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
 def models_in_use(path: Path) -> list[Model]:
     """Return the models in use of a model file: those of a grasper's axes, else the first.
 
+    Of a machine of one's own it is the first of each target.
+
     Raises:
         ModelFileError: The file cannot be read.
     """
     models = model_file.read_all(path)
-    return [model for model in models if model.target in AXES] or models[:1]
+    of_axes = [model for model in models if model.target in AXES]
+    if not of_axes and models[0].signals != reference():
+        return list({model.target: model for model in reversed(models)}.values())[::-1]
+    return of_axes or models[:1]
 
 
 def half_widths_of(estimators: Sequence[ModelEstimator]) -> dict[str, float]:

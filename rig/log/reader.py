@@ -73,6 +73,7 @@ class LogFile:
         unchecked_chunks: Chunks that carry no checksum.
         salvaged: Topic to the number of messages from the torn end of the file, which no checksum
             vouches for.
+        indexed: Topic to the number of messages that the file's index states, of all topics.
     """
 
     path: Path
@@ -88,6 +89,7 @@ class LogFile:
     damage: tuple[Damage, ...] = ()
     unchecked_chunks: int = 0
     salvaged: Mapping[str, int] = field(default_factory=dict)
+    indexed: Mapping[str, int] = field(default_factory=dict)
 
 
 def read_log(
@@ -143,6 +145,10 @@ def read_log(
         damage=(*skeleton.damage, *found.damage),
         unchecked_chunks=sum(chunk.crc == 0 for chunk in skeleton.chunks),
         salvaged={layouts[number].topic: count for number, count in found.salvaged.items()},
+        indexed={
+            layout.topic: sum(chunk.indexed.get(number, 0) for chunk in skeleton.chunks)
+            for number, layout in layouts.items()
+        },
     )
     log = _with_records(log, skeleton.metadata)
     if log.damage and not tolerant:

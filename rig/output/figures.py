@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
+from rig.output.binning import binned
 
 COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
 """Told apart in light and in dark, and by eyes that mix up red and green."""
@@ -161,21 +162,6 @@ def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24)
         for ax in axes:
             ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
     return _drawn(figure, caption)
-
-
-def binned(
-    x: FloatArray, y: FloatArray, bins: int
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return bin centres, mean, 5th and 95th percentile of y over bins of x."""
-    low, high = np.percentile(x, [1, 99])
-    edges = np.linspace(low, high if high > low else low + 1.0, bins + 1)
-    place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
-    full = [k for k in range(bins) if np.count_nonzero(place == k) >= 10]
-    parts = [y[place == k] for k in full]
-    centres = (edges[:-1] + edges[1:])[full] / 2
-    mean = np.array([part.mean() for part in parts])
-    spread = np.array([np.percentile(part, [5, 95]) for part in parts]).reshape(-1, 2)
-    return centres, mean, spread[:, 0], spread[:, 1]
 
 
 def bars(

@@ -1,5 +1,6 @@
 """A diagnosis in words: claims, sizes, competing hypotheses, and what to record next."""
 
+import inspect
 import math
 import sys
 from collections.abc import Mapping
@@ -15,8 +16,9 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.findings:
         runs = len(diagnosis.sealed.confirm)
         lines = [
-            f"No unmodelled effect found in {', '.join(diagnosis.errors)}: no candidate met the"
-            f" acceptance criteria and was confirmed on the {runs} held-out test runs."
+            f"No unmodelled effect found in {', '.join(diagnosis.errors)}: no candidate"
+            f" explained enough of the training runs and was confirmed on the {runs} held-out test"
+            " runs."
         ]
     else:
         which = "test runs used before" if diagnosis.exploratory else "held-out test runs"
@@ -35,34 +37,16 @@ def _sentence(finding: Finding, unit: str, which: str) -> str:
         f" {scale * finding.rmse_before:.3g} -> {scale * finding.rmse_after:.3g} {shown}"
         f" (lower in {finding.runs_improved} of {finding.runs_total} runs)"
     )
-    also = f" It also shows in {', '.join(finding.also_in)}." if finding.also_in else ""
-    form = (
-        f" A correction term {finding.form} (SI units) improves this effect's equation further; it"
-        " is included in the reported error."
-        if finding.form
-        else ""
-    )
-    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}{form}{_formula(finding, unit)}"
+    also = f" It also enters {', '.join(finding.also_in)}." if finding.also_in else ""
+    return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
 
 
 def _where(finding: Finding, runs: int) -> str:
-    """Return the runs a finding affects, where a third of them and more are not affected."""
+    """Return the runs in which a finding acts, unless it acts in all."""
     shown = finding.runs_affected
-    if not 0 < 3 * len(shown) <= 2 * runs:
+    if not 0 < len(shown) < runs:
         return ""
-    return f" It affects {len(shown)} of {runs} runs: {', '.join(shown)}."
-
-
-def _formula(finding: Finding, unit: str) -> str:
-    """Return the formula that a model file holds, in words; empty without one."""
-    if not finding.formulas:
-        return ""
-    best = finding.formulas[0]
-    scale, shown = display(unit)
-    left = "" if best.rmse_after is None else f", error {scale * best.rmse_after:.3g} {shown}"
-    more = len(finding.formulas) - 1
-    others = f"; {more} more fit about equally well" if more else ""
-    return f" Formula: {best.text} (SI units){left}{others}."
+    return f" It acts in {len(shown)} of {runs} runs: {', '.join(shown)}."
 
 
 def _claim(finding: Finding) -> str:
@@ -71,9 +55,7 @@ def _claim(finding: Finding) -> str:
         return _named(finding)
     if finding.verdict == "one_of":
         others = ", ".join(finding.alternatives) or "another effect"
-        return (
-            f"{_named(finding)}; {others} fits equally well, and these runs cannot distinguish them"
-        )
+        return f"{_named(finding)}; also possible: {others}; these runs cannot distinguish them"
     if finding.verdict == "depends_on":
         return f"unmodelled effect of unknown form; it depends on {words}"
     return "the model is incomplete, and the cause cannot be identified from these runs"
@@ -94,6 +76,32 @@ def meaning(family: str) -> str:
     lines = known and sys.modules[type(known).__module__].__doc__
     first = (lines or "").partition("\n")[0]
     return first.partition(": ")[2].removesuffix(".")
+
+
+def check_of(finding: Finding) -> str:
+    """Return what to check at the rig for a finding, one sentence at least."""
+    if finding.verdict in ("identified", "one_of"):
+        checks = [_check(family) for family in (finding.family, *finding.alternatives)]
+        if any(checks):
+            return " Then: ".join(dict.fromkeys(check for check in checks if check))
+    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    if words:
+        return (
+            f"Find the part of the rig whose behaviour changes with {words}: the residual below"
+            " depends on it. Then record the next experiment."
+        )
+    return "Record the next experiment: these runs do not single out a part of the rig."
+
+
+def _check(family: str) -> str:
+    """Return the advice in the description of an effect; empty without."""
+    known = catalogue().get(family)
+    text = inspect.cleandoc(type(known).__doc__ or "") if known else ""
+    checks = [p for p in text.split("\n\n") if p.startswith("Check: ")]
+    if not checks:
+        return ""
+    advice = " ".join(checks[0].removeprefix("Check: ").split())
+    return advice[0].upper() + advice[1:]
 
 
 def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
@@ -120,24 +128,47 @@ def display(unit: str) -> tuple[float, str]:
 
 
 def other_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return the competing hypotheses of each finding, and what distinguishes them."""
+    """Return for each finding where it acts, what else fits, and what a technician checks."""
     return [
-        f"{finding.balance}, {finding.family}: {_others(finding)}" for finding in diagnosis.findings
+        f"{finding.balance}, {finding.family}: {_where_it_acts(finding)} {_others(finding)}"
+        for finding in diagnosis.findings
     ]
 
 
+def _where_it_acts(finding: Finding) -> str:
+    """Return the part of the machine that a finding points at."""
+    kind, _, channel = finding.place.partition(" ")
+    if kind == "sensor":
+        return f"It is an error of the sensor of {channel}."
+    if finding.place.startswith("torque at "):
+        return f"It is a torque between {finding.place.removeprefix('torque at ')} and its load."
+    if kind == "actuator":
+        return f"It is in the actuator driven by {channel}."
+    return f"It acts in the parts that the equation {finding.balance} describes."
+
+
 def _others(finding: Finding) -> str:
-    known = catalogue().get(finding.family)
-    if known is None:
-        return "a non-parametric function of its variables fits better than any known effect."
     if finding.alternatives:
-        said = f"on these runs {', '.join(finding.alternatives)} fits about equally well."
+        likely = ", ".join(
+            f"{name} {finding.probabilities.get(name, 0.0):.0%}" for name in finding.alternatives
+        )
+        said = f"These also fit: {likely}."
+    elif finding.family in catalogue():
+        said = "Another effect of the catalogue does not fit as well."
     else:
-        said = "on these runs no other effect of the catalogue fits equally well."
-    if known.confused_with:
-        said += f" It resembles {', '.join(known.confused_with)}"
-        said += f"; to distinguish them: {known.told_apart_by}." if known.told_apart_by else "."
-    return said
+        said = "A smooth function of its variables fits better than any effect of the catalogue."
+    checks = [check for f in (finding.family, *finding.alternatives) if (check := checked(f))]
+    return " ".join([said, *checks])
+
+
+def checked(family: str) -> str:
+    """Return what a technician checks for a family; empty where its file does not have it."""
+    known = catalogue().get(family)
+    text = inspect.getdoc(type(known)) if known else ""
+    for part in (text or "").split("\n\n"):
+        if part.startswith("Check: "):
+            return f"To check {family}: {' '.join(part.removeprefix('Check: ').split())}"
+    return ""
 
 
 def next_sentence(diagnosis: Diagnosis) -> str:
@@ -145,16 +176,16 @@ def next_sentence(diagnosis: Diagnosis) -> str:
     proposed = diagnosis.next_experiment
     if proposed is None:
         return NO_NEXT
-    rivals = (
+    names = (
         " from ".join(proposed["between"][:2])
         if len(proposed["between"]) == 2
         else (", ".join(proposed["between"]) + " from each other")
     )
     if proposed["protocol"] is None:
-        return f"To distinguish {rivals}: {proposed['description']}."
+        return f"To distinguish {names}: {proposed['description']}."
     others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())
     return (
-        f"To distinguish {rivals}, record {proposed['name']!r}: {proposed['description']}"
-        f" ({proposed['seconds']:.0f} s). Expected variance ratio between the hypotheses and the"
-        f" noise: {proposed['discrimination']:.3g}. Alternatives: {others}."
+        f"To distinguish {names}, record {proposed['name']!r}: {proposed['description']}"
+        f" ({proposed['seconds']:.0f} s). Expected difference between the hypotheses:"
+        f" {proposed['discrimination']:.3g} times the variance of the noise. Others: {others}."
     )

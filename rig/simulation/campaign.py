@@ -4,6 +4,7 @@ For studies that need many runs and no bytes. `rig record` goes the whole way in
 logger's frames, its driver and the log.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -14,25 +15,32 @@ from rig.protocols.motion import motion_of
 from rig.protocols.protocol import RunPlan, load_protocol
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 from rig.simulation.bench import SimulatedBench
+from rig.simulation.hidden import HiddenEffect, table
 from rig.simulation.play import play
 
 
-def simulate_reference_campaign(seed: int = 0, protocol: str = "reference") -> Campaign:
-    """Return a campaign of the simulated rig, no hidden effect switched on.
+def simulate_reference_campaign(
+    seed: int = 0, protocol: str = "reference", effects: Sequence[HiddenEffect] = ()
+) -> Campaign:
+    """Return a campaign of the simulated rig.
 
     Args:
         seed: Seed of the sensors' noise; each run has its own, made of this and its number.
         protocol: Protocol file or the name of a shipped one.
+        effects: Hidden effects switched on in every run.
 
     Raises:
-        UsageError: The protocol does not exist.
+        UsageError: The protocol does not exist, or there is no such effect.
     """
     plans = load_protocol(protocol).plans()
-    return Campaign(tuple(Run(p.name, partial(_simulate, p, seed, i)) for i, p in enumerate(plans)))
+    table(effects)  # an unknown name is refused now
+    return Campaign(
+        tuple(Run(p.name, partial(_simulate, p, seed, i, effects)) for i, p in enumerate(plans))
+    )
 
 
-def _simulate(plan: RunPlan, seed: int, index: int) -> Recording:
-    bench = SimulatedBench(seed=seed * 100_003 + index)
+def _simulate(plan: RunPlan, seed: int, index: int, effects: Sequence[HiddenEffect]) -> Recording:
+    bench = SimulatedBench(effects=effects, seed=seed * 100_003 + index)
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
     columns = play(bench, motion.target_angle_rad, motion.load_command_a)
     run = slice(motion.first, motion.last)

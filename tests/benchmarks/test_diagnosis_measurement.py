@@ -12,12 +12,11 @@ import pytest
 from scipy.io import savemat
 
 from benchmarks.diagnosis import __main__ as command
-from benchmarks.diagnosis import otherlab, varied
+from benchmarks.diagnosis import machines, otherlab, varied
 from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case, Judgement, write_recordings
 from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record, write_next
 from benchmarks.diagnosis.excitation import EXCITATIONS, plans_of
-from benchmarks.diagnosis.machines import emps, smart_grasper, sts3215, ur10e
 from benchmarks.diagnosis.measure import measure
 from benchmarks.diagnosis.own import truth_of
 from benchmarks.diagnosis.page import Measured, append, judged_seeds
@@ -26,7 +25,8 @@ from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.candidate import FAMILIES
+from estimation.diagnosis.result import FAMILIES
+from estimation.recording import Recording
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
@@ -433,15 +433,17 @@ def test_a_folder_that_is_not_there_is_named_and_skipped(
 def test_a_drive_axis_is_cut_in_laps_and_its_asymmetry_is_the_answer(tmp_path: Path) -> None:
     count = 24841
     data = {"t": np.arange(count) * 1e-3, "qm": np.linspace(0, 0.1, count), "gtau": 35.0}
-    savemat(tmp_path / "DATA_EMPS.mat", data | {"vir": np.ones(count)})
-    cases = {case.name: case for case in emps.cases(tmp_path)}
+    (tmp_path / "emps").mkdir()
+    savemat(tmp_path / "emps" / "DATA_EMPS.mat", data | {"vir": np.ones(count)})
+    cases = {case.name: case for case in machines.cases(tmp_path)}
     case = cases["emps, half laps, motor_current_a"]
     folder = tmp_path / "runs"
     folder.mkdir()
     case.write(folder)
     runs = list(open_campaign(folder))
     assert [len(run) for run in runs] == [3120] * 7 + [count - 7 * 3120]
-    assert runs[-1]["motor_angle_rad"][-1] == pytest.approx(100.0)
+    assert runs[-1]["carriage_position_m"][-1] == pytest.approx(0.1)
+    assert runs[0]["motor_current_a"] == pytest.approx(np.full(3120, 35.0))
     rmse = {"motor": 3.5}
     report = {"runs": {"confirm": [runs[0].name]}}
     report |= {"rmse_with_means_before": rmse, "rmse_with_means_after": rmse}
@@ -457,7 +459,12 @@ def test_a_drive_axis_is_cut_in_laps_and_its_asymmetry_is_the_answer(tmp_path: P
         assert judged.note.startswith("10.00 -> 10.00 %")
 
 
-def test_a_servo_s_run_is_its_drive_while_it_is_on(tmp_path: Path) -> None:
+def handed_over(folder: Path, name: str) -> list[Recording]:
+    """Return the runs of the first hand-over of a machine."""
+    return machines.read(folder, next(machines.MACHINES[name]()))
+
+
+def test_a_servo_s_run_is_its_drive_and_what_does_not_count_is_flagged(tmp_path: Path) -> None:
     entries = [
         {
             "timestamp": 0.01 * k,
@@ -469,21 +476,27 @@ def test_a_servo_s_run_is_its_drive_while_it_is_on(tmp_path: Path) -> None:
         }
         for k in range(50)
     ]
-    run = sts3215.read(
-        {"mass": 1.0, "length": 0.1, "kp": 8, "trajectory": "sin", "entries": entries}
-    )
-    assert run.time_s[-1] == pytest.approx(0.39, abs=0.011)
-    assert run.columns["drive_ratio"] == pytest.approx(np.full(len(run.time_s), 0.4))
-    assert run.columns["motor_temperature_k"][0] == pytest.approx(303.15)
+    head = {"mass": 1.1682, "length": 0.1, "kp": 8, "trajectory": "sin"}
+    (tmp_path / "run.json").write_text(json.dumps({**head, "entries": entries}))
+    other = {**head, "mass": 0.5, "entries": entries}
+    (tmp_path / "other.json").write_text(json.dumps(other))
+    (run,) = handed_over(tmp_path, "sts3215")
+    assert run["drive_ratio"][run.valid] == pytest.approx(np.full(run.valid.sum(), 0.4))
+    assert run["motor_temperature_k"][0] == pytest.approx(303.15)
+    assert not run.valid[:10].any()
+    assert run.valid[11:20].all()
+    assert not run.valid[20]
 
 
 def test_a_grasper_s_file_is_cut_where_the_sweep_begins_again(tmp_path: Path) -> None:
     rows = [f"0,20.4,{pwm},10,3000,-500" for pwm in (30, 30, 35, 40, 30, 35, 40)]
     path = tmp_path / "Force_Calibration_05_05_2021_0.csv"
-    path.write_text("\n".join(["Trial,Jaw,PWM,Inner,Outer,Encoder", *rows]))
-    first, second = smart_grasper.read(path)
-    assert (len(first.time_s), len(second.time_s)) == (4, 3)
-    assert second.columns["motor_current_a"][-1] == pytest.approx(0.4 * 40 / 255)
+    head = "Trial,Jaw Distance (mm),PWM,Grasper Force Sensor (Counts),"
+    head += "External Force Sensor (Counts),Encoder Value (Pulses)"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    first, second = handed_over(tmp_path, "smart-grasper")
+    assert (len(first), len(second)) == (4, 3)
+    assert second["motor_current_a"][-1] == pytest.approx(0.4 * 40 / 255)
     assert first.conditions == {"jaw_distance_m": pytest.approx(0.0204), "date": "05_05_2021"}
 
 
@@ -492,8 +505,8 @@ def test_a_joint_s_runs_hold_both_directions(tmp_path: Path) -> None:
     rows = np.zeros((time_s.size, 31))
     rows[:, 0], rows[:, 6] = 300.0 + time_s, np.cos(2 * np.pi * (time_s - 2.7) / 10.0)
     np.savetxt(tmp_path / "ur-joint_6.csv", rows, delimiter=",")
-    runs = ur10e.read(tmp_path, "drive_current_a")
+    runs = handed_over(tmp_path, "ur10e")
     assert len(runs) >= 7
     for run in runs:
-        steps = np.diff(run.columns["spindle_angle_rad"])
+        steps = np.diff(run["joint_6_angle_rad"])
         assert min(np.mean(steps > 0), np.mean(steps < 0)) > 0.4

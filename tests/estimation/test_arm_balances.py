@@ -8,10 +8,9 @@ import pytest
 from estimation.arm.balances import balances_of
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import motion_of
-from estimation.arm.shared import shared_fit, with_links
-from estimation.arm.twin import laid_out
-from estimation.diagnosis.candidate import pool
-from estimation.diagnosis.diagnose import diagnose
+from estimation.arm.shared import laid_out, shared_fit, with_links
+from estimation.candidates import candidates
+from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
@@ -42,9 +41,9 @@ def positions(run: Recording) -> np.ndarray:
 
 def diagnosed(recordings: list[Recording], *joints: int):
     arm, sealed = balances_of(recordings[0]), split(recordings, 0)
-    whole, twin = laid_out(arm, recordings, sealed.discover)
+    whole = laid_out(arm, recordings, sealed.discover)
     models = [arm.models[j - 1] for j in joints]
-    return diagnose(whole, models, sealed, twins={m.balance: lambda *_: twin for m in models})[0]
+    return diagnose(whole, models, sealed)
 
 
 def test_hidden_friction_is_named_on_its_joint_and_on_no_other() -> None:
@@ -87,7 +86,11 @@ def test_the_wrists_motors_and_a_sliding_joint_are_among_the_candidates() -> Non
     arm = balances_of(seven)
     (whole,) = with_links(arm, [seven], shared_fit(arm, [seven]))
     read = {
-        model.balance: {c for one in pool(model, list(whole.columns)) for _, c in one.channels}
+        model.balance: {
+            c
+            for one in candidates(model.balance, list(whole.columns))
+            for c in one.channels.values()
+        }
         for model in arm.models
     }
     assert "joint_6_drive_7_angle_rad" in read["joint.6"]

@@ -9,7 +9,6 @@ import pytest
 
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
-from estimation.derived import GEARBOX
 from estimation.estimators.bank import BankEstimator, BankRecipe
 from estimation.estimators.c_header import ExportError, header
 from estimation.estimators.network import NetworkEstimator
@@ -90,7 +89,12 @@ def test_an_unknown_interval_and_a_pose_come_through(bank, runs, tmp_path):
 
 def test_the_compiled_network_gives_the_same(runs, tmp_path):
     draw = np.random.default_rng(1)
-    inputs = ("spindle_angle_rad", "motor_acceleration_rad_s2", "motor_travel_rad", GEARBOX)
+    inputs = (
+        "spindle_angle_rad",
+        "motor_acceleration_rad_s2",
+        "motor_travel_rad",
+        "gearbox_differential_rad",
+    )
     ranges = np.array([[-0.7, -2000.0, 0.0, -0.1], [0.7, 2000.0, 20.0, 0.1]])
     network = Network(
         inputs, (TARGET,), ranges, np.array([[0.0], [0.2]]), draw.normal(size=(8, 5)),

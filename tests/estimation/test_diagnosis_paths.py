@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.diagnosis.maps import stretches
 from estimation.diagnosis.paths import claim, path_of, period_samples, periods, split_paths
 from estimation.diagnosis.split import SplitError
 from estimation.recording import Recording
@@ -74,12 +73,3 @@ def test_the_measured_paths_of_the_arm_repeat_themselves() -> None:
     for run in open_campaign(data):
         assert period_samples(run) / run.sample_rate_hz == pytest.approx(6.48, rel=0.01)
         assert len(periods(run)) == 5
-
-
-def test_stretches_of_a_path_are_cut_out_of_every_period() -> None:
-    cut = stretches([np.arange(10.0), 100 + np.arange(10.0), 200 + np.arange(7.0)])
-    assert [part.tolist() for part in cut] == [
-        [0, 1, 2, 100, 101, 102, 200, 201, 202],
-        [3, 4, 5, 103, 104, 105, 203, 204, 205],
-        [6, 7, 8, 9, 106, 107, 108, 109, 206],
-    ]

@@ -1,5 +1,7 @@
 """Fitting a declared model, predicting with it, and running it live."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from estimation.campaign import Campaign
 from estimation.effects import effect
 from estimation.fitting import FitError, fit
 from estimation.model import Model, NotFittedError, Term, predict
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from estimation.recording import Flag, MissingChannelError, Stretch
 from estimation.stream import Stream
 from tests.estimation.synthetic import TRUE, campaign, run
@@ -17,7 +19,7 @@ from tests.estimation.synthetic import TRUE, campaign, run
 
 @pytest.fixture(scope="module")
 def motor() -> Model:
-    return fit(read(shipped()["motor"]), campaign())
+    return fit(read(Path("motor")), campaign())
 
 
 def numbers(model: Model) -> dict[str, float]:
@@ -41,27 +43,27 @@ def test_spreads_cover_the_truth(motor):
 
 
 def test_run_offsets_are_a_nuisance_only_when_declared(motor):
-    together = fit(read(shipped()["motor"]), campaign(), run_offsets=False, bootstrap=0)
+    together = fit(read(Path("motor")), campaign(), run_offsets=False, bootstrap=0)
     assert together.evidence.rmse_with_means < motor.evidence.rmse_with_means
     assert abs(numbers(motor)["gain"] - 0.94) < abs(numbers(together)["gain"] - 0.94)
     assert numbers(together)["offset"] == pytest.approx(numbers(motor)["offset"], abs=2e-3)
 
 
 def test_a_fit_is_repeatable_and_starts_from_known_shapes(motor):
-    assert fit(read(shipped()["motor"]), campaign()) == motor
+    assert fit(read(Path("motor")), campaign()) == motor
     again = numbers(fit(motor, campaign(), bootstrap=0))
     assert again == pytest.approx(numbers(motor), rel=1e-3)
 
 
 def test_friction_never_comes_out_negative():
     runs = campaign(extra=lambda angle, speed, load: -8e-4 * speed)  # drives instead of braking
-    damping = fit(read(shipped()["motor"]), runs).terms[2].values["damping"]
+    damping = fit(read(Path("motor")), runs).terms[2].values["damping"]
     assert damping.value == 0.0
     assert damping.spread is None
 
 
 def test_one_run_gives_values_without_spreads():
-    model = fit(read(shipped()["motor"]), Campaign.of([run("a", 0.3, 0.1, seed=1)]))
+    model = fit(read(Path("motor")), Campaign.of([run("a", 0.3, 0.1, seed=1)]))
     assert numbers(model)["gain"] == pytest.approx(0.94, rel=0.01)
     assert all(e.spread is None for term in model.terms for e in term.values.values())
 
@@ -74,7 +76,7 @@ def test_excluded_runs_and_flagged_samples_do_not_count(motor):
     )
     flagged = broken.with_stretch(Stretch(6.99, 8.0, Flag.SUSPECT, "runaway"))
     runs = Campaign.of([flagged, *good[1:], bad.exclude("for the test")])
-    model = fit(read(shipped()["motor"]), runs, bootstrap=0)
+    model = fit(read(Path("motor")), runs, bootstrap=0)
     assert numbers(model) == pytest.approx(numbers(motor), rel=0.02)
     assert "bad" not in model.evidence.runs
 
@@ -90,13 +92,13 @@ def test_collinear_columns_are_named():
         fit(twice, campaign())
     still = run("still", 0.3, 0.1, seed=1).with_columns(motor_current_a=np.zeros(8000))
     with pytest.raises(FitError, match="cannot be identified"):
-        fit(read(shipped()["linear"]), Campaign.of([still]))
+        fit(read(Path("linear")), Campaign.of([still]))
 
 
 def test_a_model_says_what_is_missing(motor):
     recording = run("a", 0.3, 0.1, seed=1)
     with pytest.raises(NotFittedError, match="declared but not fitted"):
-        predict(read(shipped()["motor"]), recording)
+        predict(read(Path("motor")), recording)
     with pytest.raises(MissingChannelError, match="motor_angle_rad"):
         predict(
             motor, type(recording)("b", recording.time_s, {"motor_current_a": recording.time_s})

@@ -1,18 +1,20 @@
 """Screening a residual for structure."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
 from estimation.fitting import fit
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from estimation.residual import ResidualError, largest_structure, residuals
 from tests.estimation.synthetic import TRUE, campaign
 
 
 def screened(extra=None, model="motor"):
     runs = campaign(extra)
-    return largest_structure(fit(read(shipped()[model]), runs, bootstrap=0), runs)
+    return largest_structure(fit(read(Path(model)), runs, bootstrap=0), runs)
 
 
 def test_nothing_stands_out_when_nothing_is_left():
@@ -66,7 +68,7 @@ def test_what_differs_between_runs_is_seen_only_when_it_is_no_nuisance():
     )
     found = {}
     for declared in (True, False):
-        model = fit(read(shipped()["motor"]), runs, run_offsets=declared, bootstrap=0)
+        model = fit(read(Path("motor")), runs, run_offsets=declared, bootstrap=0)
         assert model.run_offsets is declared
         found[declared] = largest_structure(model, runs)[0]
     assert not found[True].stands_out
@@ -75,7 +77,7 @@ def test_what_differs_between_runs_is_seen_only_when_it_is_no_nuisance():
 
 def test_residuals_are_target_less_estimate():
     runs = campaign()
-    model = fit(read(shipped()["motor"]), runs, bootstrap=0)
+    model = fit(read(Path("motor")), runs, bootstrap=0)
     (part, *others) = residuals(model, runs)
     assert len(others) == 8
     assert part.values + part.estimate == pytest.approx(part.run["proximal_torque_n_m"])
@@ -83,6 +85,6 @@ def test_residuals_are_target_less_estimate():
 
 def test_one_run_is_too_few():
     runs = campaign()
-    model = fit(read(shipped()["motor"]), runs, bootstrap=0)
+    model = fit(read(Path("motor")), runs, bootstrap=0)
     with pytest.raises(ResidualError, match="too few"):
         largest_structure(model, Campaign(runs.runs[:1]))

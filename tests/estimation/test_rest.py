@@ -1,5 +1,7 @@
 """Samples at rest: found, and kept out of the fit of a model with friction."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,12 +12,11 @@ from estimation.filters import PAPER
 from estimation.fitting import fit
 from estimation.recording import Recording
 from estimation.rest import in_motion
-from tests.conftest import ROOT
 
 
 def test_rest_is_where_the_motor_stands_and_a_little_around_it():
     speed = np.concatenate([np.full(500, 10.0), np.zeros(500), np.full(500, -10.0)])
-    moving = in_motion(speed, np.ones(1500, bool), 1000.0)
+    moving = in_motion(speed, np.ones(1500, bool), 1000.0, 0.7)
     assert moving[:450].all()
     assert moving[1050:].all()
     assert not moving[490:1010].any()
@@ -51,7 +52,7 @@ def test_torque_that_friction_holds_at_rest_does_not_move_the_torque_constant():
             "proximal_torque_n_m": torque,
         },
     )
-    declared = model_file.read(ROOT / "estimation" / "models" / "motor.toml")
+    declared = model_file.read(Path("motor"))
     fitted = fit(declared, Campaign.of([run]), bootstrap=0)
     gain = next(t for t in fitted.terms if t.effect.id == "motor.torque_constant").values["gain"]
     assert gain.value == pytest.approx(0.9, rel=0.03)

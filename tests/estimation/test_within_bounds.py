@@ -1,7 +1,6 @@
 """Bounds hold in a fit and in each replicate of it; an interval holds its own value."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +8,11 @@ import pytest
 
 from estimation import model_file
 from estimation.campaign import Campaign
-from estimation.diagnosis.balance import intervals, lay_out
-from estimation.diagnosis.design import prepare
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.recording import Recording
 from estimation.within_bounds import solve_within
-from tests.estimation.test_diagnosis import runs
+from tests.estimation.campaigns import runs
 
 
 def test_beside_an_active_bound_the_others_are_the_best() -> None:
@@ -54,14 +51,9 @@ def outside(model: Model) -> list[str]:
 
 
 @pytest.mark.parametrize("recordings", [negative_friction(), runs(count=3, seconds=2.0)])
-def test_every_interval_of_a_fit_and_a_diagnosis_holds_its_value(
+def test_every_interval_of_a_fit_holds_its_value(
     recordings: Sequence[Recording],
 ) -> None:
     declared = model_file.read(Path("motor"))
     fitted = fit(declared, Campaign.of(recordings))
     assert outside(fitted) == []
-    wanted = [declared.target, *declared.channels]
-    balance = lay_out(fitted, [prepare(r, wanted, declared) for r in recordings])
-    estimates = intervals(balance, balance.terms, seed=0, count=100)
-    terms = [replace(c.term, values=v) for c, v in zip(balance.terms, estimates, strict=True)]
-    assert outside(replace(fitted, terms=tuple(terms))) == []

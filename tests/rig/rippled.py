@@ -1,12 +1,10 @@
-"""A small campaign of the simulated rig whose motor ripples, and a part of the catalogue."""
+"""A small campaign of the simulated rig whose motor ripples."""
 
 from pathlib import Path
 
 import numpy as np
 
 from estimation import model_file
-from estimation.diagnosis import candidate
-from estimation.diagnosis.gates import Gates
 from estimation.recording import Recording
 from rig.protocols.motion import motion_of
 from rig.protocols.protocol import Protocol
@@ -17,7 +15,6 @@ from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
 
 MOTOR = model_file.read(Path("motor"))
-QUICK = Gates(surrogates=59)
 
 PROTOCOL = Protocol.model_validate(
     {
@@ -44,7 +41,7 @@ PROTOCOL = Protocol.model_validate(
 
 
 def record(*effects: HiddenEffect) -> list[Recording]:
-    """Play the small protocol on a rig that the declared balances describe, but for effects."""
+    """Play the small protocol on a rig that the declared equations describe, but for effects."""
     made = []
     for k, plan in enumerate(PROTOCOL.plans()):
         start = float(plan.target_angle_rad[0])
@@ -64,13 +61,3 @@ def record(*effects: HiddenEffect) -> list[Recording]:
             )
         )
     return made
-
-
-def few(model, measured):
-    """A part of the catalogue: what is tested is not how many effects there are."""
-    return [
-        c
-        for c in candidate.pool(model, measured)
-        if c.family in ("friction.stribeck", "friction.drag")
-        or (c.family.startswith("ripple.") and c.shape[0] % 1 == 0)
-    ]

@@ -83,11 +83,16 @@ def test_the_help_names_what_is_shipped_and_the_default(capsys):
         ("rig record --config gra", {"grasper", "grasper_pty"}),
         ("rig record --config b", {"bench.toml"}),
         ("rig fit --model gr", {"grasper", "grip"}),
+        ("rig diagnose logs/mo", {"logs/monday"}),
+        ("rig diagnose logs/monday --model gea", {"gearbox"}),
+        ("rig campaigns mond", {"monday"}),
     ],
 )
 def test_the_shell_completes_commands_and_names(words, wanted, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bench.toml").touch()
+    (tmp_path / "logs" / "monday").mkdir(parents=True)
+    (tmp_path / "logs" / "monday" / "a.mcap").touch()
     monkeypatch.setenv("_RIG_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))

@@ -1,7 +1,10 @@
 """`rig calibrate` on the simulated rig: what was put in is found, and nothing is half done."""
 
 import json
+import math
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +13,10 @@ from calibration.fsr import ZHANG_2022
 from calibration.store import CalibrationStore
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED
+from rig.importers.registry import open_campaign
+from rig.log.convert import write_recording
 from rig.simulation.parameters import PlantParameters
+from tests.rig.browser import Opened, chromium
 
 pytestmark = pytest.mark.integration
 
@@ -55,6 +61,73 @@ def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, caps
     # the same raw logs give the same numbers
     again = calibrate("torque", "--from", "raw", "--out", "again", yes=False)[1]
     assert by_channel(again) == by_channel(said)
+
+
+def test_before_it_starts_a_session_states_what_it_needs_and_what_moves(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    shared = ["--operator", "Ada", "--yes", "--store", "store"]
+    assert main(["calibrate", "torque", "--masses-g", "50,100,150", *shared, "-o", "a"]) == 0
+    said = capsys.readouterr().err
+    first = said.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
+    assert first < said.index("The rig does not move by itself.") < said.index("1/7")
+    assert main(["calibrate", "current", *shared, "-o", "b"]) == 0
+    assert "The rig moves by itself: the spindle turns between" in capsys.readouterr().err
+
+
+def test_a_sensor_that_drifted_since_its_last_calibration_raises_an_alarm(calibrate, tmp_path):
+    words = ("torque", "--masses-g", "50,100,150")
+    said = calibrate(*words, "--out", "first")[1]
+    assert said["drifted"] == []
+    (digest,) = said["records"]
+    record = CalibrationStore(tmp_path / "store").get(digest)
+    parameters = dict(record.fit.parameters)
+    parameters["slope"] *= 1.05
+    changed = replace(record.fit, parameters=parameters)
+    shutil.rmtree(tmp_path / "store")
+    CalibrationStore(tmp_path / "store").add(
+        replace(record, fit=changed, made_at="2026-01-02T00:00:00+00:00", raw=())
+    )
+    said = calibrate(*words, "--from", "first", "--out", "second", yes=False)[1]
+    (alarm,) = said["drifted"]
+    assert "proximal_torque_n_m, slope drifted" in alarm
+    page = (tmp_path / "second" / "calibration.html").read_text()
+    assert "slope drifted" in page
+    assert "history-proximal_torque_n_m-slope" in page
+    assert "slope over the last calibrations" in page
+
+
+def test_the_page_of_a_calibration_draws_without_an_error(calibrate, tmp_path):
+    said = calibrate("torque", "--masses-g", "50,100,150", "--out", "raw")[1]
+    with chromium() as browser:
+        opened = Opened(browser, Path(tmp_path / said["page"]))
+        assert opened.messages == []
+        assert len(opened.requests) == 1
+        assert opened.page.locator("#chart-residuals .point").count() == 7
+        opened.close()
+
+
+def test_recordings_that_exist_verify_an_encoder(tmp_path, capsys):
+    """A healthy rig raises no alarm; a spindle encoder mounted 17 degrees off is found."""
+    folder = tmp_path / "logs"
+    assert main(["record", "--sim", "--protocol", "quick", "-o", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["calibrate", "check", str(folder), "--json"]) == 0
+    out = json.loads(capsys.readouterr().out)
+    assert out["wrong"] == []
+    assert [one["encoder"] for one in out["agreements"]] == ["spindle"]
+    (tmp_path / "off").mkdir()
+    for handle in open_campaign(folder).runs:
+        run = handle.recording()
+        angle = run["spindle_angle_rad"] + math.radians(17)
+        run = replace(run, columns={**run.columns, "spindle_angle_rad": angle})
+        write_recording(tmp_path / "off" / f"{run.name}.mcap", run)
+    assert main(["calibrate", "check", str(tmp_path / "off")]) == 1
+    said = capsys.readouterr().out
+    assert out["agreements"][0]["offset_rad"] == pytest.approx(0.0, abs=math.radians(1))
+    assert re.search(r"1[67]\.\d deg off", said)
+    assert "rig calibrate encoder --which spindle" in said
 
 
 def test_current_finds_the_plant(calibrate):

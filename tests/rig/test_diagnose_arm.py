@@ -49,7 +49,7 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     assert "joint_2" in first["depends_on"]
     page = (report / "diagnosis.html").read_text()
     assert first["family"] in page
-    assert "joint 2, rad" in page  # the residual over the joint's own angle
+    assert "joint.2: residual over joint 2" in page
     assert main(words) == 0
     assert json.loads(out.read_text())["exploratory"] is True
     assert main([*words[:3], "joint.9", *words[4:]]) == 2

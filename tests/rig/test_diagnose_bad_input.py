@@ -14,7 +14,7 @@ from estimation.campaign import Campaign
 from estimation.recording import Instrument, Recording
 from rig.cli.main import main
 from rig.diagnosis import subject
-from tests.estimation.test_diagnosis import runs, spring
+from tests.estimation.campaigns import runs, spring
 
 pytestmark = pytest.mark.long
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimation.diagnosis.candidate import FAMILIES
 from estimation.diagnosis.result import (
+    FAMILIES,
     SCHEMA,
     VARIABLES,
     VERDICTS,
@@ -27,8 +27,9 @@ FIELDS = {
     "declared_parameters_moved", "exploratory", "seed", "seconds",
 }  # fmt: skip
 OF_FINDING = {
-    "balance", "also_in", "family", "verdict", "alternatives", "depends_on", "confidence",
-    "parameters", "rmse_before", "rmse_after", "runs_improved", "runs_total", "runs_affected",
+    "balance", "also_in", "place", "family", "verdict", "alternatives", "probabilities",
+    "depends_on", "confidence", "parameters", "rmse_before", "rmse_after", "runs_improved",
+    "runs_total", "runs_affected",
 }  # fmt: skip
 
 BALANCES = st.sampled_from(["motor", "gearbox", "cable", "stretch", "joint.3", "calibration.force"])
@@ -57,7 +58,8 @@ def findings(draw: st.DrawFn) -> Finding:
         depends_on=tuple(draw(st.lists(st.sampled_from([*VARIABLES, "joint_4"]), max_size=2))),
         confidence=draw(st.floats(0, 1) | st.none()),
         parameters=draw(st.dictionaries(st.text(min_size=1), values, max_size=2)),
-        form=draw(st.sampled_from(["", "0.1 cos(4 motor_angle)"])) if named else "",
+        place=draw(st.sampled_from(["motor", "sensor distal_torque_n_m"])),
+        probabilities={family: draw(st.floats(0, 1))},
     )
 
 
@@ -92,7 +94,7 @@ def test_every_field_is_there_and_no_number_is_undefined(diagnosis: Diagnosis) -
     assert (found["findings"] == []) == (found["verdict"] == "nothing_missing")
     assert [f["family"] for f in found["findings"]] == [f.family for f in diagnosis.findings]
     for finding in found["findings"]:
-        assert OF_FINDING <= finding.keys() <= OF_FINDING | {"form"}
+        assert finding.keys() == OF_FINDING
         assert finding["family"] not in finding["alternatives"]
         assert VERDICTS.index(found["verdict"]) >= VERDICTS.index(finding["verdict"])
         for known in finding["parameters"].values():

@@ -6,20 +6,20 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
-from estimation.diagnosis import diagnose as diagnosing
-from estimation.diagnosis.diagnose import diagnose
+from estimation.causes.equations import on_one_clock
+from estimation.causes.verdict import answer
 from estimation.diagnosis.split import split
 from rig.cli.main import main
 from rig.diagnosis.engine import engine
-from rig.diagnosis.twins import twins_of
+from rig.diagnosis.propose import propose
 from rig.errors import UsageError
 from rig.simulation.hidden import HiddenEffect
-from tests.rig.rippled import MOTOR, QUICK, few, record
+from tests.rig.rippled import MOTOR, record
 
 pytestmark = pytest.mark.long
 
@@ -74,34 +74,26 @@ class Losing:
     def map(self, *arguments):
         self.maps += 1
         results = self.executor.map(*arguments)
-        if self.maps == 2:
-            self.victim.kill()
-            self.victim.wait()
+        self.victim.kill()
+        self.victim.wait()
         return results
 
 
 @pytest.mark.filterwarnings("ignore")  # the cluster's own, about sizes and versions
-def test_a_cluster_that_loses_a_worker_gives_the_same_answer(cluster, monkeypatch) -> None:
-    monkeypatch.setattr(diagnosing, "pool", few)
-    recordings = record(HiddenEffect("motor_ripple", 0.5))
-    sealed = split(recordings, 0)
-    twins = twins_of([MOTOR], [r for r in recordings if r.name in sealed.discover])
-
-    def answer(executor) -> dict:
-        diagnosis, _ = diagnose(
-            recordings, [MOTOR], sealed, gates=QUICK, twins=twins.makers, executor=executor
-        )
-        return {**diagnosis.to_json(), "seconds": None}
-
+def test_a_cluster_that_loses_a_worker_gives_the_same_experiment(cluster) -> None:
+    recordings = on_one_clock(record(HiddenEffect("motor_ripple", 0.5)))
+    found = answer(recordings, [MOTOR], split(recordings, 0))
+    unsure = replace(found.diagnosis.findings[0], verdict="one_of")
+    found = replace(found, diagnosis=replace(found.diagnosis, findings=(unsure,)))
     with engine(scheduler=cluster.address) as executor:
         client = distributed.get_client(cluster.address)
         client.wait_for_workers(2, timeout=PATIENCE_S)
         losing = Losing(executor, cluster.workers[0])
-        there = answer(losing)
-        assert losing.maps > 2
+        there = propose(found, recordings, losing)
+        assert losing.maps == 1
         assert len(client.scheduler_info()["workers"]) == 1
-    assert there == answer(None)
-    assert there["findings"]
+    assert there is not None
+    assert there == propose(found, recordings)
 
 
 def test_without_workers_the_work_is_done_here() -> None:

@@ -64,7 +64,7 @@ def test_the_shipped_model_is_live_as_good_as_its_file_states():
     truth = np.concatenate([b.columns["distal_torque_n_m"] for b in blocks])
     error = np.concatenate([b.estimates["distal_torque_n_m"] for b in blocks]) - truth
     motor_rad = np.concatenate([b.columns["motor_angle_rad"] for b in blocks])
-    moving = in_motion(np.gradient(motor_rad, 1e-3), np.ones(len(motor_rad), bool), 1000.0)
+    moving = in_motion(np.gradient(motor_rad, 1e-3), np.ones(len(motor_rad), bool), 1000.0, 0.7)
     assert moving.mean() > 0.3
     # live filters lag
     assert np.sqrt(np.mean(error[moving] ** 2)) < 1.5 * stated.rmse_with_means

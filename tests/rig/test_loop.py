@@ -129,11 +129,9 @@ def test_what_is_hidden_is_chosen_by_name_by_seed_or_not_at_all():
         chosen(["motor_ripple=much"], 0)
 
 
-def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys, monkeypatch):
-    from estimation.diagnosis import diagnose as diagnosing
-    from tests.rig.rippled import PROTOCOL, few
+def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys):
+    from tests.rig.rippled import PROTOCOL
 
-    monkeypatch.setattr(diagnosing, "pool", few)
     protocol = tmp_path / "first.toml"
     from rig.protocols.protocol import protocol_toml
 

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from html.parser import HTMLParser
 from io import StringIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +14,10 @@ from jinja2 import UndefinedError
 from estimation.diagnosis.result import Value
 from estimation.effects import catalogue
 from estimation.fitting import fit
-from estimation.model_file import read, shipped
+from estimation.model_file import read
 from estimation.residual import largest_structure
 from rig.output import figures
+from rig.output.binning import binned
 from rig.output.provenance import Provenance, commit
 from rig.output.render import render, write_report
 from rig.output.table import TextTable, to_markdown, to_rich
@@ -65,7 +67,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
     runs = campaign(lambda angle, speed, load: 2e-3 * np.sin(7 * angle))
-    model = fit(read(shipped()["motor"]), runs)
+    model = fit(read(Path("motor")), runs)
     return {
         "study": page(run_study(Source(runs, "a <b> & c", measured=False))),
         "first_look": first_look(
@@ -160,7 +162,7 @@ def test_figures_do_not_share_ids_and_thin_long_lines():
 
 def test_bins_with_few_samples_are_left_out():
     x = np.concatenate([np.zeros(500), np.ones(500), [0.5]])
-    centres, mean, low, high = figures.binned(x, x, 10)
+    centres, mean, low, high = binned(x, x, 10)
     assert centres == pytest.approx([0.05, 0.95])
     assert mean == pytest.approx([0.0, 1.0])
     assert np.all(low <= high)

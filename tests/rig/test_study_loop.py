@@ -45,9 +45,13 @@ def run(index: int, seconds: float = 8.0) -> Recording:
 
 @pytest.fixture
 def made(monkeypatch):
-    every = loop.pool
+    every = loop.candidates
     monkeypatch.setattr(loop, "open_campaign", lambda path: Campaign.of([run(k) for k in range(9)]))
-    monkeypatch.setattr(loop, "pool", lambda *args: [c for c in every(*args) if c.family in FEW])
+    monkeypatch.setattr(
+        loop,
+        "candidates",
+        lambda *args, **more: [c for c in every(*args, **more) if c.effect.family in FEW],
+    )
 
 
 def test_friction_that_sticks_is_found_and_proved_on_runs_kept_back(made, tmp_path):

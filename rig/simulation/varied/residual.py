@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import model_file
-from estimation.derived import GEARBOX, settled_places, zero_phase_channels
+from estimation.derived import settled_places, zero_phase_channels
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SLOWEST_RAD_S, in_motion
+from estimation.rest import in_motion
 
 EQUATIONS = ("motor", "gearbox", "cable", "stretch")
+GEARBOX = "gearbox_differential_rad"
 EVERY = 10
 """One in so many samples of 1 kHz is regressed on."""
 
@@ -89,7 +90,7 @@ def prepare(recording: Recording, ratio: float) -> Prepared:
     for equation in EQUATIONS:
         model, counted = declared(equation), valid.copy()
         if model.samples == "motion":
-            for name, slowest in SLOWEST_RAD_S.items():
+            for name, slowest in model.signals.rest.items():
                 if name in model.channels:
                     counted &= in_motion(channels[name], valid, recording.sample_rate_hz, slowest)
         places[equation] = np.flatnonzero(counted)[::EVERY]

@@ -1,8 +1,7 @@
 """What the diagnosis names on a simulated hydraulic arm that is moved freely.
 
 The joints are torque equations of the project's own diagnosis, declared by the paper's model.
-One run in three is held out before any fit; the reported gain of an effect is from those. As with
-`rig diagnose --quick`, chance is estimated from permutation nulls, without simulated nulls.
+One run in three is held out before any fit; the reported gain of an effect is from those.
 """
 
 from dataclasses import dataclass
@@ -13,10 +12,10 @@ from estimation.arm.balances import closed
 from estimation.arm.effects import on_joint
 from estimation.arm.motion import JointNames, Motion
 from estimation.arm.periodic import periodic_motion
-from estimation.arm.twin import laid_out
-from estimation.diagnosis.candidate import Candidate
-from estimation.diagnosis.diagnose import diagnose
+from estimation.arm.shared import laid_out
+from estimation.causes.verdict import answer
 from estimation.diagnosis.split import split
+from estimation.model import Term
 from estimation.recording import FloatArray, Recording
 from rig.arm.simulated import recorded
 from rig.studies.delsol.hydraulic_arm import (
@@ -65,7 +64,7 @@ class Named:
     after_n_m: float
 
 
-Effects = tuple[tuple[int, Candidate], ...]
+Effects = tuple[tuple[int, Term], ...]
 """Effects found, each with its joint, from 0."""
 
 
@@ -74,8 +73,8 @@ def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named,
     recordings = free_runs(arm, rng)
     sealed = split(recordings)
     balances = closed(HYDRAULIC, SIGN_RAD_S)
-    whole, _ = laid_out(balances, recordings, sealed.discover)
-    diagnosis, stories = diagnose(whole, balances.models, sealed)
+    whole = laid_out(balances, recordings, sealed.discover)
+    found = answer(whole, balances.models, sealed)
     told = tuple(
         Named(
             int(finding.balance.removeprefix("joint.")),
@@ -85,14 +84,15 @@ def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named,
             finding.rmse_before,
             finding.rmse_after,
         )
-        for finding in diagnosis.findings
+        for finding in found.diagnosis.findings
     )
+    declared = {model.balance: len(model.terms) for model in balances.models}
+    joints = [f"joint.{name.number}" for name in NAMES]
     effects = tuple(
-        (k, effect)
-        for k, name in enumerate(NAMES)
-        for claim in stories[f"joint.{name.number}"].claims
-        for effect in claim.written.terms
-        if {channel for _, channel in effect.channels} <= {*motion_channels()}
+        (joints.index(model.balance), term)
+        for model in found.models
+        for term in model.terms[declared[model.balance] :]
+        if {*term.channels.values()} <= {*motion_channels()}
     )
     return told, effects
 
@@ -123,7 +123,10 @@ def found_columns(effects: Effects, motion: Motion) -> FloatArray:
         channels[name.position] = motion.position[:, k]
         channels[name.velocity] = motion.velocity[:, k]
         channels[name.acceleration] = motion.acceleration[:, k]
-    parts = [on_joint(effect.columns(channels), k, JOINTS) for k, effect in effects]
+    parts = [
+        on_joint(term.sign * term.columns(channels, term.numbers(term.effect.shape)), k, JOINTS)
+        for k, term in effects
+    ]
     return np.concatenate([np.zeros((len(motion), JOINTS, 0)), *parts], axis=2)
 
 

@@ -1,8 +1,7 @@
 """The loop closed on measured data: from a linear model to effects confirmed on held-out test runs.
 
-Each row starts from the paper's linear model of one torque, lets the search add effects of the
-catalogue on two thirds of the runs while all acceptance criteria are met, and uses the others once,
-at the end.
+Each row starts from the paper's linear model of one torque, adds effects of the catalogue on two
+thirds of the runs while these predict runs left out better, and uses the others once, at the end.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,30 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.derived import MOTOR_LOAD
-from estimation.diagnosis.balance import lay_out
-from estimation.diagnosis.candidate import Candidate, pool
-from estimation.diagnosis.design import DesignError, Run, covered, prepare
-from estimation.diagnosis.frozen import Frozen, Part, freeze
-from estimation.diagnosis.gates import Gates
-from estimation.diagnosis.search import Search, Trial
+from estimation.candidates import candidates
 from estimation.diagnosis.split import Sealed, split
-from estimation.diagnosis.steps import forwards
 from estimation.effects import effect
-from estimation.fitting import fit
-from estimation.model import Model, Term
-from estimation.recording import Recording
+from estimation.effects.roles import MOTOR_LOAD
+from estimation.fitting import prepared
+from estimation.model import Model, Term, estimate
+from estimation.recording import FloatArray, Recording
 from estimation.rest import Samples
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
+from rig.studies.loop.selection import Chosen, grid, selected
 
 TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
 """Excluded families: they depend on the time since the start, which is irrelevant to a new load."""
-
-
-FLOOR = 0.002
-"""Least share of the linear model's squared error that an effect must remove."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +115,8 @@ class Row:
         parameters: Named parameters of the last model.
         rmse: Its error on the test runs, means included, N m.
         rmse_without_means: The same with each run's mean error removed.
-        runs_improved: Confirm runs whose error fell.
-        rmse_by_run: Confirm run to the error before and after, N m.
+        runs_improved: Test runs whose error fell.
+        rmse_by_run: Test run to the error before and after, N m.
         families: Families tried.
         candidates: Grid points tried.
     """
@@ -172,7 +162,7 @@ def run_study(
 
     Args:
         data: File, folder or archive of recordings.
-        seed: Seed of the split and the surrogates.
+        seed: Seed of the split.
         tasks: Rows to make.
         on_stage: Told what happens, in words.
 
@@ -203,54 +193,32 @@ def _row(
     what = f"{task.name}, {task.samples} samples"
     on_stage(f"{what}: linear model")
     declared = _linear(task)
-    discover = [r for r in recordings if r.name in sealed.discover]
-    fitted = fit(declared, Campaign.of(discover), bootstrap=0)
-    tried = [c for c in pool(declared, task.measured, task.instead) if c.family not in TIMELESS]
-    wanted = [task.target, *declared.channels, *(ch for c in tried for _, ch in c.channels)]
-    runs = _prepared(discover, wanted, declared)
-    tried = covered(tried, runs)
-    gates = Gates(
-        most=task.parameters,
-        parameters=task.parameters,
-        akin=True,
-        surrogates=99,
-        floor=FLOOR,
-        leftover=0.0,
-    )
-    search = Search(lay_out(fitted, runs), tried, gates, sealed.seed)
+    campaign = Campaign.of([r for r in recordings if r.name in sealed.discover])
+    offered = candidates(task.balance, task.measured, task.instead, at_rest=True)
+    tried = [term for term in offered if term.effect.family not in TIMELESS]
 
-    def found(trial: Trial) -> None:
-        on_stage(f"{what}: {trial.family}, {100 * trial.gain:.0f} % of what was left")
+    def found(step: Chosen) -> None:
+        name = step.model.terms[-1].effect.id
+        on_stage(f"{what}: {name} removes {100 * step.gain:.0f} % of the squared error")
 
-    made = forwards(search, found)
-    effects = made.found
+    chosen = selected(declared, campaign, tried, task.parameters, found)
     on_stage(f"{what}: scoring the held-out test runs")
-    held = _prepared([r for r in recordings if r.name in sealed.confirm], wanted, declared)
-    stages = [
-        freeze(search.balance, [Part(e) for e in effects[:k]]) for k in range(len(effects) + 1)
-    ]
-    return _scored(task, stages, effects, made.trials, held, tried)
+    test = Campaign.of([r for r in recordings if r.name in sealed.confirm])
+    return _scored(task, chosen, test, tried)
 
 
-def _scored(
-    task: Task,
-    stages: Sequence[Frozen],
-    effects: Sequence[Candidate],
-    trials: Sequence[Trial],
-    held: Sequence[Run],
-    tried: Sequence[Candidate],
-) -> Row:
-    errors = [[stage.error(run) for run in held] for stage in stages]
-    samples = sum(len(e) for e in errors[0])
-    totals = [float(np.sqrt(sum(float(e @ e) for e in es) / samples)) for es in errors]
-    centred = sum(float(np.sum((e - e.mean()) ** 2)) for e in errors[-1])
+def _scored(task: Task, chosen: Sequence[Chosen], test: Campaign, tried: Sequence[Term]) -> Row:
+    errors = [_errors(one.model, test) for one in chosen]
+    samples = sum(len(e) for e in errors[0].values())
+    totals = [float(np.sqrt(sum(float(e @ e) for e in es.values()) / samples)) for es in errors]
+    centred = sum(float(np.sum((e - e.mean()) ** 2)) for e in errors[-1].values())
     by_run = {
-        run.name: (float(np.sqrt(np.mean(a**2))), float(np.sqrt(np.mean(b**2))))
-        for run, a, b in zip(held, errors[0], errors[-1], strict=True)
+        name: (float(np.sqrt(np.mean(a**2))), float(np.sqrt(np.mean(errors[-1][name] ** 2))))
+        for name, a in errors[0].items()
     }
     steps = [
-        Step(e.id, len(e.term.parameters), trial.gain, total)
-        for e, trial, total in zip(effects, trials, totals[1:], strict=True)
+        Step(one.model.terms[-1].effect.id, len(one.model.terms[-1].parameters), one.gain, total)
+        for one, total in zip(chosen[1:], totals[1:], strict=True)
     ]
     return Row(
         task=task,
@@ -261,9 +229,17 @@ def _scored(
         rmse_without_means=float(np.sqrt(centred / samples)),
         runs_improved=sum(after < before for before, after in by_run.values()),
         rmse_by_run=by_run,
-        families=len({c.family for c in tried}),
-        candidates=len(tried),
+        families=len({term.effect.family for term in tried}),
+        candidates=sum(len(grid(term.effect)) for term in tried),
     )
+
+
+def _errors(model: Model, test: Campaign) -> dict[str, FloatArray]:
+    """Return test run to the residual at the samples that count."""
+    return {
+        run.whole.name: run.thin[model.target] - estimate(model, run.whole)[run.places]
+        for run in prepared(model, test, every=1)
+    }
 
 
 def _linear(task: Task) -> Model:
@@ -278,15 +254,3 @@ def _linear(task: Task) -> Model:
         run_offsets=False,
         counted=task.samples,
     )
-
-
-def _prepared(recordings: Sequence[Recording], names: Sequence[str], model: Model) -> list[Run]:
-    runs = []
-    for recording in recordings:
-        try:
-            runs.append(prepare(recording, names, model))
-        except DesignError:
-            continue
-    if not runs:
-        raise DataError("No run has a usable sample.", f"Samples that count: {model.samples}.")
-    return runs

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from estimation.campaign import Campaign, Split, Table
 from estimation.closing import closing_samples, processed
-from estimation.derived import GEARBOX
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording
 from estimation.scores import Score, score
@@ -27,7 +26,7 @@ TEST_SHARE = 0.15
 SURROGATES = {
     "command": "motor_command_ratio",
     "current": "motor_current_a",
-    "gearbox": GEARBOX,
+    "gearbox": "gearbox_differential_rad",
 }
 """The paper's torque surrogates by short name, and the channel of each."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from estimation.campaign import Campaign
-from estimation.diagnosis.diagnose import diagnose
+from estimation.causes.verdict import answer
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.filters import LowPass
@@ -132,12 +132,11 @@ def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
     """Return the effects that the diagnosis identifies on a grasper's runs."""
     runs = calibration_runs(dof, axes, seed, repeats)
     model = declared(dof)
-    diagnosis, stories = diagnose(runs, [model], split(runs, seed))
-    named = [claim.part.candidate for claim in stories[dof].claims]
-    names = {candidate.id for candidate in named if candidate is not None}
+    found = answer(runs, [model], split(runs, seed))
+    (written,) = found.models
     return Lacking(
-        tuple((finding.family, finding.verdict) for finding in diagnosis.findings),
-        tuple(term for term in stories[dof].model.terms if term.effect.id in names),
+        tuple((finding.family, finding.verdict) for finding in found.diagnosis.findings),
+        written.terms[len(model.terms) :],
     )
 
 

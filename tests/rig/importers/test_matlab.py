@@ -1,4 +1,4 @@
-"""MATLAB files: names that are channels, structs that are runs, sidecars that map the rest."""
+"""MATLAB files: names that are channels, structs that are runs."""
 
 from pathlib import Path
 
@@ -104,52 +104,6 @@ def test_version_7_3_says_how_to_save_again(tmp_path, header):
     path.write_bytes(header.ljust(512) + b"\x89HDF\r\n\x1a\n")
     with pytest.raises(DataError, match=r"version 7\.3.*'-v7'"):
         IMPORTER.open(path)
-
-
-SIDECAR = """
-sample_rate_hz = 200
-[channels.spindle_angle_rad]
-variable = "data.enc"
-scale = -0.5
-offset = 0.25
-[channels.motor_current_a]
-variable = "current"
-[conditions]
-load_command_a = 0.2
-"""
-
-
-def test_a_sidecar_maps_and_scales_other_names(save):
-    encoder = np.arange(N, dtype=float)
-    path = save({"data": {"enc": encoder, "junk": "x"}, "current": CURRENT})
-    path.with_name("run.mat.toml").write_text(SIDECAR)
-    (recording,) = IMPORTER.open(path)
-    np.testing.assert_allclose(recording["spindle_angle_rad"], 0.25 - 0.5 * encoder)
-    np.testing.assert_array_equal(recording["motor_current_a"], CURRENT)
-    np.testing.assert_allclose(recording.time_s, np.arange(N) / 200)
-    assert dict(recording.conditions) == {"load_command_a": 0.2}
-    assert IMPORTER.recognises(path.parent)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"data.enc"', '"data.gone"', r"'data\.gone', which the sidecar maps to spindle_angle_rad"),
-        ('"current"', '"short"', r"differ in length"),
-        ("spindle_angle_rad", "spindle", "does not map"),
-        ("sample_rate_hz = 200", "", "does not map"),
-        ("sample_rate_hz = 200", "sample_rate_hz = -1", "does not map"),
-        ("scale = -0.5", 'scale = "x"', "does not map"),
-        ("scale = -0.5", "gain = 2", "does not map"),
-        ("[conditions]", "[condition]", "does not map"),
-        ("[conditions]", "[conditions", "is not valid TOML"),
-    ],
-)
-def test_a_wrong_sidecar_is_refused(save, old, new, message):
-    path = save({"data": {"enc": TIME}, "current": CURRENT, "short": CURRENT[:5]})
-    path.with_name("run.mat.toml").write_text(SIDECAR.replace(old, new))
-    with pytest.raises(DataError, match=message):
-        IMPORTER.open(path).runs[0].recording()
 
 
 def test_a_folder_of_other_files_is_not_claimed(save, tmp_path):

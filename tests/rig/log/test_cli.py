@@ -44,6 +44,18 @@ def test_info_for_people(rig, log):
     assert "2026-09-21T" in out
 
 
+def test_the_first_line_of_info_is_what_was_lost(rig, tmp_path, make_log):
+    first = make_log(tmp_path / "a.mcap")
+    assert rig("info", first)[1].startswith(f"{first}: complete, nothing lost")
+    second = make_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
+    line = rig("info", second)[1].splitlines()[0]
+    assert "2 samples" in line
+    found = rig("info", second, "--json")[1]["logs"][0]
+    assert found["lost"]["/rig/sample"] == 2
+    assert found["problems"]
+    assert rig("info", tmp_path)[1].startswith("2 logs, 1 of them not complete.")
+
+
 def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
     name, notes = "br[ack]et :x:", "jaw [/] cleaned [red]twice[/red] :warning:"
     run, end = RunInfo(name, rig="bench [1]", notes=notes), RunEnd(clean=False, reason="[limits] a")

@@ -1,0 +1,170 @@
+"""How well an experiment would separate the hypotheses of a finding, before it is recorded.
+
+The simulated rig, without the cause, plays the experiment; its closed loop follows the reference
+almost equally with and without it. Each hypothesis, fitted on the training runs, predicts its
+contribution to every equation there. Two hypotheses are as far apart as the mean square of the
+difference of their contributions over the variance of the noise, after the declared terms have
+absorbed what they can: a Mahalanobis distance. Pairs are weighted by their probabilities.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.causes.equations import Layout, LayoutError, laid_out_like
+from estimation.causes.functions import Function, names
+from estimation.causes.instruments import add_instruments
+from estimation.causes.joint import Joint
+from estimation.causes.search import Scored
+from estimation.causes.sources import Source
+from estimation.causes.verdict import IN_SET, Answer, Kept
+from estimation.recording import FloatArray, Recording
+
+MOST = 4
+"""Hypotheses that are compared at most."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation of a finding.
+
+    Attributes:
+        label: Its family, or the variables of an unknown form.
+        probability: Its probability among those compared.
+        cause: The cause.
+        amplitudes: Fitted on the training runs together with the other causes, shape (k,).
+    """
+
+    label: str
+    probability: float
+    cause: Source | Function
+    amplitudes: FloatArray
+
+
+@dataclass(frozen=True)
+class Question:
+    """The hypotheses of one finding, ready to predict.
+
+    Attributes:
+        hypotheses: Two at least.
+        noise: Equation to the variance of its residual with the likeliest hypothesis, on runs left
+            out.
+        layout: The equations.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    noise: Mapping[str, float]
+    layout: Layout
+
+
+def question(answer: Answer, place: int) -> Question | None:
+    """Return the hypotheses that an experiment should separate; None where the name is sure.
+
+    Args:
+        answer: The diagnosis.
+        place: Place of the finding.
+    """
+    if answer.diagnosis.findings[place].verdict == "identified":
+        return None
+    joint = answer.found.joint
+    for k, other in enumerate(answer.kept):
+        if k != place:
+            joint = joint.with_cause(other.scored.candidate.laid, other.scored.candidate.precision)
+    likely = _likely(answer.kept[place], joint)
+    if len(likely) < 2:
+        return None
+    leading = likely[0][1].candidate
+    best = joint.with_cause(leading.laid, leading.precision)
+    (errors,) = best.base_errors([[[k] for k in range(len(joint.runs))]])
+    noise = {
+        name: float(errors[name, "within"].sum() / joint.samples[name, "within"].sum())
+        for name in joint.layout.equations
+    }
+    total = sum(share for share, _ in likely)
+    found = tuple(
+        Hypothesis(
+            _label(one),
+            share / total,
+            one.candidate.cause,
+            one.amplitudes / one.candidate.laid.size,
+        )
+        for share, one in likely
+    )
+    return Question(found, noise, answer.layout)
+
+
+def separation(asked: Question, recordings: Sequence[Recording]) -> float | None:
+    """Return the expected distance of the hypotheses on simulated runs, in variances of the noise.
+
+    Args:
+        asked: The hypotheses.
+        recordings: Simulated runs of one experiment, with the campaign's time.
+
+    Returns:
+        None where no run has a sample of the equations.
+    """
+    try:
+        layout = laid_out_like(asked.layout, recordings)
+    except LayoutError:
+        return None
+    add_instruments(layout, [run.name for run in layout.runs])
+    total, weight = 0.0, 0.0
+    predicted = [_predicted(one, layout) for one in asked.hypotheses]
+    pairs = itertools.combinations(zip(asked.hypotheses, predicted, strict=True), 2)
+    for (one, first), (other, second) in pairs:
+        share = one.probability * other.probability
+        apart = 0.0
+        for name in {*first, *second}:
+            difference = first.get(name, 0.0) - second.get(name, 0.0)
+            apart += float(np.mean(np.square(difference))) / max(asked.noise[name], 1e-300)
+        total, weight = total + share * apart, weight + share
+    return total / weight
+
+
+def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
+    """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
+    sharpness = joint.numbers.sharpness
+    scores = np.array([s.score for s in kept.ranked])
+    weights = np.exp(sharpness * (scores - scores.max()))
+    shares: dict[str, float] = {}
+    best: dict[str, Scored] = {}
+    for scored, weight in zip(kept.ranked, weights / weights.sum(), strict=True):
+        label = _label(scored)
+        shares[label] = shares.get(label, 0.0) + float(weight)
+        best.setdefault(label, scored)
+    ordered = sorted(shares, key=lambda label: -shares[label])
+    covered, out = 0.0, []
+    for label in ordered[:MOST]:
+        out.append((shares[label], best[label]))
+        covered += shares[label]
+        if covered >= IN_SET and len(out) > 1:
+            break
+    return out
+
+
+def _label(scored: Scored) -> str:
+    cause = scored.candidate.cause
+    if isinstance(cause, Source):
+        return cause.family
+    return f"a function of {' and '.join(names(cause.place, cause.variables))}"
+
+
+def _predicted(one: Hypothesis, layout: Layout) -> Mapping[str, FloatArray]:
+    """Return the contribution to each equation beyond what declared terms absorb, (samples,)."""
+    made: dict[str, list[FloatArray]] = {}
+    declared: dict[str, list[FloatArray]] = {}
+    for run in layout.runs:
+        for name, columns in (one.cause.columns(run) or {}).items():
+            equation = layout.equations[name]
+            used = run.grid[run.used[name]]
+            base = equation.columns(run.channels)[used]
+            value = columns @ one.amplitudes
+            made.setdefault(name, []).append(value - value.mean())
+            declared.setdefault(name, []).append(base - base.mean(axis=0))
+    out = {}
+    for name, values in made.items():
+        aim, base = np.concatenate(values), np.vstack(declared[name])
+        out[name] = aim - base @ np.linalg.lstsq(base, aim, rcond=1e-10)[0]
+    return out

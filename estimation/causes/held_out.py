@@ -1,0 +1,94 @@
+"""The test runs: opened once, when every hypothesis is fixed, to keep or drop each cause."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimation.causes.equations import Layout
+from estimation.causes.joint import Joint, Part
+from estimation.causes.numbers import Numbers
+from estimation.causes.search import Candidate, laid_out
+from estimation.causes.sources import Source
+from estimation.derived import CAMPAIGN_TIME
+from estimation.diagnosis.split import Sealed
+from estimation.recording import FloatArray
+
+
+class HeldOut:
+    """The evidence of the test runs for each cause.
+
+    Args:
+        layout: All runs.
+        sealed: Which runs train and which test.
+        numbers: What decides.
+    """
+
+    def __init__(self, layout: Layout, sealed: Sealed, numbers: Numbers) -> None:
+        self.layout, self.numbers = layout, numbers
+        self.joint = Joint(layout, numbers)
+        self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
+
+    def acts_in(self, candidate: Candidate) -> Mapping[str, bool | None]:
+        """Return whether a cause acts in each run; None where the training runs do not decide.
+
+        A test run between a run in which the cause acts and one in which it does not is open: a
+        change at one time of the campaign may be before it or after it.
+        """
+        order = [run.name for run in self.layout.runs]
+        train = [r for k, r in enumerate(order) if k not in self.at]
+        since_s = _since(candidate)
+        if candidate.acts is not None:
+            known = dict(zip(train, candidate.acts, strict=True))
+        elif since_s is not None:
+            ends = {r.name: float(r.channels[CAMPAIGN_TIME][-1]) for r in self.layout.runs}
+            known = {name: ends[name] >= since_s for name in train}
+        else:
+            return dict.fromkeys(order, True)
+        out: dict[str, bool | None] = {}
+        for k, name in enumerate(order):
+            before = [known[n] for n in order[: k + 1] if n in known][-1:]
+            after = [known[n] for n in order[k:] if n in known][:1]
+            around = {*before, *after}
+            out[name] = around.pop() if len(around) == 1 else None
+        return out
+
+    def gain(self, before: Sequence[Candidate], cause: Candidate) -> float:
+        """Return the score of one more cause on the test runs that it decides."""
+        old, new = self._squared(before), self._squared([*before, cause])
+        state = self.acts_in(cause)
+        open_to = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is None]
+        known = [k for k in range(len(self.at)) if k not in open_to]
+        if not known:
+            return 0.0
+        total = 0.0
+        for p, samples in self.joint.samples.items():
+            pair = [
+                np.asarray(e[p][known].sum() / samples[self.at][known].sum()) for e in (old, new)
+            ]
+            total += float(self.joint.log_ratio(p, pair[0], pair[1]))
+        return total
+
+    def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
+        """Return the squared error of each test run, fitted on the training runs alone."""
+        joint = self.joint
+        for cause in causes:
+            joint = self._with(joint, cause)
+        (errors,) = joint.base_errors([[self.at]])
+        return {p: values[self.at] for p, values in errors.items()}
+
+    def _with(self, joint: Joint, candidate: Candidate) -> Joint:
+        """Return a regression with a cause; where it is open whether it acts it does not."""
+        acts = None
+        if candidate.acts is not None:
+            acts = tuple(on is True for on in self.acts_in(candidate).values())
+        laid = laid_out(self.layout, self.joint, candidate.cause, acts)
+        return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
+
+
+def _since(candidate: Candidate) -> float | None:
+    """Return the time of the campaign from which a cause acts, s; None where it has none."""
+    cause = candidate.cause
+    if not isinstance(cause, Source) or "campaign_clock" not in cause.effect.roles:
+        return None
+    shape = {p.name: x for p, x in zip(cause.effect.shape, cause.shape, strict=True)}
+    return shape.get("since")

@@ -1,0 +1,255 @@
+"""One equation refitted with the causes that were found, and its errors on the test runs.
+
+The search reads signals predicted from other sensors. Here every channel is read as measured, as a
+model in use reads it, and the amplitudes are least squares within their bounds on the training
+runs. Shapes stay as they were found. Fits count the samples that the model counts; errors count all
+valid samples, at standstill too, unless the model declares otherwise.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.campaign import Campaign
+from estimation.causes.numbers import DEFAULT, Numbers
+from estimation.derived import settled_places
+from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
+from estimation.model import Model, Term
+from estimation.recording import FloatArray, Recording
+from estimation.rest import Samples
+from estimation.within_bounds import solve_within
+
+Unwritten = Callable[[str, FloatArray], FloatArray]
+"""Name of a run and times in it to the columns of a cause that no model file holds, (n, k)."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one cause adds to an equation: a term of its model, or columns that no file can hold.
+
+    Attributes:
+        term: The term, or None.
+        acts: Names of the runs in which the term acts; in all when None.
+        unwritten: The columns where there is no term.
+        precision: Prior precision of an amplitude of these, in units of the inverse squared column.
+    """
+
+    term: Term | None = None
+    acts: frozenset[str] | None = None
+    unwritten: Unwritten | None = None
+    precision: float = 0.0
+
+    @property
+    def is_written(self) -> bool:
+        """Whether a model file holds it."""
+        return self.term is not None and self.acts is None
+
+
+@dataclass(frozen=True)
+class Solved:
+    """An equation's amplitudes, declared ones first, and the mean residual over training runs."""
+
+    parts: tuple[Part, ...]
+    weights: FloatArray
+    level: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Squared errors of test runs.
+
+    Attributes:
+        centred: Run to the sum of squares, its mean removed.
+        raw: The same with the mean left in.
+        samples: Run to its samples.
+    """
+
+    centred: Mapping[str, float]
+    raw: Mapping[str, float]
+    samples: Mapping[str, int]
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square over all samples, each run's mean removed."""
+        return _rms(self.centred, self.samples)
+
+    @property
+    def rmse_with_means(self) -> float:
+        """Root mean square over all samples."""
+        return _rms(self.raw, self.samples)
+
+    @property
+    def by_run(self) -> dict[str, float]:
+        """Root mean square of each run, its mean removed."""
+        return {n: float(np.sqrt(x / self.samples[n])) for n, x in self.centred.items()}
+
+
+class Refit:
+    """One equation on all runs.
+
+    Args:
+        model: The declared model, fitted on the training runs.
+        recordings: All runs, with the campaign's time.
+        train: Names of the training runs.
+        test: Names of the test runs.
+        numbers: The prior of amplitudes without a term.
+
+    Raises:
+        FitError: No training run has a sample of the equation.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        recordings: Sequence[Recording],
+        train: Sequence[str],
+        test: Sequence[str],
+        numbers: Numbers = DEFAULT,
+    ) -> None:
+        self.model, self.recordings = model, {r.name: r for r in recordings}
+        self.train_names, self.test_names = tuple(train), tuple(test)
+        self.numbers = numbers
+        self._runs: dict[frozenset[str], dict[str, tuple[FitRun, NDArray[np.intp]] | None]] = {}
+        self._solved: dict[tuple[int, ...], Solved] = {}
+
+    @cached_property
+    def _declared(self) -> list[Term]:
+        own = self.model.terms
+        return [t for t in own if not (self.model.run_offsets and t.effect.id == OFFSET)]
+
+    def solve(self, parts: Sequence[Part]) -> Solved:
+        """Return the amplitudes of the declared terms and of some causes on the training runs."""
+        key = tuple(map(id, parts))
+        if key not in self._solved:
+            self._solved[key] = self._fitted(tuple(parts))
+        return self._solved[key]
+
+    def residuals(self, solved: Solved, name: str) -> tuple[NDArray[np.intp], FloatArray] | None:
+        """Return the samples that a run's error counts and the residual there, shape (n,) each.
+
+        None where the run has no sample of this equation.
+        """
+        known = self._run(solved.parts, name)
+        if known is None:
+            return None
+        run, judged = known
+        target = run.whole[self.model.target][judged]
+        table = self._table(solved.parts, name, judged)
+        return judged, target - table @ solved.weights - solved.level
+
+    def channel(self, solved: Solved, name: str, channel: str) -> FloatArray | None:
+        """Return a filtered channel at the samples of `residuals`; None where it is not read."""
+        known = self._run(solved.parts, name)
+        if known is None or channel not in known[0].whole:
+            return None
+        return known[0].whole[channel][known[1]]
+
+    def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
+        """Return the errors on the test runs, or on some of them."""
+        names = [name for name in self.test_names if name not in without]
+        found = [(name, self.residuals(solved, name)) for name in names]
+        left = {name: one[1] for name, one in found if one is not None}
+        return Errors(
+            {name: float(np.sum((e - e.mean()) ** 2)) for name, e in left.items()},
+            {name: float(e @ e) for name, e in left.items()},
+            {name: len(e) for name, e in left.items()},
+        )
+
+    def written(self, parts: Sequence[Part], bootstrap: int = 200) -> Model:
+        """Return the model with the causes that a file can hold.
+
+        Values are those of `solve` with these causes. Spreads and intervals are of a bootstrap over
+        the training runs, to first order in shapes too (`estimation.fitting.fit`). A term that
+        cannot be identified next to the declared ones is left out.
+        """
+        terms = [p.term for p in parts if p.is_written and p.term is not None]
+        campaign = Campaign.of([self.recordings[n] for n in self.train_names])
+        while True:
+            model = replace(self.model, terms=(*self.model.terms, *terms), evidence=None)
+            try:
+                return fit(model, campaign, bootstrap=bootstrap, shapes="keep")
+            except FitError:
+                if not terms:
+                    raise
+                terms.pop()
+
+    def _fitted(self, parts: tuple[Part, ...]) -> Solved:
+        grams, means, samples = [], [], 0
+        for name in self.train_names:
+            known = self._run(parts, name)
+            if known is None:
+                continue
+            run, _ = known
+            table = self._table(parts, name, run.places)
+            whole = np.column_stack([table, run.whole[self.model.target][run.places]])
+            means.append(whole.mean(axis=0))
+            centred = whole - means[-1] if self.model.run_offsets else whole
+            grams.append(centred.T @ centred)
+            samples += len(whole)
+        gram = np.sum(grams, axis=0)
+        penalty, low, high = self._limits(parts)
+        penalty = penalty * samples / (len(grams) * self.numbers.samples_a_run)
+        weights = solve_within(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1], low, high)
+        level = 0.0
+        if self.model.run_offsets:
+            level = float(np.mean([m[-1] - m[:-1] @ weights for m in means]))
+        return Solved(parts, weights, level)
+
+    def _limits(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the penalty and the bounds of every amplitude, shape (k,) each."""
+        rows = [
+            (0.0, p.lower, p.upper)
+            for term in [*self._declared, *(p.term for p in parts if p.term is not None)]
+            for p in term.effect.amplitudes
+        ]
+        for part in parts:
+            if part.unwritten is not None:
+                count = part.unwritten(self.train_names[0], np.zeros(1)).shape[1]
+                rows += [(part.precision, -np.inf, np.inf)] * count
+        penalty, low, high = np.array(rows).T
+        return penalty, low, high
+
+    def _table(self, parts: Sequence[Part], name: str, places: NDArray[np.intp]) -> FloatArray:
+        """Return the signed columns of a run: declared, found, and those without a term, (n, k)."""
+        known = self._run(parts, name)
+        assert known is not None  # noqa: S101 - narrows the type
+        run, _ = known
+        blocks = [_columns(term, run, places) for term in self._declared]
+        for part in parts:
+            if part.term is not None:
+                acts = part.acts is None or name in part.acts
+                blocks.append(_columns(part.term, run, places) * float(acts))
+        since_s = run.whole.time_s[places] - run.whole.time_s[0]
+        blocks += [p.unwritten(name, since_s) for p in parts if p.unwritten is not None]
+        return np.hstack(blocks)
+
+    def _run(self, parts: Sequence[Part], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
+        """Return a run and the samples that its error counts; None without a sample to fit."""
+        terms = [p.term for p in parts if p.term is not None]
+        key = frozenset(c for t in terms for c in t.channels.values()) - {*self.model.channels}
+        held = self._runs.setdefault(key, {})
+        if name not in held:
+            model = replace(self.model, terms=(*self.model.terms, *terms))
+            counted: Samples = "closing" if model.samples == "closing" else "all"
+            try:
+                (run,) = prepared(model, Campaign.of([self.recordings[name]]))
+            except FitError:
+                held[name] = None
+            else:
+                step = max(1, int(run.whole.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
+                held[name] = run, settled_places(run.whole, model.low_pass, step, counted)
+        return held[name]
+
+
+def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:
+    return float(np.sqrt(sum(squares.values()) / max(1, sum(samples.values()))))
+
+
+def _columns(term: Term, run: FitRun, places: NDArray[np.intp]) -> FloatArray:
+    shape = term.numbers(term.effect.shape)
+    if term.effect.start():
+        return term.sign * term.columns(run.whole, shape)[places]
+    return term.sign * term.columns(run.whole.at(places), shape)

@@ -1,0 +1,135 @@
+"""All equations refitted with the causes that were kept, one after another."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.numbers import Numbers
+from estimation.causes.refit import Part, Refit, Solved
+from estimation.causes.search import Candidate
+from estimation.causes.sources import Source
+from estimation.causes.terms import term_of
+from estimation.diagnosis.result import Error
+from estimation.diagnosis.split import Sealed
+from estimation.model import Model
+from estimation.recording import FloatArray, Recording
+
+DRAWS = 1000
+"""Resamplings of the test runs behind the interval of an error ratio."""
+
+
+class Refits:
+    """Every equation with the causes kept so far.
+
+    Args:
+        layout: The declared equations, fitted on the training runs, on all runs.
+        recordings: The runs, with the campaign's time.
+        sealed: Which runs train and which test.
+        numbers: What decides.
+
+    Attributes:
+        open: Test runs not counted in errors: the training runs do not show whether a cause acts
+            in them.
+    """
+
+    def __init__(
+        self, layout: Layout, recordings: Sequence[Recording], sealed: Sealed, numbers: Numbers
+    ) -> None:
+        self.layout, self.sealed, self.numbers = layout, sealed, numbers
+        self.of: dict[str, Refit] = {
+            name: Refit(e.model, recordings, sealed.discover, sealed.confirm, numbers)
+            for name, e in layout.equations.items()
+        }
+        self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
+        self.open: set[str] = set()
+
+    def add(self, candidate: Candidate, acts_in: Mapping[str, bool | None]) -> None:
+        """Add a cause to every equation it enters.
+
+        Args:
+            candidate: The cause.
+            acts_in: Run to whether it acts there; None where the training runs do not decide.
+        """
+        runs = [name for name, acts in acts_in.items() if acts]
+        for name in dict.fromkeys(e.equation for e in candidate.cause.place.enters):
+            part = self._part(candidate, name, runs)
+            if part is not None:
+                self.parts[name].append(part)
+
+    def before(self, name: str) -> Solved:
+        """Return the declared equation."""
+        return self.of[name].solve([])
+
+    def after(self, name: str) -> Solved:
+        """Return the equation with the causes added so far."""
+        return self.of[name].solve(self.parts[name])
+
+    def rmse(self, name: str) -> tuple[float, dict[str, float]]:
+        """Return an equation's error on the test runs with the causes so far, whole and by run."""
+        found = self.of[name].errors(self.after(name), self.open)
+        return found.rmse, found.by_run
+
+    def models(self) -> list[Model]:
+        """Return the models with the causes that a file can hold; see `Refit.written`."""
+        return [self.of[name].written(self.parts[name]) for name in self.of]
+
+    def errors(self) -> dict[str, Error]:
+        """Return the errors of every equation before and after the causes."""
+        out = {}
+        for name, refit in self.of.items():
+            solved = (self.before(name), self.after(name))
+            old, new = (refit.errors(s, self.open) for s in solved)
+            out[name] = Error(
+                before=old.rmse,
+                after=new.rmse,
+                with_means_before=old.rmse_with_means,
+                with_means_after=new.rmse_with_means,
+                ratio_ci95=_interval(old.centred, new.centred, self.sealed.seed),
+                by_run_before=old.by_run,
+                by_run_after=new.by_run,
+            )
+        return out
+
+    def _part(self, candidate: Candidate, name: str, runs: Collection[str]) -> Part | None:
+        cause, equation = candidate.cause, self.layout.equations[name]
+        acts = None if candidate.acts is None else frozenset(runs)
+        if isinstance(cause, Source):
+            term = term_of(cause, equation, self.layout.measured)
+            if term is not None:
+                return Part(term, acts)
+            if name != cause.place.home:
+                return None
+        gain = sum(abs(e.gain) for e in cause.place.enters if e.equation == name)
+        precision = 0.0 if isinstance(cause, Source) else (gain / self.numbers.knot_sd) ** 2
+        whole = {run.name: _everywhere(run, candidate, name) for run in self.layout.runs}
+
+        def columns(run: str, since_s: FloatArray) -> FloatArray:
+            time_s, values = whole[run]
+            acting = float(acts is None or run in acts)
+            return acting * np.column_stack([np.interp(since_s, time_s, c) for c in values.T])
+
+        return Part(unwritten=columns, precision=precision)
+
+
+def _everywhere(
+    run: RunSignals, candidate: Candidate, equation: str
+) -> tuple[FloatArray, FloatArray]:
+    """Return times and a cause's columns there, at all of a run's places, at standstill too."""
+    everything = {name: np.arange(len(run.grid)) for name in run.used}
+    columns = candidate.cause.columns(replace(run, used=everything)) or {}
+    return run.channels["time_s"][run.grid], columns[equation]
+
+
+def _interval(
+    before: Mapping[str, float], after: Mapping[str, float], seed: int
+) -> tuple[float, float]:
+    """Return the 95 % interval of an error ratio by a bootstrap over the test runs."""
+    old, new = (np.array(list(x.values())) for x in (before, after))
+    draws = np.random.default_rng(seed).multinomial(
+        len(old), np.full(len(old), 1 / len(old)), DRAWS
+    )
+    ratio = np.sqrt((draws @ new) / np.maximum(draws @ old, np.finfo(float).tiny))
+    low, high = np.percentile(ratio, [2.5, 97.5])
+    return float(low), float(high)

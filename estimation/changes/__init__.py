@@ -1,0 +1,1 @@
+"""What changed between two campaigns of one machine: parameters that moved, effects that came."""

@@ -1,0 +1,334 @@
+"""A plant: what a machine is, as data.
+
+Axes (shafts and carriages) are driven by actuators, joined by transmissions and read by sensors.
+Which equations of motion can be written follows from it, see `estimation.plant_equations`. Channels
+are SI, and their names end in the unit.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from estimation.channels import UnknownUnitError, unit_of
+from estimation.errors import EstimationError, nearest
+from estimation.signals import Combination
+from estimation.toml_table import Place
+
+Reads = Literal["position", "speed", "effort", "temperature", "reference", "other"]
+
+POSITION = {"rad": "_angle_rad", "m": "_position_m"}
+SPEED = {"rad": "_velocity_rad_s", "m": "_velocity_m_s"}
+ACCELERATION = {"rad": "_acceleration_rad_s2", "m": "_acceleration_m_s2"}
+EFFORT = {"rad": "N m", "m": "N"}
+"""Unit of an axis' travel to the ending of its channels, and to the unit of what drives it."""
+
+
+class PlantError(EstimationError):
+    """The parts of a machine do not fit together.
+
+    Attributes:
+        place: The part and its key as they are called in a machine file.
+    """
+
+    def __init__(self, place: Place, what: str, why: str = "", fix: str = "") -> None:
+        self.place = place
+        super().__init__(what, why, fix)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A shaft or a carriage.
+
+    Attributes:
+        name: Its name.
+        unit: `rad` of a shaft, `m` of a carriage.
+        rest_speed: Speed below which it is at rest, in its unit a second; None where one count of
+            its sensor in a period of the filter decides.
+        description: In words.
+    """
+
+    name: str
+    unit: str
+    rest_speed: float | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """What joins two axes.
+
+    Attributes:
+        name: Its name, also of the equation of what it loses.
+        input: Axis on the side of the drive.
+        output: Axis it drives.
+        ratio: Travel of the input per travel of the output, negative where it reverses the
+            direction; None where it is fitted.
+        compliant: Whether it bends measurably.
+        damped: Whether the bend lags behind the load.
+        deflection: Name of the equation of its bend.
+        description: In words.
+    """
+
+    name: str
+    input: str
+    output: str
+    ratio: float | None = None
+    compliant: bool = False
+    damped: bool = False
+    deflection: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """What drives an axis.
+
+    Attributes:
+        name: Channel of the drive: a current, a voltage, a share of full scale, a force or torque.
+        axis: Axis it drives.
+        description: In words.
+    """
+
+    name: str
+    axis: str
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What is measured.
+
+    Attributes:
+        name: Channel.
+        axis: Axis it reads; empty where it is of none.
+        reads: What it reads. An effort is what the axis passes on.
+        counts: Counts a radian or a metre; None where it is not known.
+        rate_hz: Samples a second; None where it is not known.
+        noise: Standard deviation in the unit of the channel; None where it is not known.
+        delay_s: Age of a value when it is recorded; None where it is not known.
+        description: In words.
+    """
+
+    name: str
+    axis: str = ""
+    reads: Reads = "other"
+    counts: float | None = None
+    rate_hz: float | None = None
+    noise: float | None = None
+    delay_s: float | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Load:
+    """A known force or torque that an axis carries, such as the weight of a pendulum.
+
+    Attributes:
+        name: Channel of it, recorded or computed when a recording is read.
+        axis: Axis that carries it.
+        description: In words.
+    """
+
+    name: str
+    axis: str
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One effect of an equation.
+
+    Attributes:
+        id: Id of the effect in the catalogue.
+        sign: Its side: 1 adds to the target, -1 subtracts from it.
+        channels: Role to channel; the effect's default where a role is left out.
+    """
+
+    id: str
+    sign: int = 1
+    channels: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Written:
+    """An equation as it is written down: a target and its effects.
+
+    Attributes:
+        name: Its name.
+        target: Channel on the left-hand side.
+        parts: Effects on the right-hand side.
+        description: In words.
+    """
+
+    name: str
+    target: str
+    parts: tuple[Part, ...]
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A machine.
+
+    Attributes:
+        name: Its name.
+        axes: Shafts and carriages.
+        transmissions: What joins them.
+        actuators: What drives them.
+        sensors: What is measured.
+        loads: Known weights.
+        equations: Equations of its owner's, in addition to those that follow.
+        derived: Derived channels of its owner's, in addition.
+        description: In words.
+        cutoff_hz: Cutoff of the filter of every channel.
+        order: Order of that filter.
+        run_offsets: Whether an offset of each run is a nuisance of a fit.
+
+    Raises:
+        PlantError: The parts do not fit together.
+    """
+
+    name: str
+    axes: tuple[Axis, ...] = ()
+    transmissions: tuple[Transmission, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    loads: tuple[Load, ...] = ()
+    equations: tuple[Written, ...] = ()
+    derived: tuple[Combination, ...] = ()
+    description: str = ""
+    cutoff_hz: float = 50.0
+    order: int = 3
+    run_offsets: bool = True
+
+    def __post_init__(self) -> None:
+        _check_names(self)
+        _check_axes(self)
+        for number, sensor in enumerate(self.sensors, start=1):
+            _check_sensor(self, sensor, ("sensor", number, ""))
+        for number, joint in enumerate(self.transmissions, start=1):
+            _check_transmission(joint, ("transmission", number, ""))
+        for number, load in enumerate(self.loads, start=1):
+            if unit_of(load.name) != EFFORT[self.axis(load.axis).unit]:
+                raise PlantError(
+                    ("load", number, "name"),
+                    f"The load {load.name!r} is not in {EFFORT[self.axis(load.axis).unit]}.",
+                    f"It acts on the axis {load.axis!r}.",
+                    "Name it, for example, weight_n_m.",
+                )
+
+    def axis(self, name: str) -> Axis:
+        """Return the axis of that name."""
+        return next(axis for axis in self.axes if axis.name == name)
+
+    def position(self, axis: str) -> Sensor | None:
+        """Return the first sensor of an axis' position, or None."""
+        return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "position")), None)
+
+    def effort(self, axis: str) -> Sensor | None:
+        """Return the first sensor of what an axis passes on, or None."""
+        return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "effort")), None)
+
+    def moved(self, axis: str, ending: Mapping[str, str]) -> str:
+        """Return a channel of an axis' motion; empty without a sensor of its position."""
+        sensor = self.position(axis)
+        unit = self.axis(axis).unit
+        return sensor.name.removesuffix(POSITION[unit]) + ending[unit] if sensor else ""
+
+
+def _check_names(plant: Plant) -> None:
+    for table, parts in (
+        ("axis", plant.axes),
+        ("transmission", plant.transmissions),
+        ("equation", plant.equations),
+    ):
+        _check_unique(table, [part.name for part in parts])
+    channels = [("actuator", a.name) for a in plant.actuators]
+    channels += [("sensor", s.name) for s in plant.sensors]
+    channels += [("load", load.name) for load in plant.loads]
+    channels += [("derived", c.name) for c in plant.derived]
+    seen: set[str] = set()
+    count: dict[str, int] = {}
+    for table, name in channels:
+        count[table] = count.get(table, 0) + 1
+        place = (table, count[table], "name")
+        try:
+            unit_of(name)
+        except UnknownUnitError as error:
+            raise PlantError(place, error.what, error.why, error.fix) from error
+        if name in seen:
+            raise PlantError(place, f"Two channels are called {name!r}.", fix="Rename one.")
+        seen.add(name)
+
+
+def _check_unique(table: str, names: Sequence[str]) -> None:
+    for number, name in enumerate(names, start=1):
+        if name in names[: number - 1]:
+            raise PlantError(
+                (table, number, "name"), f"There are two of the name {name!r}.", fix="Rename one."
+            )
+
+
+def _check_axes(plant: Plant) -> None:
+    names = [axis.name for axis in plant.axes]
+    for number, axis in enumerate(plant.axes, start=1):
+        if axis.unit not in POSITION:
+            raise PlantError(
+                ("axis", number, "unit"),
+                f"The axis {axis.name!r} has the unit {axis.unit!r}.",
+                "A shaft turns by rad, a carriage moves by m.",
+                'Write unit = "rad" or unit = "m".',
+            )
+    for place, axis_name in _named_axes(plant):
+        if axis_name not in names:
+            why = nearest(axis_name, names) if names else "The file has no [[axis]]."
+            raise PlantError(place, f"There is no axis {axis_name!r}.", why)
+
+
+def _named_axes(plant: Plant) -> Iterable[tuple[Place, str]]:
+    for number, joint in enumerate(plant.transmissions, start=1):
+        yield ("transmission", number, "input"), joint.input
+        yield ("transmission", number, "output"), joint.output
+    for number, actuator in enumerate(plant.actuators, start=1):
+        yield ("actuator", number, "axis"), actuator.axis
+    for number, sensor in enumerate(plant.sensors, start=1):
+        if sensor.axis or sensor.reads in ("position", "speed", "effort"):
+            yield ("sensor", number, "axis"), sensor.axis
+    for number, load in enumerate(plant.loads, start=1):
+        yield ("load", number, "axis"), load.axis
+
+
+def _check_sensor(plant: Plant, sensor: Sensor, place: Place) -> None:
+    if sensor.reads not in ("position", "speed", "effort"):
+        return
+    axis = plant.axis(sensor.axis)
+    if sensor.reads == "effort":
+        suits = unit_of(sensor.name) == EFFORT[axis.unit]
+        wanted = f"ends in {'_n_m' if axis.unit == 'rad' else '_n'}"
+    else:
+        ending = (POSITION if sensor.reads == "position" else SPEED)[axis.unit]
+        suits, wanted = sensor.name.endswith(ending), f"ends in {ending}"
+    if not suits:
+        raise PlantError(
+            (*place[:2], "name"),
+            f"The channel {sensor.name!r} cannot be the {sensor.reads} of the axis {axis.name!r}.",
+            f"The axis is in {axis.unit}: the name of its {sensor.reads} {wanted}.",
+            "Rename the channel, or change the axis, its unit or `reads`.",
+        )
+    if sensor.counts is not None and sensor.counts <= 0.0:
+        raise PlantError(
+            (*place[:2], "counts"), f"The sensor {sensor.name!r} has {sensor.counts:g} counts."
+        )
+
+
+def _check_transmission(joint: Transmission, place: Place) -> None:
+    if joint.input == joint.output:
+        raise PlantError(
+            (*place[:2], "output"), f"{joint.name!r} joins the axis {joint.input!r} to itself."
+        )
+    if joint.ratio == 0.0:
+        raise PlantError(
+            (*place[:2], "ratio"),
+            f"The ratio of {joint.name!r} is zero.",
+            fix="State the travel of the input per travel of the output, or none to fit it.",
+        )

@@ -1,0 +1,205 @@
+"""What can be identified of a machine from its sensors, and from recordings of it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.derived import measured_channels
+from estimation.errors import EstimationError, nearest
+from estimation.fitting import fit
+from estimation.model import Model, balance_channels, settled
+from estimation.plant import Plant
+from estimation.plant_equations import Missing, missing, unused
+from estimation.plant_models import declared
+from estimation.recording import FloatArray, Recording, shared_columns
+
+FOLLOWS = 0.02
+"""Share by which two readings of one travel may differ."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A parameter of an equation.
+
+    Attributes:
+        effect: Id of its effect.
+        name: Its name.
+        unit: Its unit.
+        description: In words.
+        value: Fitted on the recordings; None without them.
+    """
+
+    effect: str
+    name: str
+    unit: str
+    description: str
+    value: float | None = None
+
+
+@dataclass(frozen=True)
+class CheckedEquation:
+    """One equation of a machine.
+
+    Attributes:
+        name: Its name.
+        sentence: The equation in words.
+        parameters: What it identifies.
+        target: Channel on its left-hand side.
+        unit: Unit of the target.
+        relative_error: Root mean square of what the fit does not explain over that of the target;
+            None without recordings.
+        trouble: Why it cannot be fitted on the recordings; empty where it can.
+    """
+
+    name: str
+    sentence: str
+    parameters: tuple[Identified, ...]
+    target: str
+    unit: str
+    relative_error: float | None = None
+    trouble: str = ""
+
+
+@dataclass(frozen=True)
+class CheckedPlant:
+    """What can be identified of a machine.
+
+    Attributes:
+        equations: The equations that its sensors allow.
+        missing: What they do not identify.
+        unused: Channels that no equation reads.
+        contradictions: Where the recordings contradict the file, sentences.
+        runs: Runs checked.
+    """
+
+    equations: tuple[CheckedEquation, ...]
+    missing: tuple[Missing, ...]
+    unused: tuple[str, ...]
+    contradictions: tuple[str, ...] = field(default=())
+    runs: int = 0
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether there is an equation, each can be fitted, and nothing is contradicted."""
+        troubled = any(equation.trouble for equation in self.equations)
+        return bool(self.equations) and not troubled and not self.contradictions
+
+
+def check(plant: Plant, campaign: Campaign | None = None, file: Path | None = None) -> CheckedPlant:
+    """Check which parameters of a machine can be identified.
+
+    Args:
+        plant: The machine.
+        campaign: Recordings of it, or None.
+        file: Its file, for sentences that say what to change.
+
+    Raises:
+        PlantError: An equation of its owner's has an unknown effect, role or channel.
+    """
+    models = declared(plant)
+    if campaign is None:
+        found = [_described(model) for model in models]
+        return CheckedPlant(tuple(found), tuple(missing(plant)), tuple(unused(plant)))
+    recordings = list(campaign.evidence)
+    columns = shared_columns(recordings) if recordings else []
+    return CheckedPlant(
+        equations=tuple(_fitted(model, campaign, columns) for model in models),
+        missing=tuple(missing(plant)),
+        unused=tuple(unused(plant)),
+        contradictions=tuple(_contradictions(plant, recordings, str(file or plant.name))),
+        runs=len(recordings),
+    )
+
+
+def _described(model: Model, values: bool = False) -> CheckedEquation:
+    parameters = tuple(
+        Identified(
+            term.effect.id,
+            parameter.name,
+            term.unit(parameter, model.target),
+            parameter.description,
+            term.values[parameter.name].value if values else None,
+        )
+        for term in model.terms
+        for parameter in term.parameters
+    )
+    return CheckedEquation(model.balance, model.description, parameters, model.target, model.unit)
+
+
+def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> CheckedEquation:
+    plain = _described(model)
+    needed = measured_channels([*model.channels, model.target], model.signals)
+    absent = [name for name in needed if name not in (*columns, "time_s")]
+    if absent:
+        near = nearest(absent[0], list(columns)) if columns else "There are no runs."
+        return _troubled(plain, f"{', '.join(absent)} was not recorded. {near}")
+    try:
+        fitted = fit(model, campaign, bootstrap=0)
+    except EstimationError as error:
+        return _troubled(plain, f"{error.what} {error.fix}".strip())
+    found = _described(fitted, values=True)
+    evidence = fitted.evidence
+    assert evidence is not None  # noqa: S101  a fit sets its evidence
+    size = float(np.sqrt(np.mean([float(np.mean(r**2)) for r in _targets(fitted, campaign)])))
+    return CheckedEquation(
+        found.name,
+        found.sentence,
+        found.parameters,
+        found.target,
+        found.unit,
+        (evidence.rmse if fitted.run_offsets else evidence.rmse_with_means) / size,
+    )
+
+
+def _targets(model: Model, campaign: Campaign) -> Iterator[FloatArray]:
+    for recording in campaign.evidence:
+        channels = balance_channels(model, recording)
+        target = channels[model.target][settled(model, channels)]
+        if target.size:
+            yield target - target.mean() if model.run_offsets else target
+
+
+def _troubled(plain: CheckedEquation, trouble: str) -> CheckedEquation:
+    return CheckedEquation(
+        plain.name, plain.sentence, plain.parameters, plain.target, plain.unit, trouble=trouble
+    )
+
+
+def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:
+    """Yield where recorded travels are not as the file states."""
+    for axis in plant.axes:
+        readings = [s.name for s in plant.sensors if (s.axis, s.reads) == (axis.name, "position")]
+        for first, second in pairwise(readings):
+            slope = _slope(recordings, first, second)
+            if slope is not None and abs(slope - 1.0) > FOLLOWS:
+                yield (
+                    f"{first} and {second} both read the position of {axis.name}, but {second}"
+                    f" changes {slope:.4g} times as much. Correct its unit, gain or sign, or its"
+                    f" axis, in {file}."
+                )
+    for joint in plant.transmissions:
+        driving, driven = plant.position(joint.input), plant.position(joint.output)
+        if joint.ratio is None or driving is None or driven is None:
+            continue
+        slope = _slope(recordings, driven.name, driving.name)
+        if slope is not None and abs(slope / joint.ratio - 1.0) > FOLLOWS:
+            yield (
+                f"{file} states the ratio {joint.ratio:g} for {joint.name}, but {driving.name}"
+                f" changes {slope:.4g} times as much as {driven.name}. Correct the ratio, or the"
+                " counts of one of the sensors."
+            )
+
+
+def _slope(recordings: Sequence[Recording], x: str, y: str) -> float | None:
+    """Return the change of one channel per change of another; None where neither moves."""
+    above, below = 0.0, 0.0
+    for recording in recordings:
+        if x in recording and y in recording:
+            across = recording[x][recording.valid] - recording[x][recording.valid].mean()
+            up = recording[y][recording.valid] - recording[y][recording.valid].mean()
+            above, below = above + float(across @ up), below + float(across @ across)
+    return above / below if below > 0.0 else None

@@ -1,0 +1,314 @@
+"""The equations of motion that a machine's sensors allow, and what keeps others from being written.
+
+Along the chain of axes that an actuator drives:
+
+- from the actuator to the first sensor of effort: effort = gain x drive - inertia - friction;
+- between two sensors of effort: effort = ratio x effort behind + inertia + friction;
+- without a sensor of effort: drive = weights + inertia + friction, in the unit of the drive;
+- across a compliant transmission with its travel read at both ends and its effort at one: the bend
+  of known ratio, or the output's travel where the ratio is fitted, = compliance x effort.
+
+Each has an offset. Friction goes with the speed of the axis on the driving side of what loses it:
+a gearbox winds up before its output turns. Acceleration is taken from the driven axis, whose sensor
+turns fastest.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+
+from estimation.channels import unit_of
+from estimation.plant import (
+    ACCELERATION,
+    EFFORT,
+    SPEED,
+    Actuator,
+    Part,
+    Plant,
+    PlantError,
+    Transmission,
+    Written,
+)
+from estimation.signals import Combination, Share, Signals
+
+OFFSET = Part("sensor.offset")
+RATE = {"N m": "_rate_n_m_s"}
+"""Unit of an effort to the ending of its rate."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What cannot be identified, and the sensor that would change it.
+
+    Attributes:
+        what: What cannot be identified, a sentence.
+        needed: What to add, a sentence.
+    """
+
+    what: str
+    needed: str
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The axes that an actuator drives, one after the other.
+
+    Attributes:
+        actuator: What drives the first.
+        axes: Names of the axes.
+        joints: The transmissions between them, one fewer.
+    """
+
+    actuator: Actuator
+    axes: tuple[str, ...]
+    joints: tuple[Transmission, ...]
+
+
+def equations(plant: Plant) -> tuple[Written, ...]:
+    """Return the equations that the sensors allow, those of the machine's owner last.
+
+    Raises:
+        PlantError: Two equations have the same name.
+    """
+    found = [
+        equation
+        for chain in chains(plant)
+        for equation in (*_efforts(plant, chain), *_deflections(plant, chain))
+    ]
+    unique = list(dict.fromkeys((e.name, e.target) for e in found))
+    once = [next(e for e in found if (e.name, e.target) == key) for key in unique]
+    # in the order of the chain: drive, bend of the gear, cable, bend of the cable
+    names = [e.name for e in (*once, *plant.equations)]
+    for name in names:
+        if names.count(name) > 1:
+            own = [e.name for e in plant.equations]
+            place = ("equation", own.index(name) + 1, "name") if name in own else ("machine", 1, "")
+            raise PlantError(
+                place,
+                f"Two equations are called {name!r}.",
+                f"The sensors allow: {', '.join(e.name for e in once)}.",
+                "Rename the equation, the transmission or the axis, or name the equation of a"
+                " transmission's bend with `deflection`.",
+            )
+    return (*_in_order(plant, once), *plant.equations)
+
+
+def _in_order(plant: Plant, found: list[Written]) -> list[Written]:
+    """Return equations along the chain: a transmission's loss before its bend."""
+    place: dict[str, int] = {}
+    for chain in chains(plant):
+        place.setdefault(_drive_name(chain), len(place))
+        for joint in chain.joints:
+            place.setdefault(joint.name, len(place))
+            place.setdefault(_bend_name(plant, joint), len(place))
+    return sorted(found, key=lambda e: place[e.name])
+
+
+def signals(plant: Plant) -> Signals:
+    """Return the machine's derived channels and its speeds of standstill.
+
+    Raises:
+        PlantError: Two equations have the same name.
+    """
+    bends = [c for joint in plant.transmissions if (c := bend_channel(plant, joint)) is not None]
+    speeds = {
+        channel
+        for equation in equations(plant)
+        for part in equation.parts
+        if part.id.startswith("friction.") and (channel := part.channels.get("speed")) is not None
+    }
+    rest = {}
+    for axis in plant.axes:
+        sensor, speed = plant.position(axis.name), plant.moved(axis.name, SPEED)
+        if sensor is None or speed not in speeds:
+            continue
+        count = 0.0
+        if sensor.counts is not None:
+            count = (2.0 * pi if axis.unit == "rad" else 1.0) / sensor.counts
+        rest[speed] = count * plant.cutoff_hz if axis.rest_speed is None else axis.rest_speed
+    return Signals((*bends, *plant.derived), rest)
+
+
+def chains(plant: Plant) -> Iterator[Chain]:
+    """Yield the chain of every actuator; where it branches, one chain an end."""
+    for actuator in plant.actuators:
+        yield from _onward(plant, Chain(actuator, (actuator.axis,), ()))
+
+
+def _onward(plant: Plant, chain: Chain) -> Iterator[Chain]:
+    further = [
+        joint
+        for joint in plant.transmissions
+        if joint.input == chain.axes[-1] and joint.output not in chain.axes
+    ]
+    if not further:
+        yield chain
+    for joint in further:
+        longer = Chain(chain.actuator, (*chain.axes, joint.output), (*chain.joints, joint))
+        yield from _onward(plant, longer)
+
+
+def bend_channel(plant: Plant, joint: Transmission) -> Combination | None:
+    """Return the channel of a transmission's bend, None where no sensors or no ratio give it."""
+    driving, driven = plant.position(joint.input), plant.position(joint.output)
+    if not joint.compliant or joint.ratio is None or driving is None or driven is None:
+        return None
+    name = f"{joint.name}_differential_{plant.axis(joint.output).unit}"
+    return Combination(
+        name, (Share(driving.name, over=joint.ratio), Share(driven.name, times=-1.0))
+    )
+
+
+def _drive_name(chain: Chain) -> str:
+    return chain.actuator.axis
+
+
+def _bend_name(plant: Plant, joint: Transmission) -> str:
+    if joint.deflection:
+        return joint.deflection
+    loses = any(
+        plant.effort(joint.output) and plant.effort(a) for c in chains(plant) for a in c.axes
+        if joint in c.joints and c.axes.index(a) <= c.axes.index(joint.input)
+    )  # fmt: skip
+    return f"{joint.name}_stretch" if loses else joint.name
+
+
+def _driven(plant: Plant, axes: tuple[str, ...]) -> str:
+    """Return the first axis whose travel is read; empty where none is."""
+    return next((axis for axis in axes if plant.position(axis)), "")
+
+
+def _motion(plant: Plant, speed_of: str, acceleration_of: str, sign: int) -> list[Part]:
+    """Return inertia and friction, as far as motion is measured."""
+    parts = []
+    if acceleration_of:
+        acceleration = plant.moved(acceleration_of, ACCELERATION)
+        parts.append(Part("inertia.missing", sign, {"acceleration": acceleration}))
+    if speed_of:
+        speed = plant.moved(speed_of, SPEED)
+        parts.append(Part("friction.viscous", sign, {"speed": speed}))
+        parts.append(Part("friction.coulomb", sign, {"speed": speed}))
+    return parts
+
+
+def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
+    """Yield the equations of what the drive and the transmissions of a chain lose."""
+    reading = [(k, s) for k, axis in enumerate(chain.axes) if (s := plant.effort(axis)) is not None]
+    driven = _driven(plant, chain.axes)
+    drive = chain.actuator.name
+    if not reading:
+        weights = [
+            Part("transmission.ratio", 1, {"load": load.name})
+            for load in plant.loads
+            if load.axis in chain.axes
+        ]
+        parts = (*weights, *_motion(plant, driven, driven, 1))
+        if parts:
+            yield Written(_drive_name(chain), drive, (*parts, OFFSET))
+        return
+    if unit_of(drive) in EFFORT.values():
+        gain = Part("transmission.ratio", 1, {"load": drive})
+    else:
+        gain = Part("motor.torque_constant", 1, {"source": drive})
+    at, first = reading[0]
+    own = _driven(plant, chain.axes[: at + 1]) or driven
+    yield Written(_drive_name(chain), first.name, (gain, *_motion(plant, own, own, -1), OFFSET))
+    for (near, here), (far, there) in pairwise(reading):
+        ratio = Part("transmission.ratio", 1, {"load": there.name})
+        speed_of = _driven(plant, chain.axes[near : far + 1])
+        parts = (ratio, *_motion(plant, speed_of, driven, 1), OFFSET)
+        yield Written(chain.joints[far - 1].name, here.name, parts)
+
+
+def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
+    """Yield the equations of the bends of a chain's transmissions."""
+    for joint in chain.joints:
+        driving, driven = plant.position(joint.input), plant.position(joint.output)
+        load = plant.effort(joint.output) or plant.effort(joint.input)
+        if not (joint.compliant and driving and driven and load):
+            continue
+        bend = bend_channel(plant, joint)
+        sign = 1 if bend else -1
+        parts = [Part("compliance.link", sign, {"load": load.name})]
+        unit = unit_of(load.name)
+        if joint.damped and unit in RATE:
+            rate = load.name.removesuffix("_n_m") + RATE[unit]
+            parts.append(Part("transmission.damping", -sign, {"rate": rate}))
+        if bend is None:
+            parts.insert(0, Part("transmission.ratio", 1, {"load": driving.name}))
+        target = bend.name if bend else driven.name
+        yield Written(_bend_name(plant, joint), target, (*parts, OFFSET))
+
+
+def missing(plant: Plant) -> list[Missing]:
+    """Return the gaps of these sensors: quantities without an equation, and the sensor for each."""
+    found = []
+    for chain in chains(plant):
+        if not any(plant.effort(axis) for axis in chain.axes):
+            scale = unit_of(chain.actuator.name)
+            kind = EFFORT[plant.axis(chain.axes[-1]).unit]
+            if scale not in EFFORT.values():
+                found.append(
+                    Missing(
+                        f"What {chain.actuator.name} drives with is known in {scale} only:"
+                        f" inertia and friction come out in units of the drive.",
+                        f"A sensor of effort ({kind}) on one of {', '.join(chain.axes)}.",
+                    )
+                )
+        if not _driven(plant, chain.axes):
+            found.append(
+                Missing(
+                    f"No motion is measured behind {chain.actuator.name}: neither inertia nor"
+                    " friction can be identified.",
+                    f"A sensor of position on one of {', '.join(chain.axes)}.",
+                )
+            )
+    for joint in plant.transmissions:
+        ends = (joint.input, joint.output)
+        absent = [f"of position on {axis}" for axis in ends if not plant.position(axis)]
+        if not plant.effort(joint.output) and not plant.effort(joint.input):
+            absent.append(f"of effort on {joint.output} or {joint.input}")
+        if joint.compliant and absent:
+            found.append(
+                Missing(
+                    f"The bend of {joint.name} cannot be identified.",
+                    f"A sensor {' and one '.join(absent)}.",
+                )
+            )
+    driven = {chain_axis for chain in chains(plant) for chain_axis in chain.axes}
+    for axis in plant.axes:
+        if axis.name not in driven and plant.actuators:
+            found.append(
+                Missing(
+                    f"Nothing drives the axis {axis.name}: no equation has it.",
+                    "An [[actuator]] on it, or a [[transmission]] that leads to it.",
+                )
+            )
+    return found
+
+
+def unused(plant: Plant) -> list[str]:
+    """Return the channels that no equation reads."""
+    combined: Mapping[str, Combination] = {c.name: c for c in signals(plant).combinations}
+    read: set[str] = set()
+    for equation in equations(plant):
+        names = [equation.target, *(n for part in equation.parts for n in part.channels.values())]
+        for name in names:
+            read |= {name, *_origins(plant, name)}
+            if name in combined:
+                read |= {share.channel for share in combined[name].shares}
+    return [s.name for s in plant.sensors if s.name not in read]
+
+
+def _origins(plant: Plant, name: str) -> set[str]:
+    """Return the sensors that a channel of motion or a rate is differentiated from."""
+    found = {
+        sensor.name
+        for axis in plant.axes
+        if (sensor := plant.position(axis.name)) is not None
+        and name in (plant.moved(axis.name, SPEED), plant.moved(axis.name, ACCELERATION))
+    }
+    return found | {
+        s.name for s in plant.sensors if s.name.removesuffix("_n_m") + RATE["N m"] == name
+    }

@@ -1,0 +1,137 @@
+"""What a machine's channels give besides their readings: combinations, and speeds of standstill."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from estimation.toml_table import Table, value_text
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one channel adds to a combination: value x times / over.
+
+    Attributes:
+        channel: A measured channel.
+        times: Factor.
+        over: Divisor, such as a gear ratio.
+    """
+
+    channel: str
+    times: float = 1.0
+    over: float = 1.0
+
+    @property
+    def gain(self) -> float:
+        """Change of the combination per change of the channel."""
+        return self.times / self.over
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A constant with the sign of a speed in a combination: size x tanh(speed / width).
+
+    Attributes:
+        speed: Channel of the speed.
+        size: The constant, in the unit of the combination.
+        width: Speed over which the sign changes.
+    """
+
+    speed: str
+    size: float
+    width: float
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A derived channel that is a weighted sum of measured ones.
+
+    Attributes:
+        name: Channel name, ends in its unit.
+        shares: What is summed.
+        direction: Nominal Coulomb friction, or None.
+    """
+
+    name: str
+    shares: tuple[Share, ...]
+    direction: Direction | None = None
+
+    def gain(self, measured: str) -> float:
+        """Return the change of the combination per change of a measured channel."""
+        return sum(share.gain for share in self.shares if share.channel == measured)
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The derived channels of a machine, and when its parts are at rest.
+
+    Attributes:
+        combinations: Derived channels.
+        rest: Channel of each speed that friction depends on, and the speed below which the part is
+            at rest, in the unit of the channel. While a gearbox winds up the motor turns and the
+            spindle stands still: an equation is static when the speed of its own friction is below
+            the threshold. Slower than a share of the usual speed is at rest too, see
+            `estimation.rest`, so 0 is a threshold that follows the data.
+    """
+
+    combinations: tuple[Combination, ...] = ()
+    rest: Mapping[str, float] = field(default_factory=dict)
+
+    def combination(self, name: str) -> Combination | None:
+        """Return the combination of that name, or None where there is none."""
+        return next((c for c in self.combinations if c.name == name), None)
+
+
+@cache
+def reference() -> Signals:
+    """Return the signals of the reference rig, which a model file without signals is of."""
+    from estimation.plant_equations import signals
+    from estimation.plant_file import shipped_plant
+
+    return signals(shipped_plant("reference"))
+
+
+def read_combinations(tables: Iterable[Table]) -> tuple[Combination, ...]:
+    """Read `[[derived]]` tables.
+
+    Raises:
+        EstimationError: The tables' own error: a key is unknown, missing or wrong.
+    """
+    return tuple(_combination(table) for table in tables)
+
+
+def _combination(table: Table) -> Combination:
+    name = table.take("name", str)
+    shares = []
+    for share in table.tables("shares"):
+        channel = share.take("channel", str)
+        shares.append(Share(channel, share.number("times", 1.0), share.number("over", 1.0)))
+        if shares[-1].over == 0.0:
+            raise table.error(f"{table.at('shares')}: a channel cannot be divided by zero.")
+        share.finish()
+    direction = None
+    if "direction" in table.content:
+        part = table.table("direction")
+        direction = Direction(part.take("speed", str), part.number("size"), part.number("width"))
+        part.finish()
+    table.finish()
+    return Combination(name, tuple(shares), direction)
+
+
+def combination_lines(combinations: Iterable[Combination], header: str) -> list[str]:
+    """Return combinations as TOML; `read_combinations` gives them back."""
+    lines = []
+    for one in combinations:
+        lines += ["", f"[[{header}]]", f"name = {value_text(one.name)}"]
+        lines.append(f"shares = {value_text([_share_entry(share) for share in one.shares])}")
+        if (part := one.direction) is not None:
+            entry = {"speed": part.speed, "size": part.size, "width": part.width}
+            lines.append(f"direction = {value_text(entry)}")
+    return lines
+
+
+def _share_entry(share: Share) -> dict[str, Any]:
+    entry: dict[str, Any] = {"channel": share.channel}
+    entry |= {"times": share.times} if share.times != 1.0 else {}
+    return entry | ({"over": share.over} if share.over != 1.0 else {})

@@ -1,0 +1,68 @@
+"""What the index keeps of a log, read from the log's records without its samples."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rig.campaigns.index import IndexedRun
+from rig.log.attempts import heads_of, is_unfinished, run_name, standing
+from rig.log.reader import LogFile
+from rig.log.scan import NotALogError
+from rig.log.streams import SAMPLE
+
+
+def runs_in(paths: Sequence[Path]) -> list[IndexedRun]:
+    """Return the runs of a folder's logs; of several attempts at a run the one that counts."""
+    heads, runs = [], []
+    for path in paths:
+        try:
+            heads += heads_of([path])
+        except NotALogError as error:
+            runs.append(_unreadable(path, str(error)))
+    return [*runs, *map(_indexed, standing(heads))]
+
+
+def _unreadable(path: Path, why: str) -> IndexedRun:
+    return IndexedRun(path.name, path.stem, "", "", "", "", {}, "", why, 0, 0, None, why)
+
+
+def _indexed(log: LogFile) -> IndexedRun:
+    run, end = log.run, log.end
+    conditions = dict(run.conditions) if run else {}
+    samples = log.indexed.get(SAMPLE, 0)
+    expected = end.expected_samples.get(SAMPLE, 0) if end else 0
+    identity = asdict(run.instrument) if run else {}
+    instrument = " ".join(str(value) for value in identity.values() if value is not None)
+    return IndexedRun(
+        file=log.path.name,
+        name=run_name(log),
+        rig=run.rig if run else "",
+        instrument=instrument,
+        date=_date(run.started_at_ns) if run else "",
+        protocol=str(conditions.get("protocol", "")),
+        conditions=conditions,
+        notes=run.notes if run else "",
+        state=_state(log),
+        samples=samples,
+        lost=max(expected - samples, 0),
+        duration_s=run.duration_s if run else None,
+        excluded=(run.excluded if run else None) or (end.excluded if end else None) or "",
+    )
+
+
+def _state(log: LogFile) -> str:
+    if is_unfinished(log):
+        return "not closed"
+    if log.damage:
+        return "damaged"
+    if log.end and not log.end.clean:
+        return f"aborted: {log.end.reason}" if log.end.reason else "aborted"
+    return "complete"
+
+
+def _date(started_at_ns: int | None) -> str:
+    from datetime import UTC, datetime
+
+    if started_at_ns is None:
+        return ""
+    return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")

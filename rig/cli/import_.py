@@ -1,0 +1,223 @@
+"""`rig import`: a table of samples, of any layout, becomes recordings."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.shipped import complete_machine, machine_names
+from rig.output.console import JsonFlag, emit_json, remarks, results
+
+if TYPE_CHECKING:
+    from estimation.recording import Recording
+    from rig.importers.table.mapping import Mapping
+    from rig.importers.table.preview import Preview
+
+MOST_RUNS = 12
+"""Runs listed on the screen; more are counted."""
+
+
+def import_(
+    path: Annotated[
+        Path, typer.Argument(help="CSV, TSV, Parquet, .mat, .npz, JSON, JSON lines, or a folder.")
+    ],
+    machine: Annotated[
+        Path | None,
+        typer.Option(
+            "--machine",
+            help="Machine file whose [data] maps the columns, or one of"
+            f" {', '.join(machine_names())}.",
+            autocompletion=complete_machine,
+        ),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."
+        ),
+    ] = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=COLUMN[:UNIT], what is constant in a run; may be repeated."),
+    ] = None,
+    runs: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Where runs begin: gap_s=1, lap_s=6.24, changes=COLUMN, falls=COLUMN,"
+            " mark=COLUMN, resets=true; may be repeated."
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="Sample rate, Hz, where no column holds the time.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="Another key of [data], such as even_rate_hz=100; may be repeated.",
+        ),
+    ] = None,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Show what would be imported; write no recording.")
+    ] = False,
+    plots: Annotated[
+        Path | None, typer.Option(help="Plots of every channel: an .html or .png file.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of the recordings, one log a run.")
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Import a table of any layout by a mapping of its columns, or preview it.
+
+    The mapping is `[data]` of a machine file or options of this command, which come first. Nothing
+    is guessed: a column without a unit is in the SI unit that the channel's name ends in.
+    """
+    from rig.errors import UsageError
+    from rig.importers.table.mapping import read_mapping
+    from rig.importers.table.open import read_runs
+    from rig.importers.table.preview import preview as look
+    from rig.importers.table.raw import Remark
+    from rig.machines.shipped import place_of
+
+    if not preview and out is None:
+        raise UsageError(
+            "Nothing states where the recordings are to be written.",
+            fix="Add --out FOLDER, or look at the table first with --preview.",
+        )
+    flags = _flags(column or [], condition or [], runs or [], set_ or [])
+    if rate is not None:
+        flags.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
+    mapping = read_mapping(None if machine is None else place_of(machine), flags)
+    said: list[Remark] = []
+    recordings = list(read_runs(path, mapping, said))
+    if not recordings:
+        raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
+    found = look(recordings, said)
+    written = [] if preview or out is None else _write(recordings, out)
+    if plots is not None:
+        _draw(recordings, plots)
+    if json:
+        emit_json({"preview": found, "written": written, "plots": plots})
+    _show(found, recordings, mapping, json)
+    screen = results(json)
+    if plots is not None:
+        screen.print(f"Plots: {plots}")
+    if written:
+        screen.print(f"wrote {len(written)} recordings to {out}")
+
+
+def _flags(
+    columns: list[str], conditions: list[str], runs: list[str], others: list[str]
+) -> list[tuple[tuple[str, ...], Any, str]]:
+    """Return the options as entries of a mapping, each with the words that state it."""
+    from rig.errors import UsageError
+
+    found: list[tuple[tuple[str, ...], Any, str]] = []
+    for option, part, words in (
+        ("--column", "columns", columns),
+        ("--condition", "conditions", conditions),
+        ("--runs", "runs", runs),
+        ("--set", "", others),
+    ):
+        for word in words:
+            name, equals, value = word.partition("=")
+            if not (name and equals and value):
+                raise UsageError(
+                    f"{option} {word} is not NAME=VALUE.", fix=f"Write {option} NAME=VALUE."
+                )
+            entry = _rule(name, value) if part == "runs" else value
+            keys = (part, name.strip()) if part else (name.strip(),)
+            found.append((keys, entry, f"{option} {word}"))
+    return found
+
+
+def _rule(name: str, value: str) -> Any:
+    """Return the value of a rule for runs: names of columns, times, a switch or a number."""
+    if name == "changes":
+        return value.split(",")
+    if name == "at_s":
+        return [float(one) for one in value.split(",")]
+    if name == "resets":
+        return value == "true"
+    return value
+
+
+def _write(recordings: "list[Recording]", out: Path) -> list[Path]:
+    """Write the runs as logs, all or none."""
+    from rig.errors import UsageError
+    from rig.importers.derivatives import checked
+    from rig.log.convert import write_recording
+
+    for recording in recordings:
+        checked(recording)
+    paths = [out / f"{recording.name}.mcap" for recording in recordings]
+    there = [path for path in paths if path.exists()]
+    if there:
+        raise UsageError(
+            f"{there[0]} is there already.", fix="Choose another folder; nothing was written."
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    return [write_recording(p, recording) for p, recording in zip(paths, recordings, strict=True)]
+
+
+def _draw(recordings: "list[Recording]", plots: Path) -> None:
+    from rig.errors import UsageError
+    from rig.reports.table_plots import write_page, write_picture
+
+    writers = {".html": write_page, ".png": write_picture}
+    if plots.suffix.lower() not in writers:
+        raise UsageError(f"{plots} is neither .html nor .png.", fix="Choose one of the endings.")
+    writers[plots.suffix.lower()](recordings, plots)
+
+
+def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:
+    from rig.output.table import TextTable, to_rich
+
+    screen = results(json)
+    runs = [
+        (
+            run.name,
+            str(run.samples),
+            f"{run.duration_s:.4g}",
+            f"{run.rate_hz:.6g}" if run.rate_hz else "-",
+            str(run.flagged),
+            ", ".join(
+                f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}"
+                for k, v in run.conditions.items()
+            ),
+        )
+        for run in found.runs[:MOST_RUNS]
+    ]
+    note = f"{len(found.runs)} runs in all" if len(found.runs) > MOST_RUNS else ""
+    heads: tuple[str, ...] = ("run", "samples", "s", "Hz", "flagged", "conditions")
+    screen.print(to_rich(TextTable("Runs", heads, runs, note)))
+    channels = [
+        (c.name, _source(mapping, c.name), *(f"{v:.5g}" for v in (c.least, c.greatest, c.mean)))
+        for c in found.channels
+    ]
+    heads = ("channel", "from", "least", "greatest", "mean")
+    screen.print(to_rich(TextTable("Channels, SI units", heads, channels)))
+    cells = [[name, *(f"{v:.6g}" for v in row)] for name, row in found.first.items()]
+    heads = ("channel", *(str(k + 1) for k in range(len(found.first["time_s"]))))
+    screen.print(to_rich(TextTable(f"First samples of {recordings[0].name}", heads, cells)))
+    for line in found.remarks:
+        screen.print(f"Note: {line}.")
+    for line in found.questions:
+        remarks().print(f"Check: {line}")
+    if not found.questions:
+        screen.print("Nothing looks wrong.")
+
+
+def _source(mapping: "Mapping", name: str) -> str:
+    """Return where a channel comes from, in words."""
+    data = mapping.data
+    if name in data.formulas:
+        return data.formulas[name]
+    source = data.columns.get(name)
+    if source is None:
+        return name
+    unit = f" in {source.unit}" if source.unit else ""
+    gain = "" if source.gain == 1.0 else f" times {source.gain}"
+    zero = f" from {source.zero:g}" if source.zero else ""
+    return f"{source.column}{zero}{gain}{unit}"

@@ -1,0 +1,152 @@
+"""`rig machine`: what a machine is, in one file, and what can be identified of it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.shipped import complete_machine, machine_names
+from rig.output.console import JsonFlag, emit_json, results
+
+if TYPE_CHECKING:
+    from estimation.plant import Plant
+    from estimation.plant_check import CheckedEquation, CheckedPlant
+
+machine_app = typer.Typer(
+    help="Describe a machine of one's own in a file, and check what can be identified of it.",
+    no_args_is_help=True,
+)
+
+FileArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help=f"Machine file, or one of {', '.join(machine_names())}.",
+        autocompletion=complete_machine,
+    ),
+]
+
+
+@machine_app.command()
+def show(file: FileArgument, json_: JsonFlag = False) -> None:
+    """Show a machine: its parts and its equations."""
+    from estimation.plant_equations import signals
+    from estimation.plant_file import to_toml
+    from estimation.plant_models import declared
+    from rig.machines.shipped import read_machine
+
+    plant = read_machine(file)
+    models = declared(plant)
+    screen = results(json_)
+    screen.print(to_toml(plant))
+    for model in models:
+        screen.print(f"{model.balance}: {model.description}")
+    if json_:
+        emit_json({"machine": plant, "signals": signals(plant), "equations": models})
+
+
+@machine_app.command()
+def check(
+    file: FileArgument,
+    data: Annotated[Path | None, typer.Argument(help="Recordings of the machine.")] = None,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of DATA; detected by default.")
+    ] = None,
+    json_: JsonFlag = False,
+) -> int:
+    """Check which equations can be written, what each identifies, and what would be needed.
+
+    With DATA each equation is also fitted. Exit code 1 where one cannot be, where recordings
+    contradict the file, or where nothing can be identified.
+    """
+    from estimation.plant_check import check as check_plant
+    from rig.errors import ExitCode
+    from rig.machines.recordings import open_recordings
+    from rig.machines.shipped import read_machine
+
+    plant = read_machine(file)
+    campaign = None if data is None else open_recordings(data, file, format_)
+    found = check_plant(plant, campaign, file)
+    screen = results(json_)
+    for line in check_lines(plant, found):
+        screen.print(line)
+    if json_:
+        emit_json({"machine": plant.name, "check": found, "sound": found.is_sound})
+    return ExitCode.OK if found.is_sound else ExitCode.FAILED
+
+
+def check_lines(plant: "Plant", found: "CheckedPlant") -> list[str]:
+    """Return the result of a check as lines."""
+    lines = [] if found.equations else [f"No equation can be written for {plant.name}."]
+    for equation in found.equations:
+        lines += ["", f"{equation.name}: {equation.sentence}", *_parameter_lines(equation)]
+    if found.missing:
+        lines += ["", "Not identified:"]
+        lines += [f"  {gap.what} Needed: {gap.needed}" for gap in found.missing]
+    if found.unused:
+        lines += ["", f"Read by no equation: {', '.join(found.unused)}."]
+    if found.contradictions:
+        lines += ["", "The recordings contradict the file:"]
+        lines += [f"  {sentence}" for sentence in found.contradictions]
+    return lines[1:] if lines and not lines[0] else lines
+
+
+def _parameter_lines(equation: "CheckedEquation") -> list[str]:
+    lines = []
+    for one in equation.parameters:
+        value = "" if one.value is None else f" = {one.value:.5g}"
+        unit = "" if one.unit == "1" else f" {one.unit}"
+        text = f"{value}{unit}" if value else f" ({one.unit})"
+        lines.append(f"  {one.effect}, {one.name}{text}: {one.description}")
+    if equation.relative_error is not None:
+        share = 100 * equation.relative_error
+        lines.append(f"  Residual: {share:.3f} % of the root mean square of {equation.target}.")
+    if equation.trouble:
+        lines.append(f"  Cannot be fitted: {equation.trouble}")
+    return lines
+
+
+@machine_app.command()
+def new(
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="Machine file to write.")],
+    name: Annotated[str, typer.Option(help="Name of the machine; by default the file's.")] = "",
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(help="Axis, NAME:rad or NAME:m, in the order they drive one another."),
+    ] = None,
+    transmission: Annotated[
+        list[str] | None,
+        typer.Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted."),
+    ] = None,
+    actuator: Annotated[
+        list[str] | None, typer.Option(help="AXIS:CHANNEL, such as motor:motor_current_a.")
+    ] = None,
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(help="AXIS:CHANNEL; what it reads follows from the channel's unit."),
+    ] = None,
+    from_: Annotated[
+        Path | None, typer.Option("--from", help="Table: its columns are listed under [data].")
+    ] = None,
+    json_: JsonFlag = False,
+) -> None:
+    """Write a machine file, from options or from answers on a terminal.
+
+    Without a terminal nothing is asked: what is not stated is not in the file.
+    """
+    from estimation.plant_file import write
+    from rig.cli.machine_new import Answers, asked, data_text, plant_of
+    from rig.errors import UsageError
+
+    if out.exists():
+        raise UsageError(f"{out} exists.", fix="Name another file, or delete it.")
+    answers = Answers(axis or [], transmission or [], actuator or [], sensor or [])
+    if answers.is_empty:
+        answers = asked()
+    plant = plant_of(name or out.stem, answers)
+    write(plant, out, data_text(from_, plant) if from_ else "")
+    screen = results(json_)
+    screen.print(f"Machine: {out}. Next: rig machine check {out} DATA")
+    told: dict[str, Any] = {"machine": out}
+    if json_:
+        emit_json(told)

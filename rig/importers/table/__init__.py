@@ -1,0 +1,1 @@
+"""Import of any table of samples by a mapping of its columns, `[data]` of a machine's file."""

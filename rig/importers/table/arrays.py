@@ -1,0 +1,135 @@
+"""Tables in files of arrays: Parquet, `.mat` of versions 5 to 7, and `.npz`."""
+
+import io
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.errors import DataError, MissingExtraError
+from rig.importers.matlab import read_variables
+from rig.importers.table.mapping import Layout
+from rig.importers.table.raw import Raw, Values
+
+
+def read_parquet(path: Path, layout: Layout) -> Raw:
+    """Read a Parquet file; a column of lists becomes one column an entry.
+
+    Raises:
+        DataError: It is damaged.
+        MissingExtraError: The library that reads it is not installed.
+    """
+    del layout
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError as error:
+        raise MissingExtraError(
+            f"{path} is a Parquet file.", "The library that reads it is not installed.", "parquet"
+        ) from error
+    try:
+        table = parquet.read_table(path)
+    except (ArrowException, OSError) as error:
+        raise _damaged(path, "Parquet", error) from error
+    columns: dict[str, Values] = {}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        columns |= _spread(name, _arrow_values(column))
+    return Raw(path, columns)
+
+
+def _arrow_values(column: Any) -> Values:
+    from pyarrow import types
+
+    kind = column.type
+    if types.is_timestamp(kind):
+        return np.array([value.isoformat() if value else "" for value in column.to_pylist()])
+    if types.is_list(kind) or types.is_fixed_size_list(kind):
+        return np.array(column.to_pylist(), dtype=np.float64)
+    if types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind):
+        cells = column.to_numpy(zero_copy_only=False)
+        return np.array([np.nan if v is None else v for v in cells], dtype=np.float64)
+    return np.array([str(value) for value in column.to_pylist()])
+
+
+def read_npz(path: Path, layout: Layout) -> Raw:
+    """Read arrays of a NumPy archive, which holds no objects.
+
+    Raises:
+        DataError: It is damaged, or holds objects.
+    """
+    del layout
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
+            values = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+        raise _damaged(path, "NumPy", error) from error
+    return _of_arrays(path, values)
+
+
+def read_mat(path: Path, layout: Layout) -> Raw:
+    """Read variables of a MATLAB file; a field of a struct is called `struct.field`.
+
+    Raises:
+        DataError: It is damaged, or of version 7.3.
+    """
+    del layout
+    return _of_arrays(path, dict(_flat(read_variables(path))))
+
+
+def _flat(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{name}.")
+        elif isinstance(value, np.ndarray | str):
+            yield above + name, value
+
+
+def _of_arrays(path: Path, values: Mapping[str, Any]) -> Raw:
+    """Sort arrays into columns, as long as the longest axis of any, and single values."""
+    fields: dict[str, float | str] = {}
+    columns: dict[str, Values] = {}
+    for name, value in values.items():
+        array = np.asarray(value)
+        if array.dtype.kind in "US" and array.size == 1:
+            fields[name] = str(array.reshape(-1)[0])
+        elif array.dtype.kind not in "fiubUS":  # complex numbers
+            continue
+        elif array.size == 1:
+            fields[name] = float(array.reshape(-1)[0])
+        elif array.size:
+            columns |= _spread(name, array if array.dtype.kind in "US" else array.astype(float))
+    return _longest(Raw(path, columns, fields))
+
+
+def _longest(raw: Raw) -> Raw:
+    """Return the columns of the most common length; the others are remarked on."""
+    lengths = [len(values) for values in raw.columns.values()]
+    if not lengths:
+        return raw
+    common = max(set(lengths), key=lambda n: (lengths.count(n), n))
+    others = [name for name, values in raw.columns.items() if len(values) != common]
+    if not others:
+        return raw
+    remark = f"{', '.join(others)} have another length than {common} and are not columns"
+    kept = {name: values for name, values in raw.columns.items() if name not in others}
+    return Raw(raw.path, kept, raw.fields, (*raw.remarks, remark))
+
+
+def _spread(name: str, values: Values) -> dict[str, Values]:
+    """Return a matrix as its columns, `q.1`, `q.2` and so on; a vector as it is."""
+    if values.ndim == 1:
+        return {name: values}
+    flat = values.reshape(values.shape[0], -1)
+    if flat.shape[0] < flat.shape[1]:  # one row a channel
+        flat = flat.T
+    return {f"{name}.{k + 1}": flat[:, k] for k in range(flat.shape[1])}
+
+
+def _damaged(path: Path, kind: str, error: Exception) -> DataError:
+    return DataError(
+        f"{path} cannot be read as a {kind} file: {str(error).splitlines()[0][:120]}.",
+        "It is damaged, cut off, or of another kind. Nothing of it was imported.",
+        "Copy or save it again.",
+    )

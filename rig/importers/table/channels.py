@@ -1,0 +1,232 @@
+"""From the columns of a file to channels and conditions in SI units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+
+from estimation.channels import UnknownUnitError, unit_of
+from estimation.recording import FloatArray
+from rig.errors import DataError
+from rig.importers.matlab import carries_unit
+from rig.importers.table.delimited import bad_cell
+from rig.importers.table.formula import FormulaError, evaluate, names_in
+from rig.importers.table.mapping import DATE, TIME, Mapping, Source
+from rig.importers.table.raw import Raw, Values
+from rig.importers.table.units import conversion
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One file in SI units.
+
+    Attributes:
+        raw: The file.
+        time_s: Shape (n,), as it is there.
+        channels: Name to values, shape (n,) each; not finite where a cell is empty.
+        conditions: Name to one value, or to values that must be constant in each run.
+        started_at_ns: Time of the first sample where the file holds dates, ns since 1970.
+    """
+
+    raw: Raw
+    time_s: FloatArray
+    channels: dict[str, FloatArray]
+    conditions: dict[str, float | str | Values]
+    started_at_ns: int | None = None
+
+
+def to_samples(raw: Raw, mapping: Mapping) -> Samples:
+    """Convert a file.
+
+    Raises:
+        DataError: A mapped column is not there, holds text, or is empty; a formula reads a name
+            that is neither a channel nor a condition.
+    """
+    data = mapping.data
+    sources = data.columns or _by_name(raw, mapping)
+    channels = {
+        name: _channel(raw, mapping, ("columns", name), name, source)
+        for name, source in sources.items()
+        if not (name == TIME and source.unit == DATE)
+    }
+    conditions = {
+        name: _condition(raw, mapping, name, source) for name, source in data.conditions.items()
+    }
+    started_at_ns = None
+    if TIME in sources and sources[TIME].unit == DATE:
+        time_s, started_at_ns = _dates(raw, mapping, sources[TIME])
+    elif TIME in channels:
+        time_s = channels.pop(TIME)
+    elif data.sample_rate_hz is not None:
+        time_s = np.arange(len(raw)) / data.sample_rate_hz
+    else:
+        raise DataError(
+            f"{raw.path} has no time: no column is called time_s, and no sample rate is stated.",
+            raw.listing(),
+            "Map one, --column time_s=COLUMN:ms, or state --rate HZ.",
+        )
+    for name, formula in _in_order(mapping, {*channels, *conditions, TIME}):
+        known = {**conditions, **channels, TIME: time_s}
+        try:
+            values = np.asarray(evaluate(formula, known), dtype=np.float64)
+        except (FormulaError, ValueError, TypeError) as error:
+            raise DataError(
+                f"{mapping.where('formulas', name)}: {error}.",
+                f"There are {', '.join(known)}.",
+            ) from error
+        channels[name] = np.broadcast_to(values, time_s.shape).astype(np.float64)
+    return Samples(raw, time_s, channels, conditions, started_at_ns)
+
+
+def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values | float | str:
+    """Return a column or single value of a file by name, for an entry of the mapping.
+
+    Raises:
+        DataError: The file has neither.
+    """
+    if name in raw.columns:
+        return raw.columns[name]
+    if name in raw.fields:
+        return raw.fields[name]
+    near = raw.nearest(name)
+    raise DataError(
+        f"{mapping.where(*path)}: {raw.path.name} has no column {name!r} for {path[1]}.",
+        raw.listing(),
+        f"Did you mean {near!r}? Write {path[1]} = {near!r}." if near else "Correct the name.",
+    )
+
+
+def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
+    """Return the columns that are named as channels, where no column is mapped at all."""
+    found = {
+        name: Source(column=name) for name in raw.columns if carries_unit(name) and name.islower()
+    }
+    used = {one for formula in mapping.data.formulas.values() for one in names_in(formula)}
+    if not set(found) - {TIME} and not used:
+        raise DataError(
+            f"Nothing states which column of {raw.path} is which channel.",
+            raw.listing(),
+            "Map them: --column motor_angle_rad=COLUMN:deg, or [data.columns] in --machine FILE.",
+        )
+    return found
+
+
+def _channel(
+    raw: Raw, mapping: Mapping, path: tuple[str, str], name: str, source: Source
+) -> FloatArray:
+    found = find(raw, mapping, path, source.column)
+    if not isinstance(found, np.ndarray):
+        found = np.full(len(raw), found)
+    if found.dtype.kind not in "fiub":
+        raise DataError(
+            f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is not numbers:"
+            f" {bad_cell(raw, source.column) if source.column in raw.columns else found[0]}.",
+            fix="Correct the file, or map another column.",
+        )
+    values = _in_si(raw, mapping, path, name, source, found.astype(np.float64))
+    if not np.isfinite(values).any():
+        raise DataError(
+            f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is empty.",
+            fix="Map another column, or delete this line.",
+        )
+    return values
+
+
+def _in_si(
+    raw: Raw,
+    mapping: Mapping,
+    path: tuple[str, str],
+    name: str,
+    source: Source,
+    values: FloatArray,
+) -> FloatArray:
+    gain = source.gain
+    if isinstance(gain, str):
+        gain_found = find(raw, mapping, path, gain)
+        if not isinstance(gain_found, float | int):
+            raise DataError(
+                f"{mapping.where(*path)}: the gain {gain!r} is not a single number of"
+                f" {raw.path.name}.",
+                fix="Write a number, or the name of a single value.",
+            )
+        gain = float(gain_found)
+    if source.wraps_at is not None:
+        values = np.unwrap(values, period=source.wraps_at)
+    unit = conversion(source.unit, name) if source.unit else None
+    if unit is None:
+        return np.asarray(gain * (values - source.zero))
+    return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
+
+
+def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float | str | Values:
+    if source.value is not None:
+        return source.value
+    path = ("conditions", name)
+    found = find(raw, mapping, path, source.column)
+    many = found if isinstance(found, np.ndarray) else np.array([found])
+    if many.dtype.kind in "US" and carries_unit(name):
+        try:
+            many = many.astype(np.float64)
+        except ValueError as error:
+            raise DataError(
+                f"{mapping.where(*path)}: {source.column!r} of {raw.path.name} is not a number:"
+                f" {str(many[0])!r}.",
+                f"{name} ends in a unit, so it is one.",
+                "Rename the condition without a unit, or map something else.",
+            ) from error
+    if many.dtype.kind in "fiub":
+        many = _in_si(raw, mapping, path, name, source, many.astype(np.float64))
+    if isinstance(found, np.ndarray):
+        return many
+    return str(many[0]) if many.dtype.kind in "US" else float(many[0])
+
+
+def _dates(raw: Raw, mapping: Mapping, source: Source) -> tuple[FloatArray, int]:
+    cells = find(raw, mapping, ("columns", TIME), source.column)
+    assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
+    at = []
+    for index, cell in enumerate(cells):
+        try:
+            date = datetime.fromisoformat(str(cell))
+        except ValueError as error:
+            raise DataError(
+                f"{raw.path}, {raw.row(index)}: {str(cell)!r} is not a date.",
+                "The time is mapped with the unit iso8601, such as 2024-05-01T12:00:00.25.",
+            ) from error
+        at.append(date if date.tzinfo else date.replace(tzinfo=UTC))
+    since = [(date - at[0]).total_seconds() for date in at]
+    return np.array(since), round(at[0].timestamp() * 1e6) * 1000
+
+
+def _in_order(mapping: Mapping, known: set[str]) -> list[tuple[str, str]]:
+    """Return the formulas so that each comes after those that it reads."""
+    left = dict(mapping.data.formulas)
+    ordered: list[tuple[str, str]] = []
+    while left:
+        ready = [n for n, text in left.items() if not set(names_in(text)) & set(left)]
+        if not ready:
+            raise DataError(
+                f"{mapping.where('formulas', next(iter(left)))}: formulas read one another in a"
+                f" circle: {', '.join(left)}."
+            )
+        ordered += [(name, left.pop(name)) for name in ready]
+    for name, text in ordered:
+        _check_unit(mapping, name)
+        missing = set(names_in(text)) - known - {n for n, _ in ordered}
+        if missing:
+            raise DataError(
+                f"{mapping.where('formulas', name)}: there is no channel or condition"
+                f" {sorted(missing)[0]!r}.",
+                f"There are {', '.join(sorted(known))}.",
+            )
+    return ordered
+
+
+def _check_unit(mapping: Mapping, name: str) -> None:
+    try:
+        unit_of(name)
+    except UnknownUnitError as error:
+        raise DataError(
+            f"{mapping.where('formulas', name)}: {error.what}", error.why, error.fix
+        ) from error

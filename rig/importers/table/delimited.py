@@ -1,0 +1,151 @@
+"""Text tables: CSV, TSV and other separators."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from rig.errors import DataError
+from rig.importers.table.mapping import Layout
+from rig.importers.table.raw import Raw, numbers_or_text, to_number
+
+SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
+TRUTHS = {"true": "1", "false": "0"}
+
+
+def read_delimited(path: Path, layout: Layout) -> Raw:
+    """Read a text table.
+
+    Args:
+        path: The file.
+        layout: What is stated about it; the rest follows from its first line and is remarked on.
+
+    Raises:
+        DataError: It is not text, is empty, or a line has another number of fields than the first.
+    """
+    text = _text(path)
+    lines = text.splitlines()
+    start = layout.skip_lines
+    while start < len(lines) and _is_blank(lines[start], layout.comment):
+        start += 1
+    if start >= len(lines):
+        raise DataError(f"{path} has no rows.", fix="Name a file with a head and samples.")
+    separator, remarks = _separator(path, lines[start], layout)
+    try:
+        rows = [
+            (number, cells)
+            for number, cells in _cells(lines, start, separator, layout.comment)
+            if any(cell.strip() for cell in cells)
+        ]
+    except csv.Error as error:
+        raise DataError(f"{path} cannot be read as a text table: {error}.") from error
+    if not text.endswith(("\n", "\r")):
+        remarks.append("the last line has no line end, so it may be cut off")
+    has_head = layout.header
+    if has_head is None:
+        has_head = any(not _is_number(cell, layout.decimal) for cell in rows[0][1])
+        if not has_head:
+            remarks.append("the first line holds numbers, so columns are named 1, 2, 3 and so on")
+    names = _unique([c.strip() for c in rows[0][1]]) if has_head else _numbered(len(rows[0][1]))
+    body = rows[1:] if has_head else rows
+    _check_widths(path, body, len(names))
+    columns = {}
+    for place, name in enumerate(names):
+        cells = [TRUTHS.get(cells[place].strip().lower(), cells[place]) for _, cells in body]
+        if layout.decimal != ".":
+            cells = [cell.replace(layout.decimal, ".") for cell in cells]
+        columns[name] = numbers_or_text(cells)
+    first_line = body[0][0] if body else 0
+    return Raw(path, columns, remarks=tuple(remarks), first_line=first_line)
+
+
+def _text(path: Path) -> str:
+    content = path.read_bytes()
+    if not content.strip():
+        raise DataError(f"{path} is empty.", fix="Name a file with a head and samples.")
+    try:
+        if b"\0" in content[:4096]:
+            raise ValueError
+        return content.decode("utf-8-sig")
+    except ValueError:
+        pass
+    if b"\0" not in content[:4096]:  # older spreadsheets write accented letters so
+        text = content.decode("latin-1")
+        if sum(c < " " and c not in "\t\r\n\f" for c in text[:4096]) == 0:
+            return text
+    raise DataError(
+        f"{path} is not a text table.",
+        f"It begins with the bytes {content[:8]!r}.",
+        "Name a CSV, TSV, Parquet, .mat, .npz or JSON file.",
+    )
+
+
+def _is_blank(line: str, comment: str) -> bool:
+    return not line.strip() or bool(comment and line.lstrip().startswith(comment))
+
+
+def _separator(path: Path, line: str, layout: Layout) -> tuple[str, list[str]]:
+    if layout.separator:
+        return layout.separator, []
+    counts = {one: line.count(one) for one in SEPARATORS if one != layout.decimal}
+    for one in (";", "\t", ",", " "):
+        if counts.get(one):
+            return one, [f"columns are separated by a {SEPARATORS[one]}"]
+    if path.suffix.lower() == ".tsv":
+        return "\t", []
+    return ",", []
+
+
+def _cells(
+    lines: list[str], start: int, separator: str, comment: str
+) -> list[tuple[int, list[str]]]:
+    """Return the fields of each line and its number, from 1."""
+    kept = [k for k in range(start, len(lines)) if not _is_blank(lines[k], comment)]
+    if separator == " ":
+        return [(k + 1, lines[k].split()) for k in kept]
+    reader = csv.reader((lines[k] for k in kept), delimiter=separator, skipinitialspace=True)
+    return [(kept[reader.line_num - 1] + 1, cells) for cells in reader]
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    try:
+        to_number(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _numbered(count: int) -> list[str]:
+    return [str(k + 1) for k in range(count)]
+
+
+def _unique(names: list[str]) -> list[str]:
+    """Return the names with a number after each that was there before: Time, Time.2."""
+    before = [names[: k + 1].count(name) for k, name in enumerate(names)]
+    return [
+        f"{name or 'column'}.{count}" if count > 1 or not name else name
+        for name, count in zip(names, before, strict=True)
+    ]
+
+
+def _check_widths(path: Path, body: list[tuple[int, list[str]]], width: int) -> None:
+    for place, (line, cells) in enumerate(body):
+        if len(cells) == width:
+            continue
+        last = place == len(body) - 1
+        raise DataError(
+            f"{path}, line {line}: {len(cells)} fields, not {width} as in the first line.",
+            "The file ends in the middle of this line." if last and len(cells) < width else "",
+            f"Delete line {line} or save the file again." if last else f"Correct line {line}.",
+        )
+
+
+def bad_cell(raw: Raw, name: str) -> str:
+    """Return where a text column's first cell that is not a number stands, and what it holds."""
+    for index, cell in enumerate(raw.columns[name]):
+        try:
+            to_number(str(cell))
+        except ValueError:
+            if str(cell).strip():
+                return f"{raw.row(index)} holds {str(cell)[:30]!r}"
+    return f"{raw.row(int(np.argmin([bool(str(c)) for c in raw.columns[name]])))} is empty"

@@ -1,0 +1,349 @@
+"""`[data]` of a machine's file: which column of a table becomes which channel, and what runs are.
+
+    [data]
+    files = "*.csv"
+    [data.columns]
+    time_s = "t:ms"
+    motor_angle_rad = "encoder:rev/4096"
+    motor_current_a = { column = "adc", unit = "A", gain = 0.00488, zero = 512 }
+    [data.conditions]
+    load_mass_kg = "load:g"
+    [data.runs]
+    gap_s = 0.5
+
+Every other table of that file is of the machine itself and is not read here.
+"""
+
+import tomllib
+from collections.abc import Mapping as Names
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError
+
+from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
+from rig.configuration.validation import explain, line_of
+from rig.errors import UsageError
+from rig.importers.table.formula import FormulaError, names_in
+from rig.importers.table.units import NotAUnitError, conversion, read_unit
+
+TIME = "time_s"
+DATE = "iso8601"
+"""Unit of a time column that holds dates."""
+
+EXAMPLES = Path(str(files("rig"))) / "machines" / "examples"
+"""Folder of the shipped machine files; `--machine` takes their names."""
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _short(value: Any) -> Any:
+    """Return `COLUMN:UNIT` as a table; what follows the last colon counts if it is a unit."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return {"column": str(value)}
+    if not isinstance(value, str):
+        return value
+    name, colon, unit = value.rpartition(":")
+    if colon and (unit == DATE or _is_unit(unit)):
+        return {"column": name, "unit": unit}
+    return {"column": value}
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        read_unit(text)
+    except NotAUnitError:
+        return False
+    return True
+
+
+class Source(_Section):
+    """Where a channel or a condition comes from: SI value = unit * gain * (raw - zero).
+
+    Attributes:
+        column: Name of a column, of a single value of the file, of a group of `file_name`, or of a
+            column of the side file; columns without a head are numbered from 1.
+        unit: Unit of the values; the SI unit of the channel's name if none.
+        gain: Number, or the name of a single value of the file.
+        zero: Raw value that means nought.
+        wraps_at: Raw range of a counter or angle that starts again at its end, or None.
+        value: Of a condition: the value itself, in place of a column.
+    """
+
+    column: Annotated[str, BeforeValidator(lambda v: str(v) if type(v) is int else v)] = ""
+    unit: str = ""
+    gain: FiniteFloat | str = 1.0
+    zero: FiniteFloat = 0.0
+    wraps_at: Positive | None = None
+    value: FiniteFloat | str | None = None
+
+
+Short = Annotated[Source, BeforeValidator(_short)]
+
+
+class Invalid(_Section):
+    """Samples that do not count: a formula that is true for them, and the reason."""
+
+    when: str
+    reason: str
+
+
+class Runs(_Section):
+    """Where one run ends and the next one begins; every stated rule applies.
+
+    Attributes:
+        gap_s: A pause of more than this in the time column, s.
+        resets: Whether time that goes back begins a run.
+        changes: Columns a new value of which begins a run.
+        falls: Column that begins a run where it falls.
+        mark: Column that begins a run where it turns from 0 to something else.
+        at_s: Times since the start of the file, s.
+        lap_s: Length of a lap, s.
+        start_s: What is before this time since the start of the file is left out, s.
+        tail_s: What is within this time of the end of the file is left out, s.
+        least_s: Shorter parts are left out, s; half a lap if laps are cut.
+    """
+
+    gap_s: Positive | None = None
+    resets: bool = False
+    changes: tuple[str, ...] = ()
+    falls: str = ""
+    mark: str = ""
+    at_s: tuple[FiniteFloat, ...] = ()
+    lap_s: Positive | None = None
+    start_s: FiniteFloat = 0.0
+    tail_s: Annotated[FiniteFloat, Field(ge=0)] = 0.0
+    least_s: Annotated[FiniteFloat, Field(ge=0)] | None = None
+
+
+class Layout(_Section):
+    """How a file is laid out, as far as it is stated.
+
+    Attributes:
+        files: Pattern of the files of a folder, such as `*.csv`.
+        header: Whether the first line of a text table names the columns; None follows it.
+        separator: Of a text table; found in the first line if none.
+        decimal: Decimal sign of a text table.
+        comment: What a line to be skipped begins with.
+        skip_lines: Lines before the head.
+        rows: Key of a JSON object that holds the samples.
+    """
+
+    files: str = ""
+    header: bool | None = None
+    separator: Annotated[str, Field(max_length=1)] = ""
+    decimal: Literal[".", ","] = "."
+    comment: str = ""
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    rows: str = ""
+
+
+class Data(Layout):
+    """The table `[data]`.
+
+    Attributes:
+        sample_rate_hz: Rate of the samples where no column holds their time.
+        even_rate_hz: Rate of an even clock onto which the samples are interpolated, or None.
+        file_name: Regular expression of a file's name; each named group is a single value.
+        side_file: CSV next to the data with a column `file` and one for each single value.
+        columns: Channel to its source.
+        conditions: Condition to its source.
+        formulas: Channel or condition to a formula of others, in SI units.
+        invalid: Samples that do not count.
+        runs: Where runs begin.
+    """
+
+    sample_rate_hz: Positive | None = None
+    even_rate_hz: Positive | None = None
+    file_name: str = ""
+    side_file: str = ""
+    columns: dict[str, Short] = Field(default_factory=dict)
+    conditions: dict[str, Short] = Field(default_factory=dict)
+    formulas: dict[str, str] = Field(default_factory=dict)
+    invalid: tuple[Invalid, ...] = ()
+    runs: Runs = Field(default_factory=Runs)
+
+
+class _Whole(_Section):
+    data: Data
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """A mapping, and where each of its entries is written.
+
+    Attributes:
+        data: The mapping.
+        file: The machine's file; None without one.
+        text: Its text.
+        flags: Path of an entry to the words of the command line that state it.
+    """
+
+    data: Data
+    file: Path | None = None
+    text: str = ""
+    flags: Names[tuple[str, ...], str] = field(default_factory=dict)
+
+    def where(self, *path: str | int) -> str:
+        """Return where an entry stands, such as `drive.toml, line 12`."""
+        keys = tuple(str(key) for key in path)
+        for length in range(len(keys), 0, -1):
+            if keys[:length] in self.flags:
+                return self.flags[keys[:length]]
+        number = line_of(self.text, ("data", *path))
+        name = self.file.name if self.file else "the command line"
+        return f"{name}, line {number}" if number else name
+
+    @property
+    def name(self) -> str:
+        """Name of the machine: its file's."""
+        return self.file.stem if self.file else ""
+
+
+def read_mapping(file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, str]]) -> Mapping:
+    """Read the mapping of a machine's file and of the command line, which comes first.
+
+    Args:
+        file: The machine's file, the name of a shipped one, or None.
+        flags: For each entry of the command line its path below `[data]`, value and words.
+
+    Raises:
+        UsageError: A file is not there or not TOML, a key is unknown or wrong, a unit does not fit.
+    """
+    if file is not None and not file.exists() and (EXAMPLES / f"{file}.toml").exists():
+        file = EXAMPLES / f"{file}.toml"
+    text, content = _content(file) if file else ("", {})
+    words: dict[tuple[str, ...], str] = {}
+    for path, value, typed in flags:
+        if path in words:
+            raise UsageError(
+                f"{path[-1]} is stated twice: {words[path]} and {typed}.", fix="Keep one of them."
+            )
+        words[path] = typed
+        table = content
+        for key in path[:-1]:
+            table = table.setdefault(key, {})
+        table[path[-1]] = value
+    try:
+        data = _Whole.model_validate({"data": content}).data
+    except ValidationError as error:
+        raise _wrong(error, file, text) from error
+    mapping = Mapping(data, file, text, words)
+    _check(mapping)
+    return mapping
+
+
+def _content(file: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        text = file.read_text("utf-8")
+        content = tomllib.loads(text)
+    except FileNotFoundError as error:
+        shipped = ", ".join(sorted(path.stem for path in EXAMPLES.glob("*.toml")))
+        raise UsageError(
+            f"There is no machine file {file}.", f"Shipped: {shipped}.", "Check the path."
+        ) from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        hint = ""
+        if "overwrite" in str(error):
+            hint = "Two lines state the same key, such as one channel twice: delete one of them."
+        raise UsageError(f"{file} is not a machine file: {error}.", fix=hint) from error
+    data = content.get("data")
+    if not isinstance(data, dict):
+        raise UsageError(
+            f"{file} has no table [data].",
+            "It maps the columns of a recording to channels.",
+            'Add [data.columns] with lines such as motor_angle_rad = "COLUMN:deg".',
+        )
+    return text, data
+
+
+def _wrong(error: ValidationError, file: Path | None, text: str) -> UsageError:
+    known = [*Data.model_fields, *Source.model_fields, *Runs.model_fields, *Invalid.model_fields]
+    return UsageError(
+        f"{file.name if file else 'The command line'}: {explain(error, known, text)}",
+        fix="See docs/your-own-machine.md for every key of [data].",
+    )
+
+
+def _check(mapping: Mapping) -> None:
+    data = mapping.data
+    if data.columns and (TIME in data.columns) == (data.sample_rate_hz is not None):
+        both = TIME in data.columns
+        raise UsageError(
+            "Time is stated twice: by a column for time_s and by a sample rate."
+            if both
+            else f"{mapping.where('columns')}: nothing states the time of the samples.",
+            fix="Keep one of them."
+            if both
+            else 'Map a column, time_s = "COLUMN:ms", or state sample_rate_hz (--rate).',
+        )
+    for part in ("columns", "conditions"):
+        for name, source in getattr(data, part).items():
+            _check_source(mapping, part, name, source)
+    for name, formula in data.formulas.items():
+        where = mapping.where("formulas", name)
+        if name in data.columns or name in data.conditions:
+            raise UsageError(f"{where}: {name} is mapped to a column, too.", fix="Keep one.")
+        _formula(where, formula)
+    for number, invalid in enumerate(data.invalid):
+        _formula(mapping.where("invalid", number, "when"), invalid.when)
+
+
+def _formula(where: str, formula: str) -> None:
+    try:
+        names_in(formula)
+    except FormulaError as error:
+        raise UsageError(f"{where}: {error}.") from error
+
+
+def _check_source(mapping: Mapping, part: str, name: str, source: Source) -> None:
+    where = mapping.where(part, name)
+    if part == "columns" and source.value is not None:
+        raise UsageError(f"{where}: a channel has a column, not a value.", fix="Write column = .")
+    if not source.column and source.value is None:
+        raise UsageError(f"{where}: {name} has no column.", fix=f'Write {name} = "COLUMN:UNIT".')
+    try:
+        own = unit_of(name)
+    except UnknownUnitError as error:
+        if part == "conditions" and not source.unit:
+            return
+        raise UsageError(
+            f"{where}: the name {name!r} has no unit at its end.",
+            "Channels are in SI units, and their names end in the unit: "
+            f"{', '.join(f'_{suffix}' for suffix in UNIT_BY_SUFFIX)}.",
+            f"Rename it, for example {name}_rad.",
+        ) from error
+    if source.unit in ("", DATE) and (name == TIME or source.unit == ""):
+        return
+    try:
+        fits = conversion(source.unit, name) is not None
+    except NotAUnitError as error:
+        raise UsageError(
+            f"{where}: {error}.",
+            f"{name} is in {own}.",
+            "Write a unit such as deg, rpm, mm, mA, rev/4096 or 0.4/255 A; see"
+            " docs/your-own-machine.md.",
+        ) from error
+    if not fits:
+        raise UsageError(
+            f"{where}: {source.unit!r} is not a unit of {name}, which is in {own}.",
+            fix=f"Write a unit of {own}, or the name {_renamed(name, source.unit)}."
+            if source.unit != "count"
+            else "Write the size of a count, such as rev/4096, 0.01 mm or 0.4/255 A.",
+        )
+
+
+def _renamed(name: str, unit: str) -> str:
+    """Return a name like this one that a unit fits, or an example."""
+    stem = name.rsplit("_", 1)[0]
+    for suffix in sorted(UNIT_BY_SUFFIX, key=len):
+        if conversion(unit, f"{stem}_{suffix}") is not None:
+            return f"{stem}_{suffix}"
+    return "one of the suffixes of docs/signs-and-units.md"

@@ -1,0 +1,162 @@
+"""Opening a table: the files at a path, read by their kind and cut into runs."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from estimation.campaign import Campaign
+from estimation.recording import Recording
+from rig.errors import DataError, UsageError
+from rig.importers.derivatives import checked
+from rig.importers.table.arrays import read_mat, read_npz, read_parquet
+from rig.importers.table.channels import to_samples
+from rig.importers.table.delimited import read_delimited
+from rig.importers.table.json_rows import read_json
+from rig.importers.table.mapping import Layout
+from rig.importers.table.mapping import Mapping as ColumnMapping
+from rig.importers.table.raw import Raw, Remark, to_number
+from rig.importers.table.raw import checked as with_samples
+from rig.importers.table.runs import recordings
+
+READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
+    ".csv": read_delimited,
+    ".tsv": read_delimited,
+    ".txt": read_delimited,
+    ".dat": read_delimited,
+    ".parquet": read_parquet,
+    ".mat": read_mat,
+    ".npz": read_npz,
+    ".json": read_json,
+    ".jsonl": read_json,
+    ".ndjson": read_json,
+}
+"""Ending of a file's name to its reader; any other file is read as a text table."""
+
+
+def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
+    """Read the runs of a table into a campaign.
+
+    Args:
+        path: A file, or a folder of files.
+        mapping: Which column is which channel, and where runs begin.
+
+    Raises:
+        UsageError: The path does not exist.
+        DataError: A file cannot be read as the mapping states, or a channel contradicts the one
+            that is its derivative.
+    """
+    return Campaign.of([checked(run) for run in read_runs(path, mapping, [])])
+
+
+def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iterator[Recording]:
+    """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
+
+    Args:
+        path: A file, or a folder of files.
+        mapping: The mapping.
+        remarks: Gets a sentence on everything that was assumed, left out or filled in.
+    """
+    taken: set[str] = set()
+    for file in files_at(path, mapping):
+        raw = read_raw(file, mapping)
+        remarks += [(file.name, remark) for remark in raw.remarks]
+        for run in recordings(to_samples(raw, mapping), mapping, remarks):
+            name = run.name if run.name not in taken else f"{run.name}{file.suffix.lower()}"
+            taken.add(name)
+            yield replace(run, name=name)
+
+
+def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
+    """Return the files of a table in the order of their names.
+
+    Raises:
+        UsageError: The path does not exist, or holds no such file.
+    """
+    if not path.exists():
+        raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
+    if path.is_file():
+        return [path]
+    pattern = mapping.data.files
+    if pattern:
+        found = sorted(file for file in path.glob(pattern) if file.is_file())
+    else:
+        side = mapping.data.side_file
+        found = sorted(
+            file
+            for file in path.iterdir()
+            if file.suffix.lower() in READERS and file.name != Path(side).name
+        )
+    if not found:
+        raise UsageError(
+            f"{path} has no file {pattern or 'of a known kind'}.",
+            f"Known kinds are {', '.join(READERS)}."
+            if not pattern
+            else f"The pattern is files, {mapping.where('files')}.",
+            "Name a file, or state files in [data].",
+        )
+    return found
+
+
+def read_raw(file: Path, mapping: ColumnMapping) -> Raw:
+    """Read one file: its columns, and single values from it, its name and the side file.
+
+    Raises:
+        DataError: It cannot be read, or its name or the side file does not hold what is stated.
+    """
+    reader = READERS.get(file.suffix.lower(), read_delimited)
+    try:
+        raw = with_samples(reader(file, mapping.data))
+    except OSError as error:
+        raise DataError(f"{file} cannot be read: {error.strerror or error}.") from error
+    fields = raw.fields | _named_in(file, mapping) | _beside(file, mapping)
+    return replace(raw, fields=fields)
+
+
+def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
+    """Return the named groups of a file's name."""
+    pattern = mapping.data.file_name
+    if not pattern:
+        return {}
+    where = mapping.where("file_name")
+    try:
+        found = re.search(pattern, file.name)
+    except re.error as error:
+        raise UsageError(f"{where}: {pattern!r} is not a regular expression: {error}.") from error
+    if found is None:
+        raise DataError(
+            f"{where}: the name {file.name!r} does not match {pattern!r}.",
+            fix="Correct file_name, or choose files with files = PATTERN.",
+        )
+    return {name: _number(text) for name, text in found.groupdict().items() if text is not None}
+
+
+def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
+    """Return the single values that a side file holds for a file."""
+    name = mapping.data.side_file
+    if not name:
+        return {}
+    where, path = mapping.where("side_file"), file.parent / name
+    if not path.is_file():
+        raise UsageError(f"{where}: there is no file {path}.", fix="Put it next to the data.")
+    side = read_delimited(path, Layout())
+    if "file" not in side.columns:
+        raise DataError(
+            f"{path} has no column 'file'.", side.listing(), "Add one with the names of the files."
+        )
+    names = [str(cell) for cell in side.columns["file"]]
+    lines = [k for k, one in enumerate(names) if one in (file.name, file.stem)]
+    if len(lines) != 1:
+        raise DataError(
+            f"{path} has {len(lines)} lines for the file {file.name!r}.",
+            fix="Write one line with this name in the column 'file'.",
+        )
+    values = {key: column[lines[0]] for key, column in side.columns.items() if key != "file"}
+    return {k: float(v) if v.dtype.kind in "fiu" else str(v) for k, v in values.items()}
+
+
+def _number(text: str) -> float | str:
+    try:
+        return to_number(text)
+    except ValueError:
+        return text

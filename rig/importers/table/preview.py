@@ -1,0 +1,250 @@
+"""A look at a table before it is imported: ranges, rates, and what looks wrong.
+
+Each remark is a question to the person who knows the machine; nothing is corrected here.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.channels import unit_of
+from estimation.recording import FloatArray, Recording
+from rig.importers.derivatives import fault, pairs
+from rig.importers.table.raw import Remark
+
+PLAUSIBLE: dict[str, tuple[float, str]] = {
+    "rad": (200.0, "degrees or counts"),
+    "rad/s": (2000.0, "degrees a second, revolutions a minute or counts"),
+    "m": (20.0, "millimetres or counts"),
+    "m/s": (50.0, "millimetres a second"),
+    "N m": (2000.0, "millinewton metres or counts"),
+    "N": (50000.0, "counts"),
+    "A": (200.0, "milliamperes or counts"),
+    "V": (1000.0, "millivolts or counts"),
+    "1": (10.0, "per cent or counts"),
+}
+"""Size above which values of a bench machine are unusual, and what the column may be in instead.
+
+The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revolutions a minute."""
+
+COLDEST_K, HOTTEST_K = 200.0, 600.0
+GAP_PERIODS = 1.5
+"""Step of time, in median steps, from which samples are missing between two; as for derivatives."""
+
+JITTER = 0.2
+"""Median deviation of the steps of time, in median steps, that is remarked on."""
+
+FAR = 10.0
+"""Deviations of a step of time from the median beyond which no jitter reaches."""
+
+PLATEAU = 3
+"""Equal samples in a row that make a plateau."""
+
+CLIPPED = 0.005
+"""Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
+
+
+@dataclass(frozen=True)
+class ChannelView:
+    """One channel over all runs.
+
+    Attributes:
+        name: The channel.
+        unit: Its SI unit.
+        least: Least value.
+        greatest: Greatest value.
+        mean: Mean.
+        wrong: What looks wrong with it, in words.
+    """
+
+    name: str
+    unit: str
+    least: float
+    greatest: float
+    mean: float
+    wrong: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RunView:
+    """One run: its length, rate, conditions, flagged samples, and what looks wrong with its clock.
+
+    `rate_hz` is None for a run of one sample.
+    """
+
+    name: str
+    samples: int
+    duration_s: float
+    rate_hz: float | None
+    flagged: int
+    conditions: dict[str, float | str]
+    wrong: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A look at a table.
+
+    Attributes:
+        runs: Every run.
+        channels: Every channel.
+        first: Channel and time to the values of the first samples.
+        wrong: What looks wrong with channels together, in words.
+        remarks: What was assumed, left out or filled in, in words.
+    """
+
+    runs: tuple[RunView, ...]
+    channels: tuple[ChannelView, ...]
+    first: dict[str, list[float]]
+    wrong: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def questions(self) -> list[str]:
+        """Everything that looks wrong, in words, each with the channel or run it is about."""
+        found = [f"{c.name}: {text}" for c in self.channels for text in c.wrong]
+        found += [f"{r.name}: {text}" for r in self.runs for text in r.wrong]
+        return [*found, *self.wrong]
+
+
+def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: int = 5) -> Preview:
+    """Return a look at the runs of a table.
+
+    Args:
+        recordings: The runs, at least one, not yet checked against their derivatives.
+        remarks: What reading them remarked.
+        rows: Samples shown of the first run.
+    """
+    names = list(dict.fromkeys(name for r in recordings for name in r.columns))
+    views = []
+    for name in names:
+        parts = [r[name] for r in recordings if name in r]
+        views.append(_channel(name, parts))
+    first = recordings[0]
+    shown = {n: np.asarray(first[n])[:rows].tolist() for n in ("time_s", *first.columns)}
+    together = dict.fromkeys(text for r in recordings for text in _contradictions(r))
+    return Preview(
+        tuple(_run(recording) for recording in recordings),
+        tuple(views),
+        shown,
+        tuple(together),
+        tuple(_grouped(remarks)),
+    )
+
+
+def _grouped(remarks: Sequence[Remark]) -> Iterator[str]:
+    """Yield remarks with the file or run each is about; the same on several once."""
+    about: dict[str, list[str]] = {}
+    for place, text in remarks:
+        about.setdefault(text, []).append(place)
+    for text, places in about.items():
+        yield f"{places[0]}: {text}" if len(places) == 1 else f"{text} ({len(places)} files)"
+
+
+def _contradictions(recording: Recording) -> Iterator[str]:
+    for name, slope in pairs(recording):
+        if found := fault(recording, name, slope):
+            yield f"{recording.name}: {found}"
+
+
+def _run(recording: Recording) -> RunView:
+    rate_hz = recording.sample_rate_hz if len(recording) > 1 else None
+    return RunView(
+        recording.name,
+        len(recording),
+        recording.duration_s,
+        rate_hz,
+        int((~recording.valid).sum()),
+        dict(recording.conditions),
+        tuple(_clock(recording.time_s)),
+    )
+
+
+def _clock(time_s: FloatArray) -> Iterator[str]:
+    steps = np.diff(time_s)
+    if len(steps) < 2:
+        return
+    usual = float(np.median(steps))
+    spread = float(np.median(np.abs(steps - usual))) / usual
+    gaps = steps > (GAP_PERIODS + FAR * spread) * usual
+    if gaps.any():
+        count = int(gaps.sum())
+        yield (
+            f"{count} gap{'s' if count > 1 else ''} in time, the longest of"
+            f" {float(steps.max()):.4g} s; gap_s under [data.runs] cuts runs there"
+        )
+    if spread > JITTER:
+        yield (
+            f"the steps of time vary by {100 * spread:.0f} %; even_rate_hz interpolates onto an"
+            " even clock"
+        )
+
+
+def _channel(name: str, parts: Sequence[FloatArray]) -> ChannelView:
+    values = np.concatenate(parts)
+    values = values[np.isfinite(values)]
+    unit = unit_of(name)
+    least, greatest = float(values.min()), float(values.max())
+    wrong = [*_implausible(unit, least, greatest)]
+    if least == greatest:
+        wrong.append(f"it is constant at {with_unit(least, unit)}; is the sensor connected?")
+    else:
+        wrong += _clipped(parts, least, greatest, unit)
+        if unit == "rad":
+            wrong += _wrapped(parts)
+    return ChannelView(name, unit, least, greatest, float(values.mean()), tuple(wrong))
+
+
+def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:
+    if unit == "K":
+        if least < COLDEST_K or greatest > HOTTEST_K:
+            yield f"{least:g} to {greatest:g} K is unusual; is the column in degC?"
+    elif unit in PLAUSIBLE:
+        limit, instead = PLAUSIBLE[unit]
+        size = max(abs(least), abs(greatest))
+        if size > limit:
+            yield f"{with_unit(size, unit)} is unusually large; is the column in {instead}?"
+
+
+def _clipped(
+    parts: Sequence[FloatArray], least: float, greatest: float, unit: str
+) -> Iterator[str]:
+    """Yield the ends of the range that are reached abruptly and held: a limit, not a standstill."""
+    steps = np.concatenate([np.abs(np.diff(part)) for part in parts])
+    moving = steps[steps > 0]
+    usual = float(np.median(moving)) if moving.size else 0.0
+    total = sum(map(len, parts))
+    if len(np.unique(np.concatenate(parts))) <= PLATEAU:  # a switch
+        return
+    for end, word in ((least, "least"), (greatest, "greatest")):
+        held = sum(_held(part, end, usual / 2) for part in parts)
+        if held > CLIPPED * total:
+            yield (
+                f"{100 * held / total:.1f} % of the samples are held at the {word} value,"
+                f" {with_unit(end, unit)}; is it clipped?"
+            )
+
+
+def _held(values: FloatArray, end: float, abrupt: float) -> int:
+    """Return the samples on plateaus at a value that are entered by a step of at least this."""
+    at = np.flatnonzero(np.diff(np.concatenate([[False], values == end, [False]])))
+    held = 0
+    for first, stop in at.reshape(-1, 2):
+        if stop - first >= PLATEAU and first >= 2:
+            # the step before the last one: the last is cut short by the limit itself
+            entered = abs(values[first - 1] - values[first - 2])
+            held += int(stop - first) if entered >= abrupt and entered > 0 else 0
+    return held
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Return a value with its unit; a ratio has none."""
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _wrapped(parts: Sequence[FloatArray]) -> Iterator[str]:
+    steps = np.concatenate([np.diff(part) for part in parts])
+    jumps = int((np.abs(np.abs(steps) - 2 * np.pi) < 0.2).sum())
+    if jumps and np.nanmedian(np.abs(steps)) < 0.5:
+        yield f"it jumps by a turn {jumps} times; wraps_at states the range of the counter"

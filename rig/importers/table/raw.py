@@ -1,0 +1,95 @@
+"""The content of one file of a table, as it is there: columns of samples and single values."""
+
+import difflib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import DataError
+
+Values = NDArray[np.generic]
+"""One column: float64, or text where a cell is not a number."""
+
+Remark = tuple[str, str]
+"""File or run, and what was assumed, left out or filled in there, in words."""
+
+
+@dataclass(frozen=True)
+class Raw:
+    """One file.
+
+    Attributes:
+        path: The file.
+        columns: Name to column, shape (n,) each. Columns of a file without a head are named by
+            their number, from 1.
+        fields: Name to a value that holds for the whole file.
+        remarks: What was found out about the layout, in words.
+        first_line: Line of the file that holds the first sample; 0 where it has no lines.
+    """
+
+    path: Path
+    columns: dict[str, Values]
+    fields: dict[str, float | str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    first_line: int = 0
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def row(self, index: int) -> str:
+        """Return where a sample stands in the file, in words."""
+        return f"line {self.first_line + index}" if self.first_line else f"sample {index + 1}"
+
+    def listing(self) -> str:
+        """Return the names in the file, in words."""
+        columns = ", ".join(repr(name) for name in self.columns) or "none"
+        fields = ", ".join(repr(name) for name in self.fields)
+        return f"Its columns are {columns}." + (
+            f" Its single values are {fields}." if fields else ""
+        )
+
+    def nearest(self, name: str) -> str:
+        """Return the name of a column or single value nearest to one that is not there, or ''."""
+        known = [*self.columns, *self.fields]
+        lower = {one.lower(): one for one in known}
+        near = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.5)
+        return lower[near[0]] if near else ""
+
+
+def checked(raw: Raw) -> Raw:
+    """Return a file's content if it has samples, all columns as many.
+
+    Raises:
+        DataError: It has none, or columns differ in length.
+    """
+    lengths = {name: len(values) for name, values in raw.columns.items()}
+    if not lengths or not max(lengths.values()):
+        raise DataError(f"{raw.path} has no samples.", fix="Name a file with at least one row.")
+    if len(set(lengths.values())) > 1:
+        raise DataError(
+            f"The columns of {raw.path} differ in length.",
+            ", ".join(f"{name} has {count}" for name, count in lengths.items()) + ".",
+            "Save the samples of one run as columns of the same length.",
+        )
+    return raw
+
+
+def to_number(text: str) -> float:
+    """Return a cell as a number; unlike `float`, an underscore is not part of one.
+
+    Raises:
+        ValueError: It is not a number.
+    """
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
+def numbers_or_text(cells: list[str]) -> Values:
+    """Return cells as float64; an empty one is not a number; text if any is neither."""
+    try:
+        return np.array([to_number(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError:
+        return np.array([cell.strip() for cell in cells])

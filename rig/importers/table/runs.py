@@ -1,0 +1,197 @@
+"""Cutting a file's samples into runs: by gaps, laps, trials or marks, as the mapping states."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.recording import Flag, FloatArray, Recording, RecordingError, Stretch
+from rig.errors import DataError
+from rig.importers.table.channels import Samples, find
+from rig.importers.table.formula import FormulaError, evaluate
+from rig.importers.table.mapping import Mapping
+from rig.importers.table.raw import Remark
+
+KEPT_OF_A_LAP = 0.5
+"""A last lap that is shorter is left out where no shortest run is stated."""
+
+
+def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Iterator[Recording]:
+    """Yield the runs of a file, each on a clock that begins at 0.
+
+    Args:
+        samples: The file in SI units.
+        mapping: The mapping.
+        remarks: Gets a sentence on everything that is left out or filled in.
+
+    Raises:
+        DataError: Time goes back inside a run, or a condition changes inside one.
+    """
+    edges = _edges(samples, mapping)
+    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    kept = [part for part in parts if _is_long_enough(samples, mapping, part)]
+    stem, short = samples.raw.path.stem.lower(), len(parts) - len(kept)
+    if short:
+        few = "1 part" if short == 1 else f"{short} parts"
+        remarks.append((samples.raw.path.name, f"{few} too short for a run left out"))
+    width = max(2, len(str(len(kept))))
+    for number, part in enumerate(kept):
+        name = f"{stem}-{number:0{width}d}" if len(kept) > 1 else stem
+        yield _run(samples, mapping, part, name, remarks)
+
+
+def _edges(samples: Samples, mapping: Mapping) -> list[int]:
+    """Return the first sample of each run, and the end of the last one."""
+    rules, time_s = mapping.data.runs, samples.time_s
+    since_s = np.maximum.accumulate(time_s - time_s[0])
+    begins = np.zeros(len(time_s), bool)
+    steps = np.diff(time_s)
+    if rules.gap_s is not None:
+        begins[1:] |= steps > rules.gap_s
+    if rules.resets:
+        begins[1:] |= steps < 0
+    for name in rules.changes:
+        values = _cutting(samples, mapping, "changes", name)
+        begins[1:] |= values[1:] != values[:-1]
+    if rules.falls:
+        begins[1:] |= np.diff(_cutting(samples, mapping, "falls", rules.falls).astype(float)) < 0
+    if rules.mark:
+        marked = _cutting(samples, mapping, "mark", rules.mark) != 0
+        begins[1:] |= marked[1:] & ~marked[:-1]
+    first = int(np.searchsorted(since_s, rules.start_s)) if rules.start_s > 0 else 0
+    end = int(np.searchsorted(since_s, since_s[-1] - rules.tail_s, side="right"))
+    begins[:first] = False
+    at = [*rules.at_s]
+    if rules.lap_s is not None:
+        laps = np.arange(rules.start_s, since_s[-1] - rules.tail_s, rules.lap_s)
+        at += laps.tolist()
+    begins[[k for k in np.searchsorted(since_s, np.array(at) - 1e-9) if k < len(begins)]] = True
+    return sorted({first, *np.flatnonzero(begins[:end]).tolist(), max(first, end)})
+
+
+def _cutting(samples: Samples, mapping: Mapping, rule: str, name: str) -> NDArray[np.generic]:
+    found = find(samples.raw, mapping, ("runs", rule), name)
+    if not isinstance(found, np.ndarray):
+        raise DataError(
+            f"{mapping.where('runs', rule)}: {name!r} of {samples.raw.path.name} is one value, so"
+            " it cuts nothing.",
+            fix="Name a column.",
+        )
+    return found
+
+
+def _is_long_enough(samples: Samples, mapping: Mapping, part: slice) -> bool:
+    rules = mapping.data.runs
+    least_s = rules.least_s
+    if least_s is None:
+        least_s = KEPT_OF_A_LAP * rules.lap_s if rules.lap_s else 0.0
+    time_s = samples.time_s[part]
+    return len(time_s) > 1 and float(time_s[-1] - time_s[0]) >= least_s
+
+
+def _run(
+    samples: Samples, mapping: Mapping, part: slice, name: str, remarks: list[Remark]
+) -> Recording:
+    time_s = samples.time_s[part]
+    _check_clock(samples, part, time_s)
+    channels = {key: values[part] for key, values in samples.channels.items()}
+    conditions = {
+        key: _constant(samples, mapping, key, value, part, name)
+        for key, value in samples.conditions.items()
+    }
+    empty = ~np.all([np.isfinite(values) for values in channels.values()], axis=0)
+    start_ns = samples.started_at_ns
+    if start_ns is not None:
+        start_ns += round(float(time_s[0] - samples.time_s[0]) * 1e9)
+    try:
+        run = Recording(
+            name=name,
+            time_s=time_s - time_s[0],
+            columns=channels,
+            flags=np.where(empty, np.uint8(Flag.MISSING), np.uint8(0)),
+            conditions=conditions,
+            rig=mapping.name,
+            started_at_ns=start_ns,
+            source=str(samples.raw.path),
+        )
+    except RecordingError as error:
+        raise DataError(f"{samples.raw.path}: {error.what}", error.why, error.fix) from error
+    if empty.any():
+        remarks.append((name, f"{int(empty.sum())} samples with an empty cell flagged"))
+    run = _without_invalid(run, mapping)
+    return _even(run, mapping)
+
+
+def _check_clock(samples: Samples, part: slice, time_s: FloatArray) -> None:
+    steps = np.diff(time_s)
+    if np.isfinite(time_s).all() and (steps > 0).all():
+        return
+    place = int(np.argmin(np.isfinite(time_s))) if not np.isfinite(time_s).all() else -1
+    where = part.start or 0
+    if place >= 0:
+        raise DataError(
+            f"{samples.raw.path}, {samples.raw.row(where + place)}: the time is empty.",
+            fix="Correct the file, or state a sample rate in place of the time column.",
+        )
+    back = int(np.argmax(steps <= 0)) + 1
+    before, after = float(time_s[back - 1]), float(time_s[back])
+    raise DataError(
+        f"{samples.raw.path}, {samples.raw.row(where + back)}: time goes from {before:.6g} s to"
+        f" {after:.6g} s.",
+        f"{int((steps <= 0).sum())} samples do not come after the one before them.",
+        "If the clock starts again with each trial, write resets = true under [data.runs]"
+        " (--runs resets=true); if the column is not a clock, state --rate HZ.",
+    )
+
+
+def _constant(
+    samples: Samples, mapping: Mapping, key: str, value: object, part: slice, run: str
+) -> float | str:
+    if not isinstance(value, np.ndarray):
+        assert isinstance(value, float | str)  # noqa: S101  narrows the type
+        return value
+    inside = value[part]
+    if np.any(inside != inside[0]):
+        raise DataError(
+            f"{mapping.where('conditions', key)}: {key} is not constant in run {run}: it goes from"
+            f" {inside.min()} to {inside.max()}.",
+            "A condition holds for a whole run.",
+            "Cut runs where it changes, changes = [COLUMN] under [data.runs], or map it as a"
+            " channel.",
+        )
+    return str(inside[0]) if inside.dtype.kind in "US" else float(inside[0])
+
+
+def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
+    """Flag the samples for which a formula of the mapping is true."""
+    known = {**run.conditions, **run.columns, "time_s": run.time_s}
+    for number, invalid in enumerate(mapping.data.invalid):
+        try:
+            found = np.broadcast_to(evaluate(invalid.when, known), run.time_s.shape)
+        except (FormulaError, ValueError) as error:
+            raise DataError(
+                f"{mapping.where('invalid', number, 'when')}: {error}.",
+                f"There are {', '.join(known)}.",
+            ) from error
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], found.astype(bool), [False]])))
+        for first, end in edges.reshape(-1, 2):
+            start_s, stop_s = float(run.time_s[first]), float(run.time_s[end - 1])
+            run = run.with_stretch(Stretch(start_s, stop_s, Flag.SUSPECT, invalid.reason))
+    return run
+
+
+def _even(run: Recording, mapping: Mapping) -> Recording:
+    """Interpolate a run onto an even clock; a sample next to a flagged one is flagged."""
+    rate_hz = mapping.data.even_rate_hz
+    if rate_hz is None:
+        return run
+    count = int(np.floor(run.duration_s * rate_hz * (1 + 1e-12))) + 1
+    time_s = np.arange(count) / rate_hz
+    after = np.clip(np.searchsorted(run.time_s, time_s), 0, len(run) - 1)
+    before = np.clip(after - 1, 0, None)
+    wide = run.time_s[after] - run.time_s[before] > 3.0 * max(1 / rate_hz, 1 / run.sample_rate_hz)
+    flags = run.flags[after] | run.flags[before] | np.where(wide, np.uint8(Flag.MISSING), 0)
+    columns = {name: np.interp(time_s, run.time_s, values) for name, values in run.columns.items()}
+    return replace(run, time_s=time_s, columns=columns, flags=flags.astype(np.uint8))

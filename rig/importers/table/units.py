@@ -1,0 +1,133 @@
+"""Units of a table's columns, converted to the SI unit of a channel.
+
+A unit is a product of powers with an optional number: `deg`, `mm/s`, `mN m`, `rev/4096` (an encoder
+of 4096 counts a turn), `0.4/255 A` (eight bits of a current). An angle is a dimension of its own
+here: with a unit library for which radian is the number one, degrees would pass for a ratio,
+counts for radians, and revolutions per minute for hertz.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from estimation.channels import unit_of
+
+TURN = 2 * math.pi
+G_M_S2 = 9.80665
+
+BASE: dict[str, tuple[float, dict[str, int]]] = {
+    "1": (1.0, {}),
+    "ratio": (1.0, {}),
+    "%": (0.01, {}),
+    "count": (1.0, {"count": 1}),
+    "rad": (1.0, {"rad": 1}),
+    "deg": (math.radians(1), {"rad": 1}),
+    "°": (math.radians(1), {"rad": 1}),
+    "rev": (TURN, {"rad": 1}),
+    "turn": (TURN, {"rad": 1}),
+    "rpm": (TURN / 60, {"rad": 1, "s": -1}),
+    "s": (1.0, {"s": 1}),
+    "min": (60.0, {"s": 1}),
+    "h": (3600.0, {"s": 1}),
+    "Hz": (1.0, {"s": -1}),
+    "m": (1.0, {"m": 1}),
+    "in": (0.0254, {"m": 1}),
+    "ft": (0.3048, {"m": 1}),
+    "N": (1.0, {"N": 1}),
+    "gf": (1e-3 * G_M_S2, {"N": 1}),
+    "lbf": (4.4482216152605, {"N": 1}),
+    "ozf": (4.4482216152605 / 16, {"N": 1}),
+    "g": (1e-3, {"kg": 1}),
+    "lb": (0.45359237, {"kg": 1}),
+    "A": (1.0, {"A": 1}),
+    "V": (1.0, {"V": 1}),
+    "K": (1.0, {"K": 1}),
+    "Nm": (1.0, {"N": 1, "m": 1}),
+}
+"""Symbol to its factor to SI and its powers of base symbols; `BASE` without `PREFIXES`."""
+
+PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3}
+PREFIXED = ("s", "m", "N", "Nm", "g", "gf", "A", "V", "Hz", "rad", "deg")
+
+SHIFTED = {"degC": (1.0, 273.15), "°C": (1.0, 273.15), "degF": (5 / 9, 459.67 * 5 / 9)}
+"""Temperatures whose zero is not that of kelvin: K = factor * value + shift."""
+
+FACTOR = re.compile(r"(?P<symbol>[^\W\d]+|[%°]C?)(?:\^?(?P<power>-?\d+))?")
+NUMBER = re.compile(r"\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+")
+SIZE = re.compile(rf"(?P<size>-?(?:{NUMBER.pattern}))(?:/(?P<parts>{NUMBER.pattern}))?(?:\s+|$)")
+"""A number, or a ratio of two, at the beginning of a unit."""
+
+
+class NotAUnitError(ValueError):
+    """A text is not a unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit: SI value = factor * value + shift, and its powers of base symbols."""
+
+    factor: float
+    powers: dict[str, int]
+    shift: float = 0.0
+
+
+def read_unit(text: str) -> Unit:
+    """Read a unit such as `mm/s`, `N m`, `rev/4096` or `degC`.
+
+    Raises:
+        NotAUnitError: The text is not one.
+    """
+    text = text.strip()
+    if text in SHIFTED:
+        factor, shift = SHIFTED[text]
+        return Unit(factor, {"K": 1}, shift)
+    factor, powers = 1.0, dict[str, int]()
+    if (size := SIZE.match(text)) and float(size["parts"] or 1):
+        factor = float(size["size"]) / float(size["parts"] or 1)
+        text = text[size.end() :] or "1"
+    for place, part in enumerate(text.split("/")):
+        way = 1 if place == 0 else -1
+        words = [w for w in re.split(r"[\s*·]+", part.strip(" ()")) if w]
+        if not words:
+            raise NotAUnitError(f"{text!r} is not a unit")
+        for word in words:
+            base_size, own, power = _word(word, text)
+            factor *= base_size ** (way * power)
+            for base, count in own.items():
+                powers[base] = powers.get(base, 0) + way * power * count
+    return Unit(factor, {base: count for base, count in powers.items() if count})
+
+
+def _word(word: str, text: str) -> tuple[float, dict[str, int], int]:
+    if NUMBER.fullmatch(word):
+        return float(word), {}, 1
+    found = FACTOR.fullmatch(word)
+    symbol = found["symbol"] if found else word
+    power = int(found["power"] or 1) if found else 1
+    if symbol in BASE:
+        return *BASE[symbol], power
+    for prefix, size in PREFIXES.items():
+        rest = symbol.removeprefix(prefix)
+        if prefix and rest != symbol and rest in PREFIXED:
+            return size * BASE[rest][0], BASE[rest][1], power
+    raise NotAUnitError(f"{text!r} is not a unit: {word!r} is not known")
+
+
+def conversion(unit: str, name: str) -> Unit | None:
+    """Return how values in a unit become the SI unit that a channel's name ends in.
+
+    Args:
+        unit: Unit of the values; `count` fits only a ratio.
+        name: Name of the channel, such as `motor_angle_rad`.
+
+    Returns:
+        The conversion, or None where the unit has another dimension than the channel.
+
+    Raises:
+        NotAUnitError: The unit cannot be read.
+        UnknownUnitError: The channel's name has no unit.
+    """
+    given = read_unit(unit)
+    wanted = read_unit(unit_of(name))
+    same = given.powers == wanted.powers
+    return Unit(given.factor / wanted.factor, given.powers, given.shift) if same else None

@@ -1,0 +1,82 @@
+"""Interactive charts of a page: plain data that the Plotly library, inside the page, draws.
+
+A chart has the numbers it shows as a table too, for readers who cannot see it.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from estimation.recording import FloatArray
+from rig.output.table import TextTable
+
+POINTS = 1200
+"""Most points a line is drawn with."""
+
+Line = Mapping[str, Any]
+"""A trace of Plotly. Its `meta` has the `role` (`before`, `after`, `measured`, `level`), which sets
+its colour, and the `run` it belongs to, if one."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One chart.
+
+    Attributes:
+        name: Id in the page and name of exported files.
+        title: Title, also of an exported file.
+        judgement: Conclusion that the chart supports, in a sentence.
+        caption: What is drawn.
+        layout: Axes, as Plotly has them.
+        lines: What is drawn.
+        choices: Name to what is drawn once it is chosen, in place of `lines`; empty without choice.
+        table: Its numbers.
+    """
+
+    name: str
+    title: str
+    judgement: str
+    caption: str
+    layout: Mapping[str, Any]
+    lines: Sequence[Line] = ()
+    choices: Mapping[str, Sequence[Line]] = field(default_factory=dict)
+    table: TextTable | None = None
+
+
+def numbers(values: FloatArray, digits: int = 4) -> list[float | None]:
+    """Return values for a chart, rounded to significant digits; None where not finite."""
+    finite = np.isfinite(values)
+    return [float(f"{v:.{digits}g}") if ok else None for v, ok in zip(values, finite, strict=True)]
+
+
+def thinned(values: FloatArray) -> FloatArray:
+    """Return every n-th value, so that at most `POINTS` are left."""
+    return values[:: max(1, -(-len(values) // POINTS))]
+
+
+def embedded(charts: Sequence[Chart]) -> Markup:
+    """Return the data of charts as JSON that may stand inside a script element."""
+    plain = [
+        {
+            "name": chart.name,
+            "title": chart.title,
+            "layout": chart.layout,
+            "lines": chart.lines,
+            "choices": chart.choices,
+        }
+        for chart in charts
+    ]
+    text = json.dumps(plain, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - no tag can begin in it
+
+
+def scripts() -> Markup:
+    """Return the drawing library and the code that draws a page's charts with it."""
+    folder = resources.files("rig.output") / "assets"
+    texts = [(folder / name).read_text("utf-8") for name in ("plotly-basic.min.js", "charts.js")]
+    return Markup("\n".join(texts))  # noqa: S704 - files of this package

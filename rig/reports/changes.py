@@ -1,0 +1,66 @@
+"""A comparison of two campaigns in sentences and tables."""
+
+from collections.abc import Iterator
+
+from estimation.changes.compare import Change, Difference
+from rig.output.table import TextTable
+
+
+def lines(found: Difference) -> Iterator[str]:
+    """Yield what changed, a sentence each, and the limits of the answer."""
+    if not found.changes:
+        runs = " and ".join(str(len(names)) for names in found.runs.values())
+        yield f"No change beyond the differences between runs, {runs} of them."
+    for change in found.changes:
+        yield _sentence(change)
+    yield from found.notes
+
+
+def _sentence(change: Change) -> str:
+    sure = f"confidence {100 * change.confidence:.0f} %, p {change.p:.2g}"
+    if change.verdict == "one_of":
+        others = ", ".join(change.alternatives)
+        names = f"{change.name}, {others}"
+        return f"One of these changed, not distinguishable on these runs: {names} ({sure})."
+    how = {"moved": "Moved", "came": "Came", "went": "Went"}[change.verdict]
+    sizes = ", ".join(_size(change, name) for name in change.parameters)
+    return f"{how}: {change.name}, {sizes} ({sure})."
+
+
+def _size(change: Change, name: str) -> str:
+    value, unit, before = change.parameters[name], change.unit[name], change.before[name]
+    low, high = change.ci95[name]
+    text = f"{name} {value:+.4g} {unit} ({low:+.4g} to {high:+.4g})".replace(" 1 (", " (")
+    return text if before is None else f"{text} from {before:.4g}"
+
+
+def change_table(found: Difference) -> TextTable:
+    """Return the changes as a table."""
+    rows = []
+    for change in found.changes:
+        for name, value in change.parameters.items():
+            low, high = change.ci95[name]
+            before = change.before[name]
+            rows.append(
+                (
+                    change.name,
+                    name,
+                    "-" if before is None else f"{before:.4g}",
+                    f"{value:+.4g}",
+                    f"{low:+.4g} to {high:+.4g}",
+                    change.unit[name],
+                    f"{change.p:.2g}",
+                )
+            )
+    heads = ("change", "parameter", "in A", "A to B", "95 %", "unit", "p")
+    return TextTable("What changed", heads, rows)
+
+
+def prediction_table(found: Difference) -> TextTable:
+    """Return the errors on the third campaign as a table."""
+    rows = [
+        (name, *(f"{v:.4g}" for v in (p.with_a, p.with_b, p.as_a, p.as_b)), p.unit)
+        for name, p in found.predicted.items()
+    ]
+    heads = ("equation", "fitted on A", "fitted on B", "both, unchanged", "both, changed", "unit")
+    return TextTable("Error on the third campaign, within runs", heads, rows)

@@ -1,0 +1,1 @@
+"""Machines that other people built, diagnosed from their published recordings."""

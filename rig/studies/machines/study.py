@@ -1,0 +1,179 @@
+"""Diagnosing published recordings of other people's machines with their machine files."""
+
+import inspect
+import math
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.effects import catalogue
+from estimation.errors import EstimationError
+from estimation.model import Model
+from estimation.plant_models import declared
+from estimation.recording import Recording
+from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.run import run_diagnosis
+from rig.importers.table.mapping import read_mapping
+from rig.importers.table.open import open_table, read_runs
+from rig.machines.moving import with_motion
+from rig.machines.shipped import place_of, read_machine
+from rig.output.provenance import Provenance
+from rig.reports.diagnosis_words import sentences
+from rig.studies.machines.cases import CASES, Case, unpacked
+from rig.studies.machines.published import Published, by_direction, standard
+
+
+@dataclass(frozen=True)
+class Row:
+    """One equation of a machine.
+
+    Attributes:
+        case: Name of the machine.
+        equation: Name of the equation.
+        published: Published error, in words.
+        card: Page of the machine.
+        runs: Runs that trained, and that were held out.
+        declared_percent: Error of the declared model on the held-out runs, % of the root mean
+            square of the target there.
+        found_percent: The same with the effects that were found.
+        findings: What the diagnosis says of the equation, a sentence each.
+        checks: What a technician would check, one for each named effect.
+    """
+
+    case: str
+    equation: str
+    published: str
+    card: str
+    runs: tuple[int, int]
+    declared_percent: float
+    found_percent: float
+    findings: tuple[str, ...]
+    checks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MachineStudy:
+    """The study.
+
+    Attributes:
+        rows: One an equation.
+        reproduced: The published estimates of EMPS made again; empty without its data.
+        skipped: Machines without data, and equations that could not be diagnosed, in words.
+        seconds: Time it took.
+        provenance: Version and seed.
+    """
+
+    rows: tuple[Row, ...]
+    reproduced: tuple[tuple[str, Published], ...]
+    skipped: tuple[str, ...]
+    seconds: float
+    provenance: Provenance
+
+
+def run_study(
+    data: Path, seed: int = 0, on_stage: Callable[[str], None] = lambda _: None
+) -> MachineStudy:
+    """Diagnose every machine whose recordings are there.
+
+    Args:
+        data: Folder with a folder or an archive a machine.
+        seed: Seed of the splits.
+        on_stage: Called with what begins, in words.
+
+    Raises:
+        DataError: Recordings cannot be read as the machine's file states.
+    """
+    began = time.monotonic()
+    rows: list[Row] = []
+    skipped: list[str] = []
+    reproduced: list[tuple[str, Published]] = []
+    for case in CASES:
+        with unpacked(data, case.folder) as folder:
+            if folder is None:
+                skipped.append(f"{case.name}: no recordings in {case.folder}.")
+                continue
+            on_stage(case.name)
+            if case.machine == "emps":
+                reproduced += _published(folder)
+            try:
+                rows += _rows(case, _opened(case, folder), seed)
+            except EstimationError as error:
+                skipped.append(f"{case.name}: not decided. {error}")
+    seconds = time.monotonic() - began
+    return MachineStudy(
+        tuple(rows), tuple(reproduced), tuple(skipped), seconds, Provenance.now(seed)
+    )
+
+
+def _opened(case: Case, folder: Path) -> Campaign:
+    mapping = read_mapping(place_of(Path(case.machine)), ())
+    paths = sorted(folder.glob(case.files)) if case.files else [folder]
+    runs = [run for path in paths for run in open_table(path, mapping).evidence]
+    return Campaign.of([run for run in runs if case.wants(run)])
+
+
+def _published(folder: Path) -> list[tuple[str, Published]]:
+    mapping = read_mapping(place_of(Path("emps")), [(("runs",), {}, "whole files")])
+    found = []
+    for recording in read_runs(folder, mapping, []):
+        found.append((f"{recording.name}, standard model", standard(recording)))
+        found.append((f"{recording.name}, friction by direction", by_direction(recording)))
+    return found
+
+
+def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
+    """Return a row for each equation of a machine."""
+    models = declared(read_machine(Path(case.machine)))
+    models = [model for model in models if case.equation in ("", model.balance)]
+    campaign = with_motion(campaign, models)
+    with tempfile.TemporaryDirectory(prefix="study-") as place:
+        done = run_diagnosis(
+            campaign, models, Ledger(Path(place) / "looks.jsonl"), seed=seed, quick=True
+        )
+    found = done.diagnosis
+    return [_row(case, model, found, done.recordings) for model in models if _is_in(model, found)]
+
+
+def _is_in(model: Model, found: Diagnosis) -> bool:
+    return model.balance in found.errors
+
+
+def _row(case: Case, model: Model, found: Diagnosis, recordings: Sequence[Recording]) -> Row:
+    name = model.balance
+    held_out = [r[model.target] for r in recordings if r.name in set(found.sealed.confirm)]
+    size = math.sqrt(float(np.mean(np.concatenate(held_out) ** 2)))
+    error = found.errors[name]
+    before, after = (
+        (error.before, error.after)
+        if model.run_offsets
+        else (error.with_means_before, error.with_means_after)
+    )
+    own = [f for f in found.findings if f.balance == name]
+    words = [line for line in sentences(found) if line.startswith(f"{name}:")]
+    return Row(
+        case=case.name,
+        equation=name,
+        published=case.published,
+        card=case.card,
+        runs=(len(found.sealed.discover), len(found.sealed.confirm)),
+        declared_percent=100.0 * before / size,
+        found_percent=100.0 * after / size,
+        findings=tuple(words) or (f"{name}: no unmodelled effect found.",),
+        checks=tuple(check for f in own if (check := check_of(f))),
+    )
+
+
+def check_of(finding: Finding) -> str:
+    """Return the check by hand for a finding; empty where nothing is named."""
+    effect = next((e for e in catalogue().values() if e.family == finding.family), None)
+    if effect is None:
+        return ""
+    text = inspect.cleandoc(type(effect).__doc__ or "")
+    part = next((p for p in text.split("\n\n") if p.startswith("Check:")), "")
+    return f"{finding.family}: {' '.join(part.removeprefix('Check:').split())}" if part else ""

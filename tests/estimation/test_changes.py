@@ -1,0 +1,116 @@
+"""What changed between two campaigns: a planted change is named, and chance is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.changes.compare import ChangesError, compare
+from estimation.effects import effect
+from estimation.filters import LowPass
+from estimation.model import Model, Term
+from estimation.recording import Recording
+
+RATE_HZ = 200.0
+TIME_S = np.arange(0, 12, 1 / RATE_HZ)
+SPEEDS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
+MACHINE = {"mass": 2.0, "damping": 5.0, "friction": 1.5, "asymmetry": 0.0, "offset": 0.2}
+
+
+def axis() -> Model:
+    speed = {"speed": "axis_velocity_m_s"}
+    return Model(
+        name="axis",
+        balance="motor",
+        target="drive_force_n",
+        low_pass=LowPass(cutoff_hz=20.0),
+        run_offsets=False,
+        terms=(
+            Term(effect("inertia.missing"), 1, {"acceleration": "axis_acceleration_m_s2"}),
+            Term(effect("friction.viscous"), 1, speed),
+            Term(effect("friction.coulomb"), 1, speed),
+            Term(effect("sensor.offset"), 1, {}),
+        ),
+    )
+
+
+def record(seed: int, only: int | None = None, **changed: float) -> list[Recording]:
+    """Return a campaign of an axis that moves at six speeds."""
+    machine = {**MACHINE, **changed}
+    random = np.random.default_rng(seed)
+    runs = []
+    for k, scale in enumerate(SPEEDS):
+        if only is not None and k != only:
+            continue
+        phase = random.uniform(0, 2 * np.pi, 2)
+        position = 0.2 * np.sin(2 * np.pi * 0.4 * scale * TIME_S + phase[0])
+        position += 0.1 * np.sin(2 * np.pi * 0.13 * TIME_S + phase[1])
+        speed = np.gradient(position, TIME_S)
+        force = machine["mass"] * np.gradient(speed, TIME_S) + machine["damping"] * speed
+        force += machine["friction"] * np.tanh(speed / 0.01) + machine["offset"]
+        force += machine["asymmetry"] * np.abs(speed)
+        force += random.normal(0, 0.1, TIME_S.size) + random.normal(0, 0.02)
+        columns = {"axis_position_m": position, "drive_force_n": force}
+        conditions = {"speed_ratio": scale}
+        runs.append(Recording(f"{k:02d}", TIME_S, columns, conditions=conditions))
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("changed", "name", "parameter", "change"),
+    [
+        ({"mass": 2.2}, "inertia.missing inertia of motor", "inertia", 0.2),
+        ({"damping": 6.0}, "friction.viscous damping of motor", "damping", 1.0),
+        ({"friction": 1.2}, "friction.coulomb friction of motor", "friction", -0.3),
+    ],
+)
+def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter, change):
+    (found,) = compare(record(1), record(2, **changed), [axis()]).changes
+    assert (found.verdict, found.name) == ("moved", name)
+    low, high = found.ci95[parameter]
+    assert low <= found.parameters[parameter] <= high
+    assert found.parameters[parameter] == pytest.approx(change, rel=0.15)
+    known = MACHINE[next(iter(changed))]
+    assert found.before[parameter] == pytest.approx(known, rel=0.15)
+    assert found.confidence >= 0.9
+    assert found.p <= 0.05
+
+
+def test_what_mimics_a_change_on_these_runs_is_named_with_it():
+    # the weight of a payload on a short travel is nearly constant
+    (found,) = compare(record(1), record(2, offset=0.5), [axis()]).changes
+    assert found.verdict == "one_of"
+    assert "sensor.offset offset of motor" in (found.name, *found.alternatives)
+    assert found.p <= 0.05
+
+
+def test_an_effect_that_came_and_one_that_went():
+    worn = record(2, asymmetry=2.0)
+    (came,) = compare(record(1), worn, [axis()]).changes
+    assert (came.verdict, came.family) == ("came", "friction.viscous_asymmetry")
+    (went,) = compare(worn, record(1), [axis()]).changes
+    assert (went.verdict, went.family) == ("went", "friction.viscous_asymmetry")
+
+
+def test_chance_is_not_a_change():
+    pairs = [(record(seed), record(seed + 100)) for seed in range(20, 30)]
+    wrong = [pair for pair in pairs if compare(*pair, [axis()]).changes]
+    # at a level of 5 % more than three of ten has a probability of one in a thousand
+    assert len(wrong) <= 3
+
+
+def test_a_third_campaign_is_predicted_best_by_the_changed_model():
+    first, second = record(1), record(2, damping=6.0)
+    third = [replace(run, name=f"c{run.name}") for run in record(3, damping=6.0)]
+    predicted = compare(first, second, [axis()], on=third).predicted["motor"]
+    assert predicted.as_b < 0.8 * predicted.with_a
+    assert predicted.as_b < 0.8 * predicted.as_a
+    assert predicted.as_b == pytest.approx(predicted.with_b, rel=0.05)
+    assert predicted.unit == "N"
+
+
+def test_other_conditions_are_remarked_on_and_too_few_runs_refused():
+    found = compare(record(1), record(2)[:5], [axis()])
+    assert "not recorded under the same conditions" in found.notes[0]
+    with pytest.raises(ChangesError, match="3 runs"):
+        compare(record(1)[:3], record(2), [axis()])

@@ -1,0 +1,303 @@
+"""A machine as a value: its file, the equations that follow from it, and what it cannot measure."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation import model_file
+from estimation.campaign import Campaign
+from estimation.derived import measured_channels, zero_phase_channels
+from estimation.fitting import fit
+from estimation.plant import (
+    Actuator,
+    Axis,
+    Load,
+    Part,
+    Plant,
+    Sensor,
+    Transmission,
+    Written,
+)
+from estimation.plant_equations import equations, missing, signals, unused
+from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
+from estimation.plant_models import declared
+from estimation.recording import Recording
+from estimation.signals import Combination, Direction, Share
+from estimation.stream import Stream
+
+REFERENCE = to_toml(shipped_plant("reference"))
+
+
+def test_the_reference_rig_has_the_equations_it_always_had():
+    found = {
+        model.balance: (
+            model.target,
+            [(t.effect.id, t.sign, *t.channels.values()) for t in model.terms],
+        )
+        for model in model_file.reference_rig()
+    }
+    speed, spindle = "motor_velocity_rad_s", "spindle_velocity_rad_s"
+    inertia = "motor_acceleration_rad_s2"
+    offset = ("sensor.offset", 1, "time_s")
+    assert found == {
+        "motor": (
+            "proximal_torque_n_m",
+            [
+                ("motor.torque_constant", 1, "motor_current_a"),
+                ("inertia.missing", -1, inertia),
+                ("friction.viscous", -1, speed),
+                ("friction.coulomb", -1, speed),
+                offset,
+            ],
+        ),
+        "gearbox": (
+            "gearbox_differential_rad",
+            [
+                ("compliance.link", 1, "proximal_torque_n_m"),
+                ("transmission.damping", -1, "proximal_torque_rate_n_m_s"),
+                offset,
+            ],
+        ),
+        "cable": (
+            "proximal_torque_n_m",
+            [
+                ("transmission.ratio", 1, "distal_torque_n_m"),
+                ("inertia.missing", 1, inertia),
+                ("friction.viscous", 1, spindle),
+                ("friction.coulomb", 1, spindle),
+                offset,
+            ],
+        ),
+        "stretch": (
+            "jaw_angle_rad",
+            [
+                ("transmission.ratio", 1, "spindle_angle_rad"),
+                ("compliance.link", -1, "distal_torque_n_m"),
+                offset,
+            ],
+        ),
+    }
+    model = model_file.read(Path("motor"))
+    assert (model.low_pass.cutoff_hz, model.low_pass.order, model.run_offsets) == (50.0, 3, True)
+    assert model.signals.rest == {speed: 0.7, spindle: 0.02}
+
+
+finite = st.floats(-1e6, 1e6, allow_nan=False)
+positive = st.floats(1e-6, 1e6)
+words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+
+
+@st.composite
+def plants(draw):
+    """Draw a chain of axes, shafts and carriages, with sensors on some of them."""
+    count = draw(st.integers(1, 4))
+    units = [draw(st.sampled_from(["rad", "m"])) for _ in range(count)]
+    axes = [
+        Axis(f"axis_{k}", unit, draw(st.none() | positive | st.just(0.0)), draw(words))
+        for k, unit in enumerate(units)
+    ]
+    joints = [
+        Transmission(
+            f"joint_{k}",
+            f"axis_{k}",
+            f"axis_{k + 1}",
+            draw(st.none() | positive | positive.map(lambda x: -x)),
+            draw(st.booleans()),
+            draw(st.booleans()),
+        )
+        for k in range(count - 1)
+    ]
+    ends = {"rad": ("_angle_rad", "_torque_n_m"), "m": ("_position_m", "_force_n")}
+    sensors = []
+    for axis in axes:
+        for reads, end in zip(("position", "effort"), ends[axis.unit], strict=True):
+            if draw(st.booleans()):
+                counts, noise = draw(st.none() | positive), draw(st.none() | positive)
+                sensors.append(Sensor(f"{axis.name}{end}", axis.name, reads, counts, noise=noise))
+    loads = [Load("weight_n_m", "axis_0")] if units[0] == "rad" else []
+    parts = (Part("sensor.offset"), Part("friction.load", -1, {"speed": "a_velocity_m_s"}))
+    own = (Written("mine", "mine_n", parts),)
+    share = Share("a_a", draw(finite), draw(positive))
+    direction = draw(st.none() | st.just(Direction("b_velocity_m_s", -1.0, 0.5)))
+    bent = Combination("nominal_n", (share,), direction)
+    return Plant(
+        name=draw(words.map(lambda word: f"m{word}")),
+        axes=tuple(axes),
+        transmissions=tuple(joints),
+        actuators=(Actuator("drive_a", "axis_0"),),
+        sensors=tuple(sensors),
+        loads=tuple(loads),
+        equations=own if draw(st.booleans()) else (),
+        derived=(bent,) if draw(st.booleans()) else (),
+        description=draw(words),
+        cutoff_hz=draw(positive),
+        order=draw(st.integers(1, 5)),
+        run_offsets=draw(st.booleans()),
+    )
+
+
+@given(plants())
+def test_a_machine_file_gives_the_machine_back(plant):
+    text = to_toml(plant)
+    assert parse(text) == plant
+    assert parse(text + '\n[data]\ncolumns = { anything = "at all" }\n') == plant
+
+
+@given(plants())
+def test_every_equation_is_one_that_the_sensors_can_feed(plant):
+    known = {"time_s", "drive_a", *(part.name for part in (*plant.sensors, *plant.loads))}
+    own = {equation.name for equation in plant.equations}
+    for model in declared(plant):
+        needed = measured_channels([*model.channels, model.target], model.signals)
+        assert model.balance in own or {*needed} <= known
+
+
+@given(plants())
+def test_a_declared_model_of_any_machine_survives_its_file(plant):
+    models = declared(plant)
+    if models:
+        assert model_file.parse_all(model_file.to_toml(*models)) == models
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('reads = "position"', 'reads = "positon"', r"line \d+: reads.*Did you mean 'position'"),
+        ("compliant =", "compliannt =", r"line \d+ has an unknown key.*Did you mean 'compliant'"),
+        ('input = "motor"', 'input = "moter"', r"line \d+: There is no axis 'moter'.*'motor'"),
+        ('unit = "rad"', 'unit = "deg"', r"line \d+: The axis 'motor' has the unit 'deg'.*\"rad\""),
+        ("ratio = 35.0", "ratio = 0.0", r"line \d+: The ratio of 'gearbox' is zero"),
+        ('name = "spindle"', 'name = "motor"', r"line \d+: There are two of the name 'motor'"),
+        ('"distal_torque_n_m"\naxis', '"distal_torque"\naxis', r"line \d+.*carries no unit"),
+        ('"jaw_angle_rad"', '"jaw_angle_deg"', r"line \d+.*carries no unit"),
+        (
+            '"jaw_angle_rad"\naxis = "jaw"',
+            '"jaw_rad"\naxis = "jaw"',
+            r"line \d+.*ends in _angle_rad",
+        ),
+        ('deflection = "stretch"', 'deflection = "motor"', "Two equations are called 'motor'"),
+        ("[machine]", "[machine", "is not TOML"),
+        ("rig.machine/1", "rig.machine/9", r"line 1: the schema is not"),
+        ("[[actuator]]", "[[actuater]]", r"line \d+ has an unknown key 'actuater'.*'actuator'"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(old, new, message):
+    assert old in REFERENCE
+    with pytest.raises(PlantFileError, match=message):
+        parse(REFERENCE.replace(old, new, 1), "mine.toml")
+
+
+def test_the_line_named_is_the_line_in_the_file():
+    text = REFERENCE.replace('reads = "position"', 'reads = "positon"', 1)
+    number = next(k for k, line in enumerate(text.splitlines(), 1) if "positon" in line)
+    with pytest.raises(PlantFileError, match=f"mine.toml, line {number}:"):
+        parse(text, "mine.toml")
+
+
+def test_without_a_torque_sensor_the_drive_is_the_target_and_the_gap_is_named():
+    whole = shipped_plant("reference")
+    plant = replace(whole, sensors=tuple(s for s in whole.sensors if s.reads != "effort"))
+    (drive,) = equations(plant)
+    assert drive.target == "motor_current_a"
+    assert [part.sign for part in drive.parts] == [1, 1, 1, 1]
+    gaps = " ".join(f"{gap.what} {gap.needed}" for gap in missing(plant))
+    assert "A sensor of effort (N m) on one of motor, spindle, jaw" in gaps
+    assert "The bend of cable cannot be identified" in gaps
+    assert unused(plant) == ["spindle_angle_rad", "jaw_angle_rad"]
+
+
+def slide(seed, mass=90.0, viscous=200.0, coulomb=20.0):
+    """Return a run of a carriage in m, its drive in N."""
+    random = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 6.0, 1e-3)
+    turns = 2 * np.pi * time_s
+    position = 0.1 * np.sin(0.4 * turns) + 0.02 * np.sin(1.1 * turns + seed)
+    speed = np.gradient(position, time_s)
+    force = mass * np.gradient(speed, time_s) + viscous * speed + coulomb * np.tanh(speed / 2e-3)
+    force = force + random.normal(0.0, 0.5, force.size)
+    return Recording(
+        f"run-{seed}", time_s, {"carriage_position_m": position, "drive_force_n": force}
+    )
+
+
+SLIDE = Plant(
+    name="slide",
+    axes=(Axis("carriage", "m"),),
+    actuators=(Actuator("drive_force_n", "carriage"),),
+    sensors=(Sensor("carriage_position_m", "carriage", "position", counts=1e6),),
+    run_offsets=False,
+)
+
+
+def test_a_linear_axis_is_fitted_in_metres_and_newtons():
+    (model,) = declared(SLIDE)
+    fitted = fit(model, Campaign.of([slide(k) for k in range(4)]), bootstrap=0)
+    values = {t.effect.id: t for t in fitted.terms}
+    inertia, viscous = values["inertia.missing"], values["friction.viscous"]
+    assert inertia.values["inertia"].value == pytest.approx(90.0, rel=0.05)
+    assert viscous.values["damping"].value == pytest.approx(200.0, rel=0.05)
+    assert values["friction.coulomb"].values["friction"].value == pytest.approx(20.0, rel=0.1)
+    units = [t.unit(t.parameters[0], fitted.target) for t in (inertia, viscous)]
+    assert units == ["N s^2/m", "N s/m"]
+
+
+def test_the_unit_of_a_travel_does_not_matter():
+    shaft = Plant(
+        name="the same in other units",
+        axes=(Axis("carriage", "rad"),),
+        actuators=(Actuator("drive_force_n", "carriage"),),
+        sensors=(Sensor("carriage_angle_rad", "carriage", "position", counts=1e3),),
+        run_offsets=False,
+    )
+    runs = [slide(k) for k in range(4)]
+    other = [
+        replace(
+            r,
+            columns={
+                "carriage_angle_rad": 1e3 * r["carriage_position_m"],
+                "drive_force_n": r["drive_force_n"],
+            },
+        )
+        for r in runs
+    ]
+    errors = [
+        fit(declared(plant)[0], Campaign.of(recordings), bootstrap=0).evidence.rmse
+        for plant, recordings in ((SLIDE, runs), (shaft, other))
+    ]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-4)
+
+
+def test_a_resting_speed_follows_the_counts_of_the_sensor():
+    coarse = replace(SLIDE, sensors=(replace(SLIDE.sensors[0], counts=1e3),))
+    assert signals(coarse).rest["carriage_velocity_m_s"] == pytest.approx(1e-3 * 50.0)
+    stated = replace(coarse, axes=(Axis("carriage", "m", rest_speed=0.01),))
+    assert signals(stated).rest["carriage_velocity_m_s"] == 0.01
+
+
+@given(ratio=st.floats(0.5, 200.0), sign=st.sampled_from([1.0, -1.0]))
+def test_the_bend_of_a_gear_follows_its_ratio_offline_and_live(ratio, sign):
+    whole = shipped_plant("reference")
+    gearbox, cable = whole.transmissions
+    geared = replace(whole, transmissions=(replace(gearbox, ratio=sign * ratio), cable))
+    time_s = np.arange(0.0, 1.0, 1e-3)
+    spindle = 0.5 * np.sin(2 * np.pi * time_s)
+    bend = 0.01 * np.cos(2 * np.pi * time_s)
+    run = Recording(
+        "a",
+        time_s,
+        {
+            "motor_angle_rad": sign * ratio * (spindle + bend),
+            "spindle_angle_rad": spindle,
+            "proximal_torque_n_m": bend / 0.02,
+        },
+    )
+    channels = zero_phase_channels(run, ["gearbox_differential_rad"], signals=signals(geared))
+    assert np.abs(channels["gearbox_differential_rad"] - bend)[50:-50].max() < 1e-4
+    model = next(m for m in declared(geared) if m.balance == "gearbox")
+    fitted = fit(model, Campaign.of([run]), bootstrap=0)
+    assert fitted.terms[0].values["compliance"].value == pytest.approx(0.02, rel=1e-2)
+    assert Stream(fitted, 1000.0).channels == ("proximal_torque_n_m",)

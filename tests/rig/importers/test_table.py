@@ -1,0 +1,295 @@
+"""Tables of any layout: what is mapped arrives in SI units, cut into runs, with its conditions."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+from scipy.io import savemat
+
+from rig.importers.table.mapping import read_mapping
+from rig.importers.table.open import open_table, read_runs
+
+N = 100
+TIME_MS = np.arange(N) * 10.0
+ANGLE_DEG = 90.0 * np.sin(2 * np.pi * TIME_MS / 1000)
+CURRENT_MA = 500.0 * np.cos(2 * np.pi * TIME_MS / 1000)
+COLUMNS = {"t": TIME_MS, "enc": ANGLE_DEG, "i": CURRENT_MA}
+MAPPED = """
+[data.columns]
+time_s = "t:ms"
+motor_angle_rad = "enc:deg"
+motor_current_a = "i:mA"
+"""
+
+
+@pytest.fixture
+def machine(tmp_path):
+    def _machine(text=MAPPED):
+        path = tmp_path / "bench.toml"
+        path.write_text(text)
+        return read_mapping(path, [])
+
+    return _machine
+
+
+def text_table(path, columns, separator=","):
+    names = separator.join(columns)
+    rows = [separator.join(f"{v!r}" for v in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join([names, *map(str, rows)]).replace("np.float64", "") + "\n")
+
+
+def write(folder, kind):
+    """Write the same samples in a format, and return the file."""
+    path = folder / f"run.{kind}"
+    plain = {name: values.tolist() for name, values in COLUMNS.items()}
+    if kind in ("csv", "tsv"):
+        text_table(path, plain, "\t" if kind == "tsv" else ",")
+    elif kind == "parquet":
+        parquet.write_table(pa.table(plain), path)
+    elif kind == "mat":
+        savemat(path, COLUMNS)
+    elif kind == "npz":
+        np.savez(path, **COLUMNS)
+    elif kind == "jsonl":
+        rows = [dict(zip(plain, row, strict=True)) for row in zip(*plain.values(), strict=True)]
+        path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    elif kind == "json":
+        rows = [dict(zip(plain, row, strict=True)) for row in zip(*plain.values(), strict=True)]
+        path.write_text(json.dumps({"load_g": 250, "samples": rows}))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["csv", "tsv", "parquet", "mat", "npz", "jsonl", "json"])
+def test_every_format_gives_the_same_samples_in_si_units(tmp_path, machine, kind):
+    (run,) = open_table(write(tmp_path, kind), machine())
+    np.testing.assert_allclose(run.time_s, TIME_MS / 1000)
+    np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
+    np.testing.assert_allclose(run["motor_current_a"], CURRENT_MA / 1000)
+    assert run.name == "run"
+    assert run.rig == "bench"
+    assert run.valid.all()
+
+
+def test_the_command_line_maps_what_a_file_would(tmp_path):
+    flags = [
+        (("columns", "time_s"), "t:ms", "--column time_s=t:ms"),
+        (("columns", "motor_angle_rad"), "enc:deg", "--column motor_angle_rad=enc:deg"),
+    ]
+    (run,) = open_table(write(tmp_path, "csv"), read_mapping(None, flags))
+    np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
+    assert set(run.columns) == {"motor_angle_rad"}
+
+
+def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    np.savetxt(path, np.column_stack([ANGLE_DEG, CURRENT_MA]), delimiter=";")
+    text = '[data]\nsample_rate_hz = 200\n[data.columns]\nmotor_angle_rad = "1:deg"\n'
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
+    assert run.sample_rate_hz == pytest.approx(200)
+
+
+def test_counts_and_a_raw_converter_become_si(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    text_table(path, {"t": [0.0, 0.1, 0.2], "enc": [0, 1024, 4096], "adc": [512, 612, 412]})
+    (run,) = open_table(
+        path,
+        machine(
+            """
+            [data.columns]
+            time_s = "t"
+            motor_angle_rad = "enc:rev/4096"
+            motor_current_a = { column = "adc", unit = "mA", gain = 4.88, zero = 512 }
+            """
+        ),
+    )
+    np.testing.assert_allclose(run["motor_angle_rad"], [0, np.pi / 2, 2 * np.pi])
+    np.testing.assert_allclose(run["motor_current_a"], [0, 0.488, -0.488])
+
+
+def test_a_counter_that_starts_again_is_continued(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    text_table(path, {"t": [0.0, 0.1, 0.2, 0.3], "enc": [3000, 4000, 904, 1904]})
+    text = """
+        [data.columns]
+        time_s = "t"
+        motor_angle_rad = { column = "enc", unit = "rev/4096", wraps_at = 4096 }
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(np.diff(run["motor_angle_rad"]), 1000 / 4096 * 2 * np.pi)
+
+
+def test_a_gain_may_be_a_single_value_of_the_file(tmp_path, machine):
+    path = tmp_path / "run.mat"
+    savemat(path, {"t": TIME_MS / 1000, "vir": CURRENT_MA, "gtau": 35.15})
+    text = """
+        [data.columns]
+        time_s = "t"
+        drive_force_n = { column = "vir", unit = "N", gain = "gtau" }
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run["drive_force_n"], 35.15 * CURRENT_MA)
+
+
+def test_fields_of_a_struct_and_columns_of_a_matrix_have_names(tmp_path, machine):
+    path = tmp_path / "run.mat"
+    joints = np.column_stack([ANGLE_DEG, 2 * ANGLE_DEG])
+    savemat(path, {"log": {"t": TIME_MS, "q": joints, "z": joints * 1j}, "note": "calm"})
+    text = """
+        [data.columns]
+        time_s = "log.t:ms"
+        joint_2_angle_rad = "log.q.2:deg"
+        [data.conditions]
+        note = "note"
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run["joint_2_angle_rad"], 2 * np.radians(ANGLE_DEG))
+    assert run.conditions == {"note": "calm"}
+
+
+def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
+    path = write(tmp_path, "json")
+    text = f"""
+        [data.conditions]
+        load_mass_kg = "load_g:g"
+        [data.formulas]
+        weight_n_m = "load_mass_kg * g_m_s2 * 0.1 * sin(motor_angle_rad)"
+        {MAPPED}"""
+    (run,) = open_table(path, machine(text))
+    assert run.conditions == {"load_mass_kg": 0.25}
+    expected = 0.25 * 9.80665 * 0.1 * np.sin(np.radians(ANGLE_DEG))
+    np.testing.assert_allclose(run["weight_n_m"], expected)
+
+
+def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text(
+        "when,enc\n2024-05-01T12:00:00+00:00,1\n2024-05-01T12:00:00.250+00:00,2\n"
+        "2024-05-01T12:00:00.500+00:00,3\n"
+    )
+    text = '[data.columns]\ntime_s = "when:iso8601"\nmotor_angle_rad = "enc:deg"\n'
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run.time_s, [0, 0.25, 0.5])
+    assert run.started_at_ns == 1714564800 * 10**9
+
+
+def cut(tmp_path, machine, rule, columns):
+    path = tmp_path / "run.csv"
+    text_table(path, columns)
+    runs = f'[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\n{rule}\n'
+    return [run["motor_angle_rad"] for run in open_table(path, machine(runs))]
+
+
+CUTS = [
+    ("gap_s = 0.5", {"t": [0, 0.1, 0.2, 2.0, 2.1, 2.2]}),
+    ("resets = true", {"t": [0, 0.1, 0.2, 0.0, 0.1, 0.2]}),
+    ('changes = ["trial"]', {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5], "trial": [1, 1, 1, 2, 2, 2]}),
+    ('falls = "pwm"', {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5], "pwm": [1, 2, 3, 1, 2, 3]}),
+    ('mark = "key"', {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5], "key": [0, 0, 0, 1, 1, 0]}),
+    ("lap_s = 0.3", {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5]}),
+    ("at_s = [0.3]", {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5]}),
+]
+
+
+@pytest.mark.parametrize(("rule", "columns"), CUTS)
+def test_runs_are_cut_where_the_mapping_states(tmp_path, machine, rule, columns):
+    parts = cut(tmp_path, machine, rule, {**columns, "enc": [1, 2, 3, 4, 5, 6]})
+    assert [np.degrees(part).round().tolist() for part in parts] == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    text_table(path, {"t": [0.1 * k for k in range(7)], "enc": list(range(7))})
+    text = '[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\nlap_s = 0.3\n'
+    remarks = []
+    runs = list(read_runs(path, machine(text), remarks))
+    assert [run.name for run in runs] == ["run-00", "run-01"]
+    assert [run.time_s[0] for run in runs] == [0, 0]
+    assert any("left out" in text for _, text in remarks)
+
+
+def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, machine):
+    for load, trial in ((100, 1), (200, 2)):
+        columns = {"t": [0.0, 0.1, 0.2], "enc": [1, 2, 3], "trial": [trial] * 3}
+        text_table(tmp_path / f"load_{load}g.csv", columns)
+    (tmp_path / "about.csv").write_text(
+        "file,operator,arm\nload_100g,Ada,10\nload_200g.csv,Max,15\n"
+    )
+    text = """
+        [data]
+        file_name = "load_(?P<load>[0-9]+)g"
+        side_file = "about.csv"
+        [data.columns]
+        time_s = "t"
+        motor_angle_rad = "enc:deg"
+        [data.conditions]
+        load_mass_kg = "load:g"
+        trial = "trial"
+        operator = "operator"
+        arm_m = "arm:cm"
+        bench = { value = "B2" }
+        """
+    first, second = open_table(tmp_path, machine(text))
+    assert first.conditions == {
+        "load_mass_kg": pytest.approx(0.1),
+        "trial": 1,
+        "operator": "Ada",
+        "arm_m": pytest.approx(0.1),
+        "bench": "B2",
+    }
+    assert second.conditions["operator"] == "Max"
+    assert second.conditions["load_mass_kg"] == pytest.approx(0.2)
+
+
+def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("t,enc,on\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n0.4,5,1\n")
+    text = """
+        [data.columns]
+        time_s = "t"
+        motor_angle_rad = "enc:deg"
+        drive_ratio = "on"
+        [[data.invalid]]
+        when = "drive_ratio < 1"
+        reason = "the drive was off"
+        """
+    (run,) = open_table(path, machine(text))
+    assert run.valid.tolist() == [True, False, False, False, True]
+    (stretch,) = run.stretches
+    assert stretch.reason == "the drive was off"
+    assert (stretch.start_s, stretch.stop_s) == (0.2, 0.3)
+
+
+def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
+    text_table(path, {"t": time_s.tolist(), "enc": (10 * time_s).tolist()})
+    text = '[data]\neven_rate_hz = 100\n[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc"\n'
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(np.diff(run.time_s), 0.01)
+    np.testing.assert_allclose(run["motor_angle_rad"], 10 * (run.time_s + time_s[0]), atol=1e-9)
+
+
+def test_a_decimal_comma_and_lines_before_the_head(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("Recorder 7\n# zeroed\nt;enc\n0,0;1,5\n0,1;2,5\n")
+    text = """
+        [data]
+        decimal = ","
+        skip_lines = 1
+        comment = "#"
+        [data.columns]
+        time_s = "t"
+        motor_angle_rad = "enc:deg"
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(np.degrees(run["motor_angle_rad"]), [1.5, 2.5])
+
+
+def test_columns_named_as_channels_need_no_mapping(tmp_path):
+    path = tmp_path / "run.csv"
+    text_table(path, {"time_s": [0, 0.1], "motor_angle_rad": [1, 2], "Remark": [0, 0]})
+    (run,) = open_table(path, read_mapping(None, []))
+    assert set(run.columns) == {"motor_angle_rad"}

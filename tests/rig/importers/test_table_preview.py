@@ -1,0 +1,114 @@
+"""`rig import`: what a person sees before anything is written, and what is written then."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.cli.main import main
+from rig.importers.registry import open_campaign
+from rig.importers.table.mapping import read_mapping
+from rig.importers.table.open import read_runs
+from rig.importers.table.preview import preview
+
+TIME = np.arange(0, 8, 0.01)
+WAVE = np.sin(2 * TIME)
+
+
+def csv(path, **columns):
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def questions(tmp_path, **columns):
+    path = csv(tmp_path / "run.csv", **columns)
+    remarks = []
+    recordings = list(read_runs(path, read_mapping(None, []), remarks))
+    return preview(recordings, remarks).questions
+
+
+def test_a_table_as_it_should_be_raises_no_question(tmp_path):
+    columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 2 * np.cos(2 * TIME)}
+    assert questions(tmp_path, time_s=TIME, **columns) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "word"),
+    [
+        ("motor_current_a", np.full(TIME.size, 0.2), "constant"),
+        ("motor_current_a", np.clip(WAVE, -0.8, 0.8), "clipped"),
+        ("motor_angle_rad", 400 * WAVE, "unusually large"),
+        ("motor_temperature_k", 20 + WAVE, "degC"),
+        ("motor_angle_rad", np.mod(2 * TIME, 2 * np.pi), "wraps_at"),
+    ],
+)
+def test_what_looks_wrong_with_a_channel_is_asked(tmp_path, name, values, word):
+    found = questions(tmp_path, time_s=TIME, **{name: values})
+    assert found
+    for question in found:
+        assert question.startswith(f"{name}: ")
+        assert word in question
+
+
+def test_a_motion_that_comes_to_rest_at_its_end_is_not_clipped(tmp_path):
+    there_and_back = 0.5 - 0.5 * np.cos(np.minimum(TIME, np.pi))
+    assert questions(tmp_path, time_s=TIME, motor_angle_rad=there_and_back) == []
+
+
+def test_a_gap_and_an_uneven_clock_are_asked(tmp_path):
+    gap = np.where(TIME > 4, TIME + 1, TIME)
+    (question,) = questions(tmp_path, time_s=gap, motor_angle_rad=WAVE)
+    assert "1 gap in time" in question
+    uneven = TIME + np.random.default_rng(1).uniform(0, 0.0099, TIME.size)
+    (question,) = questions(tmp_path, time_s=uneven, motor_angle_rad=WAVE)
+    assert "even_rate_hz" in question
+
+
+def test_a_velocity_that_contradicts_its_angle_is_asked(tmp_path):
+    columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 20 * np.cos(2 * TIME)}
+    (question,) = questions(tmp_path, time_s=TIME, **columns)
+    assert "motor_velocity_rad_s" in question
+
+
+def test_import_writes_recordings_that_open(tmp_path, capsys):
+    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, q=np.degrees(WAVE))
+    words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg", "--runs", "lap_s=4"]
+    assert main(["import", str(table), *words, "--out", str(tmp_path / "logs")]) == 0
+    assert "wrote 2 recordings" in capsys.readouterr().out
+    runs = list(open_campaign(tmp_path / "logs"))
+    assert [len(run) for run in runs] == [400, 400]
+    np.testing.assert_allclose(runs[1]["motor_angle_rad"], WAVE[400:], atol=1e-7)
+    # nothing recorded is overwritten
+    assert main(["import", str(table), *words, "--out", str(tmp_path / "logs")]) == 2
+
+
+def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
+    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, q=np.degrees(WAVE), i=0 * TIME)
+    words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg"]
+    words += ["--column", "motor_current_a=i:mA", "--preview", "--json"]
+    assert main(["import", str(table), *words]) == 0
+    answer = capsys.readouterr()
+    shown = json.loads(answer.out)["preview"]
+    assert shown["first"]["motor_angle_rad"][1] == pytest.approx(WAVE[1])
+    (angle, current) = shown["channels"]
+    assert angle["greatest"] == pytest.approx(1.0, abs=1e-3)
+    assert current["wrong"]
+    assert "motor_current_a: it is constant" in answer.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.csv"]
+
+
+@pytest.mark.parametrize(("name", "start"), [("p.html", b"<!DOCTYPE html>"), ("p.png", b"\x89PNG")])
+def test_plots_are_a_page_or_a_picture(tmp_path, name, start):
+    table = csv(tmp_path / "bench.csv", time_s=TIME, motor_angle_rad=WAVE)
+    assert main(["import", str(table), "--preview", "--plots", str(tmp_path / name)]) == 0
+    content = (tmp_path / name).read_bytes()
+    assert content.startswith(start)
+    assert name.endswith("png") or b"motor_angle_rad" in content
+
+
+def test_without_an_output_the_way_out_is_stated(tmp_path, capsys):
+    table = csv(tmp_path / "bench.csv", time_s=TIME, motor_angle_rad=WAVE)
+    assert main(["import", str(table)]) == 2
+    assert "--preview" in capsys.readouterr().err

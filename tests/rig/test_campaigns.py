@@ -1,0 +1,185 @@
+"""`rig campaigns`: what is listed and found, and that the index follows the logs."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rig.campaigns.index import campaigns, default_index
+from rig.cli.main import main
+from tests.rig.log.conftest import write_log
+
+DIAGNOSIS = {
+    "schema": "rig.diagnosis/1",
+    "verdict": "identified",
+    "findings": [{"family": "ripple.motor"}],
+    "rmse_before": {"motor": 2e-3},
+    "rmse_after": {"motor": 1e-3},
+    "unit": {"motor": "N m"},
+}
+
+
+@pytest.fixture
+def root(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder = tmp_path / "logs"
+    for name in ("monday", "tuesday"):
+        (folder / name).mkdir(parents=True)
+        write_log(folder / name / "a.mcap")
+    return folder
+
+
+@pytest.fixture
+def rig(root, capsys):
+    def run(*words: str) -> dict:
+        assert main(["campaigns", *words, "--root", str(root), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def names(found: dict) -> list[str]:
+    return sorted(Path(one["folder"]).name for one in found["campaigns"])
+
+
+def diagnosed(folder: Path, **other) -> None:
+    (folder / "diagnosis").mkdir()
+    (folder / "diagnosis" / "diagnosis.json").write_text(json.dumps(DIAGNOSIS | other))
+
+
+def test_campaigns_are_listed_with_what_their_logs_state(rig):
+    found = rig()
+    assert names(found) == ["monday", "tuesday"]
+    (run,) = found["campaigns"][0]["runs"]
+    assert run["rig"] == "bench 1"
+    assert run["instrument"] == "Maryland 0042 3"
+    assert run["date"].startswith("2026-09-21T")
+    assert run["conditions"] == {"load_command_a": 0.3, "object": "spring"}
+    assert run["notes"] == "first try"
+    assert (run["state"], run["samples"], run["lost"]) == ("complete", 600, 0)
+
+
+def test_lost_samples_and_unfinished_logs_are_stated(rig, root):
+    write_log(root / "monday" / "b.mcap", drop=frozenset({30, 31, 32}))
+    third = write_log(root / "monday" / "c.mcap")
+    whole = third.read_bytes()
+    third.unlink()
+    (root / "monday" / "c.mcap.part").write_bytes(whole[: len(whole) // 2])
+    runs = {Path(r["file"]).name: r for c in rig("monday")["campaigns"] for r in c["runs"]}
+    assert runs["b.mcap"]["lost"] == 3
+    assert runs["c.mcap.part"]["state"] == "not closed"
+
+
+def test_the_index_follows_the_logs_and_reads_only_what_changed(root, tmp_path):
+    index, read = tmp_path / "index", []
+    assert len(campaigns(root, index, on_folder=read.append)) == 2
+    assert sorted(p.name for p in read) == ["monday", "tuesday"]
+    read.clear()
+    assert len(campaigns(root, index, on_folder=read.append)) == 2
+    assert read == []
+    write_log(root / "monday" / "b.mcap")
+    found = {c.folder.name: c for c in campaigns(root, index, on_folder=read.append)}
+    assert [p.name for p in read] == ["monday"]
+    assert len(found["monday"].runs) == 2
+    (root / "tuesday" / "a.mcap").unlink()
+    assert [c.folder.name for c in campaigns(root, index)] == ["monday"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no database at all" * 100])
+def test_a_damaged_index_is_built_again(root, tmp_path, content):
+    index = tmp_path / "index"
+    campaigns(root, index)
+    index.write_bytes(content)
+    assert len(campaigns(root, index)) == 2
+
+
+def test_a_file_that_is_no_log_does_not_hide_the_others(rig, root):
+    (root / "monday" / "picture.mcap").write_bytes(b"PNG" * 50)
+    states = {r["name"]: r["state"] for c in rig("monday")["campaigns"] for r in c["runs"]}
+    assert states["a"] == "complete"
+    assert len(states) == 2
+    assert states["picture"] != "complete"
+
+
+@pytest.mark.parametrize(
+    ("terms", "found"),
+    [
+        (["MARYLAND"], ["monday", "tuesday"]),
+        (["monday"], ["monday"]),
+        (["first", "try", "tuesday"], ["tuesday"]),
+        (["load_command_a>=0.3"], ["monday", "tuesday"]),
+        (["load_command_a>0.3"], []),
+        (["object=spring", "date>=2026-09"], ["monday", "tuesday"]),
+        (["object!=spring"], []),
+        (["date<2026-09"], []),
+        (["verdict=identified"], ["tuesday"]),
+        (["ripple.motor"], ["tuesday"]),
+        (["samples=600", "lost=0"], ["monday", "tuesday"]),
+    ],
+)
+def test_words_and_values_are_searched(rig, root, terms, found):
+    diagnosed(root / "tuesday")
+    assert names(rig(*terms)) == found
+
+
+def test_a_condition_that_no_run_has_is_an_error_with_the_nearest_name(root, capsys):
+    assert main(["campaigns", "load_comand_a=1", "--root", str(root)]) == 2
+    assert "'load_command_a'" in capsys.readouterr().err
+
+
+def test_a_diagnosis_appears_when_it_is_written(rig, root):
+    assert [c["diagnosis"] for c in rig()["campaigns"]] == [None, None]
+    diagnosed(root / "tuesday")
+    assert rig("verdict=identified")["campaigns"][0]["diagnosis"]["verdict"] == "identified"
+    (root / "tuesday" / "diagnosis" / "diagnosis.json").write_text("{ not JSON")
+    assert rig("verdict=identified")["campaigns"] == []
+
+
+def test_tables_for_people(root, capsys):
+    diagnosed(root / "tuesday")
+    for words, parts in (
+        ([], ("monday", "identified: ripple.motor", "first try", "2 of 2 campaigns")),
+        (["--runs"], ("monday/a.mcap", "complete")),
+        (["--compare"], ("error of motor", "0.002 to 0.001 N m", "tuesday")),
+    ):
+        assert main(["campaigns", "--root", str(root), *words]) == 0
+        out = capsys.readouterr().out
+        for part in parts:
+            assert part in out
+
+
+def test_the_page_of_one_campaign_is_opened(root, capsys, monkeypatch):
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+    assert main(["campaigns", "--open", "--root", str(root)]) == 2
+    assert "2 campaigns match" in capsys.readouterr().err
+    assert main(["campaigns", "tuesday", "--open", "--root", str(root)]) == 2
+    assert "--diagnose" in capsys.readouterr().err
+    diagnosed(root / "tuesday")
+    page = root / "tuesday" / "diagnosis" / "diagnosis.html"
+    page.write_text("<!doctype html>")
+    assert main(["campaigns", "tuesday", "--open", "--root", str(root)]) == 0
+    assert opened == [page.resolve().as_uri()]
+
+
+def test_diagnosing_again_keeps_page_and_result_where_the_list_finds_them(root, monkeypatch):
+    asked = {}
+    monkeypatch.setattr(
+        "rig.cli.diagnose.diagnose", lambda path, **options: asked.update(path=path, **options)
+    )
+    assert main(["campaigns", "monday", "--diagnose", "--root", str(root)]) == 0
+    folder = root / "monday"
+    assert asked == {
+        "path": folder,
+        "report": folder / "diagnosis",
+        "json_out": folder / "diagnosis" / "diagnosis.json",
+    }
+
+
+def test_a_folder_that_is_not_there_is_an_error(tmp_path, capsys):
+    assert main(["campaigns", "--root", str(tmp_path / "absent")]) == 2
+    assert "--root" in capsys.readouterr().err
+
+
+def test_each_folder_of_campaigns_has_its_own_index(tmp_path):
+    assert default_index(tmp_path / "a") != default_index(tmp_path / "b")

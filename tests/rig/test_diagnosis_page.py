@@ -1,0 +1,245 @@
+"""The page of a diagnosis: what it contains, and how it behaves in a real browser."""
+
+import io
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from estimation.diagnosis.result import VERDICTS
+from rig.output.provenance import Provenance
+from rig.output.render import write_report
+from rig.reports.diagnosis import page
+from tests.rig.browser import Opened, chromium
+from tests.rig.diagnosed import RIPPLE_N_M, example
+from tests.rig.test_reports import Page
+
+pytestmark = pytest.mark.integration
+
+BEFORE, AFTER = (0xC4, 0x50, 0x0B), (0x0B, 0x6F, 0xB3)
+"""Colours of the declared model and of the one with the findings, on a light page."""
+
+PROFILE = "#chart-residual-1-1"
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    return example()
+
+
+@pytest.fixture(scope="module")
+def text(diagnosed):
+    return page(*diagnosed, Provenance.now(1))
+
+
+@pytest.fixture(scope="module")
+def path(text, tmp_path_factory):
+    return write_report(tmp_path_factory.mktemp("page") / "diagnosis.html", text)
+
+
+def test_the_signals_have_the_errors_of_the_models_they_come_from(diagnosed):
+    _, shown = diagnosed
+    (equation,) = shown.values()
+    run = equation.held_out[0]
+    before, after = ((run.measured - one)[run.counted] for one in (run.before, run.after))
+    assert before.mean() == pytest.approx(0.0, abs=1e-12)
+    assert after.std() < 0.5 * before.std()
+    assert before.std() == pytest.approx(RIPPLE_N_M / np.sqrt(2), rel=0.3)
+    assert [t.effect.id for t in equation.added] == ["ripple.motor"]
+
+
+def test_the_answer_and_the_check_come_before_evidence_and_method(text):
+    body = text[text.index("<body>") :]
+    order = ["unmodelled effect", "What to check", "feel the cogging", "Evidence", "Method and"]
+    places = [body.index(words) for words in order]
+    assert places == sorted(places)
+
+
+def test_a_page_is_well_formed_escaped_and_refers_to_nothing_outside(text):
+    found = Page(text)
+    assert found.open == []
+    assert len(found.ids) == len(set(found.ids))
+    assert all(reference.startswith("#") for reference in found.references)
+    assert "A note with a &lt;tag&gt; &amp; more." in text
+
+
+def test_every_chart_has_its_numbers_and_a_description_for_a_screen_reader(text):
+    data = re.search(r'id="charts">(.*?)</script>', text, re.DOTALL)
+    charts = json.loads(data[1])
+    assert [c["name"] for c in charts] == ["residual-1-1", "errors-motor", "time-motor"]
+    for chart in charts:
+        assert f'aria-label="{chart["title"]}' in text
+    assert text.count("Numbers of this chart") == 2
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_a_page_with_something_to_do(diagnosed, verdict):
+    whole, shown = diagnosed
+    if verdict == "nothing_missing":
+        found = replace(whole, findings=())
+    else:
+        named = verdict in ("identified", "one_of")
+        family = "ripple.motor" if named else "unknown"
+        one = replace(whole.findings[0], verdict=verdict, family=family)
+        found = replace(whole, findings=(one,))
+    written = page(found, shown, Provenance.now(1))
+    assert Page(written).open == []
+    section = written[written.index("What to check</h2>") : written.index("Next experiment")]
+    said = {"identified": "cogging", "one_of": "cogging", "nothing_missing": "Nothing"}
+    assert said.get(verdict, "ecord the next experiment") in section
+
+
+def test_a_page_without_signals_still_has_the_errors(diagnosed):
+    whole, _ = diagnosed
+    written = page(whole, {}, Provenance.now(1))
+    assert "errors-motor" in written
+    assert "chart-time-motor" not in written
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def opened(browser, path):
+    one = Opened(browser, path)
+    yield one
+    one.close()
+
+
+def picture(opened: Opened, selector: str) -> np.ndarray:
+    """Return what is drawn there, shape (height, width, 3), 0 to 255."""
+    image = imread(io.BytesIO(opened.page.locator(selector).screenshot()))
+    return np.asarray(image[..., :3]) * 255
+
+
+def share(image: np.ndarray, colour: tuple[int, int, int]) -> float:
+    """Return the share of the pixels that have nearly a colour."""
+    return float(np.mean(np.abs(image - np.array(colour)).max(axis=-1) < 24))
+
+
+def test_a_browser_opens_it_without_an_error_or_a_request(opened, path):
+    assert opened.page.locator(".lead").first.is_visible()
+    assert "ripple.motor" in opened.page.locator(".lead").first.inner_text()
+    assert opened.messages == []
+    assert opened.requests == [path.as_uri()]
+
+
+def test_hovering_shows_values_with_their_units(opened):
+    chart = opened.page.locator(PROFILE)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    label = opened.page.locator(f"{PROFILE} .hoverlayer")
+    label.locator("text=mN m").first.wait_for()
+    words = label.text_content()
+    assert "rad" in words
+    assert "declared model" in words
+    assert "with the findings" in words
+
+
+def test_dragging_zooms_and_a_button_shows_the_whole_range_again(opened):
+    chart = opened.page.locator(PROFILE)
+    chart.scroll_into_view_if_needed()
+    span = f"(() => {{ const r = document.querySelector('{PROFILE}').layout.xaxis.range;"
+    span += " return r[1] - r[0]; })()"
+    whole = opened.page.evaluate(span)
+    box = chart.bounding_box()
+    middle = box["y"] + box["height"] / 2
+    opened.page.mouse.move(box["x"] + 0.4 * box["width"], middle)
+    opened.page.mouse.down()
+    opened.page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
+    opened.page.mouse.up()
+    opened.page.wait_for_function(f"{span} < {0.5 * whole}")
+    opened.page.locator("figure", has=chart).get_by_role("button", name="Whole range").click()
+    opened.page.wait_for_function(f"{span} > {0.9 * whole}")
+
+
+def test_sides_and_runs_can_be_hidden(opened):
+    both = picture(opened, PROFILE)
+    assert min(share(both, BEFORE), share(both, AFTER)) > 1e-4
+    opened.page.get_by_label("declared", exact=True).uncheck()
+    alone = picture(opened, PROFILE)
+    assert share(alone, BEFORE) == 0
+    assert share(alone, AFTER) > 1e-4
+    lines = f"document.querySelectorAll('{PROFILE} .scatterlayer .trace').length"
+    shown = opened.page.evaluate(lines)
+    opened.page.locator("input[data-run]").first.uncheck()
+    opened.page.wait_for_function(f"{lines} < {shown}")
+
+
+def test_another_run_can_be_chosen(opened):
+    first = picture(opened, "#chart-time-motor")
+    opened.page.get_by_role("combobox", name="Run").select_option(index=1)
+    assert np.any(picture(opened, "#chart-time-motor") != first)
+
+
+def test_light_and_dark_follow_the_system_and_the_button(browser, path):
+    for scheme, dark in (("light", False), ("dark", True)):
+        opened = Opened(browser, path, color_scheme=scheme)
+        for turned in (False, True):
+            image = picture(opened, PROFILE)
+            ground = float(np.median(image))
+            assert (ground < 60) == (dark != turned)
+            assert (ground > 200) != (dark != turned)
+            # what is drawn stands out from the ground
+            assert np.mean(np.abs(image - ground).max(axis=-1) > 90) > 0.005
+            opened.page.get_by_role("button", name="Light or dark").click()
+        opened.close()
+
+
+def test_nothing_is_wider_than_a_phone(browser, path):
+    opened = Opened(browser, path, viewport={"width": 380, "height": 800})
+    assert opened.page.evaluate("document.scrollingElement.scrollWidth") <= 380
+    assert opened.page.locator(PROFILE).bounding_box()["width"] <= 380
+    opened.close()
+
+
+@pytest.mark.parametrize("form", ["svg", "png"])
+def test_a_chart_is_exported_with_its_title_and_axes(opened, form, tmp_path):
+    figure = opened.page.locator("figure", has=opened.page.locator(PROFILE))
+    with opened.page.expect_download() as waiting:
+        figure.get_by_role("button", name=form.upper()).click()
+    file = tmp_path / waiting.value.suggested_filename
+    waiting.value.save_as(file)
+    assert file.name == f"residual-1-1.{form}"
+    if form == "png":
+        image = imread(file)
+        assert image.shape[1] >= 2000  # fit for print
+        assert image[0, 0, :3] == pytest.approx([1, 1, 1])
+        return
+    words = " ".join(re.findall(r">([^<]+)</text>", file.read_text()))
+    for part in ("motor: residual over motor angle", "residual, mN m", "within a turn, rad"):
+        assert part in words
+
+
+def test_it_prints_light_without_controls_and_within_the_paper(browser, path):
+    opened = Opened(browser, path, color_scheme="dark")
+    opened.page.emulate_media(media="print")
+    opened.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    opened.page.wait_for_function(
+        f"document.querySelector('{PROFILE} svg').getBoundingClientRect().width < 700"
+    )
+    assert float(np.median(picture(opened, PROFILE))) > 200
+    assert not opened.page.locator(".tools").first.is_visible()
+    assert not opened.page.locator("#scheme").is_visible()
+    assert opened.page.pdf(format="A4").startswith(b"%PDF")
+    opened.close()
+
+
+def test_a_screen_reader_finds_the_result_the_charts_and_the_controls(opened):
+    tree = opened.page.locator("body").aria_snapshot()
+    for part in (
+        'heading "Diagnosis: one of several effects" [level=1]',
+        'heading "What to check" [level=2]',
+        'img "motor: residual over motor angle',
+        'checkbox "declared" [checked]',
+        'columnheader "before"',
+        'button "SVG"',
+    ):
+        assert part in tree

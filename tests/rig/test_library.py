@@ -1,0 +1,143 @@
+"""`import rig` as a library: light to import, and the notebook of the documentation runs."""
+
+import json
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rig
+from estimation.campaign import Campaign
+from estimation.recording import Recording
+
+NOTEBOOK = Path(__file__).parents[2] / "docs" / "notebook.ipynb"
+TIME_S = np.arange(0, 8, 0.01)
+
+
+def axis_run(name: str, phase: float) -> Recording:
+    position = 0.2 * np.sin(2 * TIME_S + phase) + 0.1 * np.sin(0.7 * TIME_S)
+    speed = np.gradient(position, TIME_S)
+    noise = np.random.default_rng(int(10 * phase)).normal(0, 0.05, TIME_S.size)
+    force = 2.0 * np.gradient(speed, TIME_S) + 5.0 * speed + noise
+    return Recording(name, TIME_S, {"axis_position_m": position, "drive_force_n": force})
+
+
+MODEL = """
+schema = "rig.model/1"
+name = "axis"
+balance = "motor"
+target = "drive_force_n"
+[processing]
+cutoff_hz = 20.0
+[[effects]]
+id = "inertia.missing"
+channels.acceleration = "axis_acceleration_m_s2"
+[[effects]]
+id = "friction.viscous"
+channels.speed = "axis_velocity_m_s"
+"""
+
+
+@pytest.fixture
+def campaign() -> Campaign:
+    return Campaign.of(axis_run(f"{k}", 0.7 * k) for k in range(6))
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "axis.toml"
+    path.write_text(MODEL)
+    (found,) = rig.declared(path)
+    return found
+
+
+def test_importing_loads_neither_numpy_nor_a_command():
+    code = "import rig, sys; print(sorted(m for m in sys.modules if m in ('numpy', 'rig.cli')))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_name_is_there_and_documented():
+    for name in rig.__all__:
+        value = getattr(rig, name)
+        assert name == "__version__" or value.__doc__
+    with pytest.raises(AttributeError, match="no attribute 'fitt'"):
+        rig.fitt  # noqa: B018
+
+
+def test_a_prediction_has_an_interval_that_covers(campaign, model):
+    fitted = rig.fit(campaign, model)
+    assert rig.held_out(campaign, model, folds=3).rmse < 0.05
+    run = campaign.runs[0].recording()
+    found = rig.predict(fitted, run)
+    assert found.unit == "N"
+    inside = (found.low < run["drive_force_n"]) & (run["drive_force_n"] < found.high)
+    # the interval is of the filtered signal; the measured one has the sensor's noise on top
+    assert np.mean(np.abs(found.value - run["drive_force_n"]) < 0.2) > 0.95
+    assert inside.any()
+    assert rig.predict(fitted, run).value.shape == TIME_S.shape
+
+
+def test_a_table_is_read_by_a_mapping_and_written_as_logs(tmp_path, campaign):
+    run = campaign.runs[0].recording()
+    table = tmp_path / "run.csv"
+    rows = zip(1e3 * TIME_S, 1e3 * run["axis_position_m"], strict=True)
+    table.write_text("t,x\n" + "".join(f"{t},{x}\n" for t, x in rows))
+    columns = {"time_s": "t:ms", "axis_position_m": "x:mm"}
+    read = rig.read(table, columns=columns, runs={"lap_s": 4.0})
+    assert len(read) == 2
+    rig.save(read, tmp_path / "logs")
+    again = rig.read(tmp_path / "logs")
+    first = again.runs[0].recording()
+    np.testing.assert_allclose(first["axis_position_m"], run["axis_position_m"][:400])
+
+
+def test_two_campaigns_are_compared(campaign, model):
+    found = rig.compare(campaign, campaign, [model])
+    assert found.changes == ()
+
+
+def test_tables_of_other_libraries_where_asked(campaign):
+    pd = pytest.importorskip("pandas")
+    table = rig.to_pandas(campaign)
+    assert isinstance(table, pd.DataFrame)
+    assert list(table.columns) == ["run", "time_s", "axis_position_m", "drive_force_n"]
+    assert len(table) == 6 * TIME_S.size
+
+
+def test_a_data_set_has_units(campaign):
+    pytest.importorskip("xarray")
+    found = rig.to_xarray(campaign.runs[0].recording())
+    assert found["drive_force_n"].attrs["units"] == "N"
+
+
+def test_a_plot_has_a_panel_a_channel_and_the_estimate(campaign, model):
+    run = campaign.runs[0].recording()
+    assert len(rig.plot(run).axes) == 2
+    (panel,) = rig.plot(run, rig.fit(campaign, model)).axes
+    assert [line.get_label() for line in panel.get_lines()] == ["measured", "axis"]
+
+
+def test_another_package_of_the_same_name_is_named(tmp_path):
+    (tmp_path / "estimation").mkdir()
+    (tmp_path / "estimation" / "__init__.py").write_text("")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import rig; rig.read"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert str(tmp_path / "estimation") in done.stderr
+    assert "an environment of its own" in done.stderr
+
+
+@pytest.mark.integration
+def test_the_notebook_runs(tmp_path):
+    cells = json.loads(NOTEBOOK.read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    script = tmp_path / "notebook.py"
+    script.write_text("\n".join(code))
+    names = runpy.run_path(str(script))
+    (finding,) = names["found"].findings
+    assert finding.family == "ripple.motor"
+    assert names["error"].rmse > names["found"].errors["motor"].after
