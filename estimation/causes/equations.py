@@ -155,7 +155,7 @@ class Equation:
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).
 
-        Where a column is not proportional to its channel, small noise is no guide: it is left out.
+        A column that is not proportional to its channel is left out.
         """
         parts = []
         for term in self.terms:
@@ -368,7 +368,7 @@ def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:
 def _noise_width(values: FloatArray) -> float:
     """Return the standard deviation of a reading's white noise, the steps of its counts included.
 
-    Third differences hold noise and hardly any motion; a tenth of the blocks, in which a contact or
+    Third differences hold noise and nearly no motion; a tenth of the blocks, in which a contact or
     a reversal may show, is left out. At rest counts stand still, in motion they are noise.
     """
     squared = np.diff(values, 3) ** 2 / 20.0

@@ -132,7 +132,7 @@ class Source:
         return found
 
     def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return what its readings' noise does to its columns, where its memory may follow that."""
+        """Return the change of its columns by noise, where its memory may follow that."""
         if not self.follows:
             return {}
         readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}

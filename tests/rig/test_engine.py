@@ -81,7 +81,7 @@ class Losing:
 
 @pytest.mark.filterwarnings("ignore")  # the cluster's own, about sizes and versions
 def test_a_cluster_that_loses_a_worker_gives_the_same_experiment(cluster) -> None:
-    recordings = on_one_clock(record(HiddenEffect("motor_ripple", 0.5)))
+    recordings = on_one_clock(record(HiddenEffect("motor_ripple", 1.0)))
     found = answer(recordings, [MOTOR], split(recordings, 0))
     unsure = replace(found.diagnosis.findings[0], verdict="one_of")
     found = replace(found, diagnosis=replace(found.diagnosis, findings=(unsure,)))
