@@ -22,7 +22,6 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.traces import EquationTraces, traces
 
 Stage = Callable[[str], None]
 
@@ -46,14 +45,6 @@ class Diagnosed:
     sealed: Sealed
     seen: tuple[str, ...]
     looked_at: tuple[Recording, ...]
-
-    def traces(self) -> dict[str, EquationTraces]:
-        """Return the signals of each equation's runs, for a page to draw."""
-        declared, found = self.answer.layout.equations, self.answer.models
-        return {
-            m.balance: traces(self.recordings, self.sealed, declared[m.balance].model, m)
-            for m in found
-        }
 
 
 def remember(done: Diagnosed, ledger: Ledger) -> None:
