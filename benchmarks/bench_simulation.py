@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.ratio import Ratio, best_of
-from drivers.teensy.guard import Drive
+from drivers.teensy.logic import Drive
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect

@@ -16,7 +16,7 @@ os.environ["RIG_CONFIG"] = "simulated"
 import pytest
 from hypothesis import settings
 
-from drivers.teensy.firmware_fake import firmware_library
+from drivers.teensy.core import firmware_library
 
 # compiled code is slow the first time, and a deadline is a wall clock in disguise
 settings.register_profile("no deadline", deadline=None)

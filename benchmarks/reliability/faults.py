@@ -1,9 +1,10 @@
 """Faults of every kind in random order: is each detected and named, and how fast is the rig safe.
 
-The board is the logger's fake, which answers with the firmware's bytes; its inputs are a script, so
-that every sample says by its counts at which tick it was taken. Everything is in virtual time.
+The board is the firmware's core; its inputs are a script, so that every sample says by its counts
+at which tick it was taken. Everything is in virtual time.
 """
 
+import ctypes
 import random
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -12,22 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.errors import DriverError
 from drivers.registry import fakes
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import PythonBoard
-from drivers.teensy.guard import (
-    COLUMNS,
-    CURRENT,
-    DISTAL,
-    ENGAGED,
-    JAW,
-    MOTOR,
-    PROXIMAL,
-    SPINDLE,
-    Drive,
-    run_ticks,
-)
 from drivers.teensy.protocol import MISSING, STATUS_ARMED, Trip
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
@@ -35,6 +25,9 @@ from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
 from rig.errors import RigError
 
+MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)
+"""Columns of the board's inputs."""
+_TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
 STEP_S = 0.005
 MOTOR_STEP = 3
 HOLD = np.full(1500, -1.0)
@@ -52,8 +45,18 @@ SAFETY = {
 }
 """Times short enough to wait for, a thousand times over."""
 
-ASIDE = {
-    "stalled": {"safety": {"heat_a2_s": 0.5}},
+ONE_BY_ONE = {"gear_ratio": 0, "jaw_ratio": 0}
+"""The script turns its motor and nothing else, so its encoders are not compared."""
+ASIDE: dict[str, dict[str, dict[str, float]]] = {
+    "stalled": {
+        "safety": {"heat_a2_s": 0.5},
+        "plausibility": {
+            "current_window_a": 1000.0,
+            "frozen_current_a": 1000.0,
+            "still_torque_n_m": 1000.0,
+        },
+    },
+    "overheated": {"plausibility": {"current_window_a": 1000.0}},
     "sensor saturated": {"limits": {"proximal_torque_n_m": 2.0}},
 }
 """Where another watch would rightly be faster: it is widened, so that the one meant is tried."""
@@ -81,7 +84,9 @@ class Outcome:
     Attributes:
         kind: What was injected.
         detected: Whether the program noticed.
-        named: Whether it said what it was: the trip's own code, or an error or counter of the link.
+        named: Whether it said what it was: the trip's own code, an error, or counters that rise
+            with this fault of the link alone. Where a protocol does not distinguish two faults,
+            neither is named.
         mis_stamped: Samples whose counts are of another tick than their time stamp says.
         safe_after_s: Virtual time from the fault, less the time it is allowed to last, to the safe
             state; None where the rig rightly goes on.
@@ -97,11 +102,11 @@ class Outcome:
 
 
 class ScriptedRig:
-    """Implements `drivers.teensy.fake.Bench`: the motor counts ticks, sensors make noise.
+    """Implements `drivers.teensy.core.FirmwareBench`: the motor counts ticks, sensors make noise.
 
     Args:
         kind: The sensor fault that strikes; none if not one of `SENSOR_FAULTS`.
-        after_ticks: How long after the first setpoint.
+        after_ticks: How long after arming.
     """
 
     def __init__(self, kind: str, after_ticks: int) -> None:
@@ -109,43 +114,43 @@ class ScriptedRig:
         self._kind = kind
         self._after_ticks = after_ticks
         self._tick = 0
+        self.board: FirmwareBoard | None = None
         self.struck_at: int | None = None
         """Tick at which the fault struck."""
 
-    def advance(
-        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
-    ) -> NDArray[np.int32]:
-        """Run the script; see `drivers.teensy.fake.Bench.advance`."""
-        tick = self._tick + np.arange(ticks)
-        if self.struck_at is None and self._fault and drive.guard[ENGAGED]:
-            self.struck_at = self._tick + self._after_ticks
-        rows = np.zeros((ticks, COLUMNS), np.int32)
-        rows[:, MOTOR] = MOTOR_STEP * tick
-        rows[:, SPINDLE] = 1304
-        for column in (PROXIMAL, DISTAL, CURRENT):
-            rows[:, column] = tick * (7 + column) % 23 - 11
-        if self._fault and self.struck_at is not None:
-            self._strike(rows, tick >= self.struck_at, tick)
-        self._tick += ticks
-        run_ticks(rows, target, load_ma, *drive.arrays)
-        return rows
-
-    def _strike(
-        self, rows: NDArray[np.int32], struck: NDArray[np.bool_], tick: NDArray[np.int64]
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
-        assert self._fault is not None
-        assert self.struck_at is not None
+        """Run the script; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
+        tick = _TICK(tick_address)
+        outputs = np.zeros(2, np.int32)
+        for k in range(ticks):
+            armed = self.board is not None and self.board.in_force
+            if self.struck_at is None and self._fault and armed:
+                self.struck_at = self._tick + self._after_ticks
+            row = self._inputs()
+            self._tick += 1
+            clock_us = (tick_us + 1000 * k) % 2**32
+            tick(board_address, clock_us, row.ctypes.data, outputs.ctypes.data)
+
+    def _inputs(self) -> NDArray[np.int32]:
+        row = np.zeros(7, np.int32)
+        row[MOTOR] = MOTOR_STEP * self._tick
+        row[SPINDLE] = 1304
+        for column in (PROXIMAL, DISTAL, CURRENT):
+            row[column] = self._tick * (7 + column) % 23 - 11
+        if self._fault is None or self.struck_at is None or self._tick < self.struck_at:
+            return row
         _, column, value, _ = self._fault
-        since = (tick - self.struck_at)[struck]
+        since = self._tick - self.struck_at
         if self._kind == "stalled":
-            rows[struck, MOTOR] = MOTOR_STEP * self.struck_at
-            rows[struck, CURRENT] = 560 + since % 5
+            row[MOTOR] = MOTOR_STEP * self.struck_at
+            row[CURRENT] = 560 + since % 5
         elif self._kind == "over-speed":
-            rows[struck, MOTOR] += 700 * (since + 1).astype(np.int32)
-        elif self._kind == "sensor saturated":
-            rows[struck, column] = 32767
+            row[MOTOR] += 700 * (since + 1)
         else:
-            rows[struck, column] = value
+            row[column] = 32767 if value is None else value
+        return row
 
 
 def inject(count: int, seed: int = 0) -> Iterator[Outcome]:
@@ -155,7 +160,9 @@ def inject(count: int, seed: int = 0) -> Iterator[Outcome]:
     order = [kinds[k % len(kinds)] for k in range(count)]
     generator.shuffle(order)
     config = load_config().changed(
-        safety=SAFETY, limits={"proximal_torque_n_m": 0.6, "distal_torque_n_m": 0.4}
+        safety=SAFETY,
+        limits={"proximal_torque_n_m": 0.6, "distal_torque_n_m": 0.4},
+        plausibility=ONE_BY_ONE,
     )
     for kind in order:
         try:
@@ -181,7 +188,8 @@ def _link_fault(kind: str, seed: int) -> Outcome:
     rate_hz = device.channels[0].rate_hz
     for _ in range(30):
         device.read(max(0.1, 2 / rate_hz))
-    before = sum(count for counter, count in device.counters.items() if counter != "frames")
+    earlier = dict(device.counters)
+    before = sum(count for counter, count in earlier.items() if counter != "frames")
     faults.inject(fault, 4, duration_s=max(0.3, 10 / rate_hz))
     said = False
     numbers: list[int] = []
@@ -198,16 +206,23 @@ def _link_fault(kind: str, seed: int) -> Outcome:
             mis_stamped += 1
         numbers += batch.sequence[-1:].tolist()
     after = sum(count for counter, count in device.counters.items() if counter != "frames")
-    detected = after > before or said
+    risen = {name for name, count in device.counters.items() if count > earlier.get(name, 0)}
+    named = said if fault is Fault.DISCONNECT else _is_named(name, fault, risen - EVIDENCE)
     device.close()
-    return Outcome(kind, detected, detected, mis_stamped)
+    return Outcome(kind, after > before or said, named, mis_stamped)
+
+
+def _is_named(device: str, fault: Fault, risen: set[str]) -> bool:
+    """Whether counters belong to this fault, and to no other fault of the device."""
+    names = SAID[device]
+    return bool(risen) and risen <= names[fault] and list(names.values()).count(names[fault]) == 1
 
 
 def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
     """Let a fault strike an armed rig: it must trip with its own code and be safe in time."""
     config = config.changed(**ASIDE.get(kind, {}))
     bench = ScriptedRig(kind, after_ticks)
-    board = PythonBoard(bench)
+    board = bench.board = FirmwareBoard(bench)
     faults = Faults()
     link = FaultyTransport(SimulatedTransport(board, step_s=STEP_S), faults)
     ticks: list[NDArray[np.int64]] = []
@@ -246,7 +261,7 @@ def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
 
 def _after_silence(
     kind: str,
-    board: PythonBoard,
+    board: FirmwareBoard,
     said: str,
     ticks: list[NDArray[np.int64]],
     motors: list[NDArray[np.int64]],

@@ -9,9 +9,12 @@ import numpy as np
 from rig.bench.logger import is_real_time, open_logger
 from rig.bench.session import Session
 from rig.configuration.config import load_config
+from rig.errors import SafetyTripError
 
 PERIOD_S = 4.0
 BLOCK_S = 60.0
+WATCHDOG_S = 0.05
+"""That of the shipped configurations of real rigs."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,7 @@ class Soak:
         processor_ratio: Processor time of this process over real time.
         latency_ms: Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being
             read and converted; None where time is virtual.
+        trip: What ended it before its time; empty for nothing.
     """
 
     where: str
@@ -38,6 +42,7 @@ class Soak:
     elapsed_s: float
     processor_ratio: float
     latency_ms: tuple[float, ...] | None
+    trip: str
 
 
 def soak(config_name: str, duration_s: float, where: str) -> Soak:
@@ -45,24 +50,26 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
     config = load_config(Path(config_name))
     real = is_real_time(config)
     load_a = min(0.2, config.reference_limits.load_command_a)
-    if real:  # what is measured is what gets lost, also when a shared machine is late
-        config = config.changed(safety={"watchdog_s": 1.0})
+    config = config.changed(safety={"watchdog_s": WATCHDOG_S})
     late_ms: list[np.ndarray] = []
-    samples = 0
+    samples, trip = 0, ""
     with Session(config, open_logger(config)) as session:
         next(session.rest(0.5))
         session.settle()
         began_s, busy_s = time.monotonic(), time.process_time()
         start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
         phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
-        for _ in range(max(1, blocks)):
-            grasps = start + 0.3 * (1 - np.cos(phase))
-            for reading in session.play(grasps, np.full(phase.size, load_a)):
-                samples += len(reading)
-                if real:  # the process stamps by the clock this program reads, in 32 bits
-                    now_us = time.monotonic_ns() // 1000
-                    ticks = reading.counts["tick_us"].astype(np.int64)
-                    late_ms.append(((now_us - ticks) % 2**32) / 1000)
+        try:
+            for _ in range(max(1, blocks)):
+                grasps = start + 0.3 * (1 - np.cos(phase))
+                for reading in session.play(grasps, np.full(phase.size, load_a)):
+                    samples += len(reading)
+                    if real:  # the process stamps by the clock this program reads, in 32 bits
+                        now_us = time.monotonic_ns() // 1000
+                        ticks = reading.counts["tick_us"].astype(np.int64)
+                        late_ms.append(((now_us - ticks) % 2**32) / 1000)
+        except SafetyTripError as error:
+            trip = f"{error.what} ({samples / 1000:.0f} s)"
         elapsed_s = time.monotonic() - began_s
         busy_s = time.process_time() - busy_s
         lost, counters = reading.lost, session.counters
@@ -76,4 +83,5 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
         elapsed_s,
         busy_s / elapsed_s,
         tuple(np.percentile(np.concatenate(late_ms), [50, 99, 99.9, 100])) if real else None,
+        trip,
     )

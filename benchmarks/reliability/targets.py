@@ -59,10 +59,10 @@ class Target:
 
 
 def _commands() -> list[bytes]:
-    gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), Limits.widest()
+    gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), Limits()
     payloads = [teensy.encode_command(kind, 7) for kind in teensy.Kind if kind >= 16]
-    payloads += [REFERENCE.encode_arm(8, gains, limits), teensy.encode_ping(9, 10)]
-    payloads.append(REFERENCE.encode_setpoints(9, (np.arange(5), np.arange(5))))
+    payloads += [REFERENCE.encode_arm(8, gains, limits, 7), teensy.encode_ping(9, 10)]
+    payloads.append(REFERENCE.encode_setpoints(9, (np.arange(5), np.arange(5)), 7))
     return [encode_frame(payload) for payload in payloads]
 
 

@@ -40,19 +40,21 @@ class EsconFake:
         """Level of the ready output: low on a fault."""
         return not self.fault
 
-    def tick(self, code: int, enable: bool) -> int:
+    def tick(self, code: int, enable: bool, positive: bool = True) -> int:
         """Let 1 ms pass and return the converter's reading of the actual current.
 
         Args:
             code: Code of the DAC or PWM at the set-value input.
             enable: Level of the enable input.
+            positive: Level of the direction input.
         """
         if enable and not self._asked:
             self.fault = False
         self._asked = enable
         self._enabled_for_s = self._enabled_for_s + 1e-3 if enable else 0.0
         live = self._enabled_for_s > ENABLE_DELAY_S and not self.fault
-        self.current_a = self._obeyed(code) if live else 0.0
+        size_a = self._obeyed(code) if live else 0.0
+        self.current_a = size_a if positive else -size_a
         self._heat_a2_s += 1e-3 * (self.current_a**2 - CONTINUOUS_A**2)
         self._heat_a2_s = max(self._heat_a2_s, 0.0)
         if self._heat_a2_s > PEAK_S * ((3 * CONTINUOUS_A) ** 2 - CONTINUOUS_A**2):
@@ -66,7 +68,7 @@ class EsconFake:
             duty = min(max(duty, LOWEST_DUTY), HIGHEST_DUTY)
         full = wiring.output_v if wiring.kind == "analog" else 1.0
         asked_a = wiring.set_value.current_a(duty * full)
-        return min(max(asked_a, -wiring.limit_a), wiring.limit_a)
+        return min(max(asked_a, 0.0), wiring.limit_a)
 
     def _reading(self) -> int:
         self._random = (self._random * 1103515245 + 12345) % 2**32

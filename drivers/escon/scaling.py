@@ -65,7 +65,8 @@ class EsconWiring:
     """One module at a Teensy.
 
     Attributes:
-        set_value: Voltage or duty of the set-value input, and the current it asks for.
+        set_value: Voltage or duty of the set-value input, and the size of the current it asks for;
+            the sign is that of a direction line, so that a dead set-value wire asks for nothing.
         kind: `analog` for a DAC (Teensy 3.5), `pwm` for a duty (Teensy 4.1).
         read_back: Voltage of the analog output, and the actual current it represents.
         limit_a: Current limit set in ESCON Studio.
@@ -88,7 +89,7 @@ class EsconWiring:
         if not 0 < self.limit_a <= PEAK_A:
             raise SetValueError(f"The module gives up to {PEAK_A:g} A, not {self.limit_a:g} A.")
         low, high = self.input_range
-        for current_a in (-self.limit_a, 0.0, self.limit_a):
+        for current_a in (0.0, self.limit_a):
             wanted = self.set_value.input_of(current_a)
             if not low - 1e-9 <= wanted <= high + 1e-9:
                 raise SetValueError(
@@ -103,7 +104,7 @@ class EsconWiring:
         return (0.0, self.output_v) if self.kind == "analog" else (LOWEST_DUTY, HIGHEST_DUTY)
 
     def output_code(self, current_a: float) -> int:
-        """Return the code of the DAC or PWM that asks for a current.
+        """Return the code of the DAC or PWM that asks for a current of this size.
 
         Raises:
             SetValueError: It is not finite or beyond the limit.
@@ -115,11 +116,11 @@ class EsconWiring:
             )
         top = 2**self.output_bits - 1
         full = self.output_v if self.kind == "analog" else 1.0
-        code: int = math.floor(self.set_value.input_of(current_a) / full * top + 0.5)
+        code: int = math.floor(self.set_value.input_of(abs(current_a)) / full * top + 0.5)
         return code
 
     def current_of_code(self, code: int) -> float:
-        """Return the current a code asks for, A."""
+        """Return the size of the current a code asks for, A."""
         full = self.output_v if self.kind == "analog" else 1.0
         return self.set_value.current_a(code * full / (2**self.output_bits - 1))
 

@@ -49,6 +49,41 @@ _REASONS: dict[int, tuple[str, str]] = {
         "It is not armed: it never was, was disarmed, or its watchdog or a limit tripped.",
         "Look at the status of its samples, then arm it.",
     ),
+    Result.WRONG_SESSION: (
+        "It was armed by another program, or by an earlier command of this one.",
+        "Let only one program move the rig.",
+    ),
+    Result.OLD_SEQUENCE: (
+        "A later command of this program has come before it.",
+        "Look for a link that doubles or re-orders frames.",
+    ),
+    Result.TRIPPED: (
+        "It tripped, or its emergency stop is pressed, and nobody has cleared that.",
+        "Find the cause, then run: rig clear",
+    ),
+    Result.WRONG_TRIP: (
+        "It has tripped over something else.",
+        "Read its trip again, then clear that one.",
+    ),
+    Result.ALREADY_ARMED: (
+        "It is armed already.",
+        "Disarm it first: rig stop",
+    ),
+    Result.TOO_HOT: (
+        "More than half of the heat its motors may take is used up, or it was just started and"
+        " the heat from before is not known.",
+        "Wait; they cool while nothing moves.",
+    ),
+    Result.TOO_FAST: (
+        "A setpoint asks for a motion that is too fast: it is farther from the one before it than"
+        " the motor may turn in a tick.",
+        "Let the trajectory begin where the shaft stands, or slow it down; [safety]"
+        " motor_speed_rad_s is the limit.",
+    ),
+    Result.BEYOND_BOARD: (
+        "A limit or a command is wider than those the board was built with (wiring*.hpp).",
+        "Choose narrower limits. Wider ones need another build of the firmware.",
+    ),
 }
 
 
@@ -85,8 +120,8 @@ class ClockExchange:
 class TeensyLogger:
     """The logger on the other end of a transport. Nothing runs in the background.
 
-    While armed, the board needs a frame every 250 ms: a block of setpoints or a
-    `heartbeat`; otherwise it goes to its safe state.
+    While armed, the board needs a block of setpoints or a `heartbeat` within the time it was armed
+    with; otherwise it goes to its safe state.
 
     Args:
         transport: The way to the board; the logger closes it.
@@ -99,6 +134,7 @@ class TeensyLogger:
         self._continuity = Continuity(self._link.counters)
         self._identity: Identity | None = None
         self._command_number = 0
+        self._session = 0
         self._may_be_armed = False
         self._pings: dict[int, float] = {}
         self.last_exchange: ClockExchange | None = None
@@ -148,7 +184,8 @@ class TeensyLogger:
     def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
         """Put the controllers in force. The motors stay currentless until the first setpoint.
 
-        Clears the queue, the watchdog's and the limits' latches.
+        The board offers a number with which it is armed; only this logger, which arms with it, can
+        then move it or keep it armed.
 
         Args:
             gains: `drivers.teensy.control`'s gains, shape (5,) or (motors, 5).
@@ -158,7 +195,7 @@ class TeensyLogger:
             CommandRefusedError: A gain or a limit is not finite or out of range, or the board
                 tripped at once.
         """
-        self._require_identity()
+        self._session = self.identify().offer
         values = np.atleast_2d(np.asarray(gains, np.float64))
         wanted = (self._profile.motors, len(protocol.GAIN_NAMES))
         if values.shape != wanted:
@@ -166,14 +203,27 @@ class TeensyLogger:
                 f"The controllers have {wanted[0]} x {wanted[1]} gains, not {values.shape}."
             )
         self._may_be_armed = True
-        ack = self._command(Kind.ARM, self._profile.encode_arm(self._number(), values, limits))
+        payload = self._profile.encode_arm(self._number(), values, limits, self._session)
+        ack = self._command(Kind.ARM, payload)
         if not ack.status & protocol.STATUS_ARMED:
             raise CommandRefusedError(
                 f"The board at {self._link.transport.url} was armed and is not any more.",
                 "It tripped before its answer came through.",
-                "Look at the status of its samples, then arm it again.",
+                "Look at the status of its samples, then run: rig clear",
                 Result.NOT_ARMED,
             )
+
+    def clear(self, code: int) -> None:
+        """Clear what the board tripped over first; nothing is armed by it.
+
+        Args:
+            code: The trip that was read and understood; 0 where there is none.
+
+        Raises:
+            CommandRefusedError: It is armed, or has tripped over something else.
+        """
+        self._require_identity()
+        self._command(Kind.CLEAR, protocol.encode_clear(self._number(), code))
 
     def reference(self, counts: Sequence[int]) -> None:
         """Give the encoders their counts at the present place; the board must be at rest.
@@ -226,7 +276,7 @@ class TeensyLogger:
             raise DriverError(f"The fields of the setpoints differ in number: {sizes}.")
         for first in range(0, whole[0].size, self._profile.max_setpoints):
             block = [values[first : first + self._profile.max_setpoints] for values in whole]
-            payload = self._profile.encode_setpoints(self._number(), block)
+            payload = self._profile.encode_setpoints(self._number(), block, self._session)
             self._command(Kind.SETPOINTS, payload)
         return self.queue_free
 
@@ -255,7 +305,7 @@ class TeensyLogger:
         number = self._number()
         self._pings = dict(list(self._pings.items())[-7:])  # a lost pong is not waited for
         self._pings[number] = self._link.transport.now_s
-        self._link.send(protocol.encode_ping(number, number))
+        self._link.send(protocol.encode_ping(number, number, self._session))
 
     def disarm(self) -> None:
         """Take the motors out of force: command 0, load 0, the queue cleared.
@@ -274,7 +324,7 @@ class TeensyLogger:
         self._may_be_armed = False
 
     def trip(self) -> TripReport:
-        """Read the first limit crossed since the board was armed."""
+        """Read the first limit crossed since the board was cleared."""
         question = protocol.encode_command(Kind.TRIP, self._number())
         return self._profile.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
 

@@ -1,13 +1,12 @@
-"""The logger board without a board: it takes and gives the bytes a real one would.
+"""A plain simulated board: it takes and gives the bytes a real one would, and guards nothing.
 
-The bench behind it is physics; this file is the board's logic, block by block instead of tick by
-tick: between two commands everything but a limit is known ahead, so one call of the bench and one
-bulk encode do for as many ticks. `firmware/core/board.hpp` is the implementation that runs tick by
-tick; a test compares the two byte for byte.
+For simulation where there is no compiler. It speaks the whole protocol, sessions and the watchdog
+on the host's silence included, and follows setpoints; limits it takes and does not hold. The board
+with guards is the compiled core (`drivers.teensy.core`).
 
-For simulation only, where there is no compiler. The guards that hold encoders and current against
-one another (trips 15 to 19) are in the compiled core alone: this board takes their limits and does
-not hold them. Its counts have their zeros from the start, and it refuses REFERENCE.
+The bench behind it is physics; between two commands everything is known ahead, so one call of the
+bench and one bulk encode do for as many ticks. Its counts have their zeros from the start, and it
+refuses REFERENCE.
 
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
@@ -21,13 +20,10 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
-from drivers.teensy.control import LIMIT, VELOCITY_FILTER
-from drivers.teensy.guard import REFERENCE_LOGIC
-from drivers.teensy.logic import BoardLogic
+from drivers.teensy.logic import ENGAGED, STATE, BoardLogic, Drive
 from drivers.teensy.protocol import (
     GAIN_NAMES,
     STATUS_ARMED,
-    STATUS_LIMIT_TRIPPED,
     STATUS_QUEUE_DRY,
     STATUS_REFERENCED,
     STATUS_SATURATED,
@@ -36,31 +32,17 @@ from drivers.teensy.protocol import (
     Ack,
     Kind,
     Result,
+    Trip,
 )
-from drivers.teensy.watches import (
-    ENGAGED,
-    SILENT_US,
-    STATE,
-    TICKS,
-    TRIP_CHANNEL,
-    TRIP_CODE,
-    TRIP_LATE_US,
-    TRIP_LIMIT,
-    TRIP_TICK,
-    TRIP_VALUE,
-    WATCHDOG_US,
-    is_in_force,
-)
+from drivers.teensy.reference_board import REFERENCE_LOGIC
 
-MAX_GAIN = 1e6
-FULL_SCALE_E4 = 10_000
 TRANSMIT_CAPACITY = 65536
 """Bytes the board holds for a host that does not read."""
 FRAME_OVERHEAD = 4
 """Bytes of a sample frame on the wire beyond its payload."""
-_LATCHED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED | 0xFF << TRIP_SHIFT
 _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
+_SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT
 
 
 class Bench(Protocol):
@@ -71,14 +53,14 @@ class Bench(Protocol):
         """Run closed-loop ticks and return the counts, a row a tick, int32.
 
         Within a tick: the inputs are sampled into a row, the profile's tick
-        (`drivers.teensy.guard.drive_tick`, `drivers.teensy.grasper_guard.grasper_tick`) holds the
-        limits and writes what the motors get behind them, the physics moves a tick. The result does
-        not depend on how ticks are divided between calls.
+        (`drivers.teensy.reference_board.drive_tick`, `drivers.teensy.grasper_board.grasper_tick`)
+        writes what the motors get behind them, the physics moves a tick. The result does not depend
+        on how ticks are divided between calls.
 
         Args:
             ticks: Number of ticks.
             plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
-                state, gains and limits, changed in place.
+                `Drive`, changed in place.
         """
         ...
 
@@ -119,11 +101,16 @@ class PythonBoard:
         self._streaming = False
         self._sequence = 0
         self._last_command: tuple[Kind, int, Result] | None = None
+        self._offers = 0
+        self._session: int | None = None
+        self._newest = 0
         self._host_heard = False
         self._last_host_us = 0
+        self._watchdog_us = protocol.WATCHDOG_US
         self._now_us = 0
-        self._drive = logic.idle()
+        self._drive = Drive.idle(self._profile.motors)
         self._trip_us = 0
+        self._silent_us = 0
         self._queued = np.empty((0, len(self._profile.setpoint_names)), np.int32)
         self._held: NDArray[np.int32] | None = None
 
@@ -146,25 +133,13 @@ class PythonBoard:
                 self._host_heard = False
             block = min(ticks, self._ticks_to_watchdog())
             if block == 0:
-                self._drive.guard[SILENT_US] = self._silent_us
+                self._trip_us = self._next_tick_us
+                self._silent_us = (self._next_tick_us - self._last_host_us) % 2**32
+                self._release()
+                self._drive.state[STATE] = _SILENT
                 block = ticks
             self._run_block(block)
             ticks -= block
-
-    @property
-    def in_force(self) -> bool:
-        """Whether the motors are, or may any moment be, given current."""
-        return is_in_force(self._state)
-
-    def set_clock(self, tick_us: int) -> None:
-        """Set the board's clock of the next tick, where ticks are not regular."""
-        self._next_tick_us = tick_us % 2**32
-
-    def skip(self, ticks: int) -> None:
-        """Let ticks pass without running them: samples are lost, setpoints are played."""
-        self._queued = self._queued[ticks:]
-        self._sequence = (self._sequence + ticks) % 2**32
-        self._next_tick_us = (self._next_tick_us + ticks * self._profile.tick_us) % 2**32
 
     # commands
 
@@ -172,7 +147,6 @@ class PythonBoard:
         """Carry out one command and queue its answer."""
         if len(payload) < protocol.HEADER_DTYPE.itemsize:
             return
-        self._host_heard = True
         number, sequence = payload[1], int.from_bytes(payload[2:4], "little")
         try:
             kind, _, fields = self._profile.decode(payload)
@@ -180,12 +154,20 @@ class PythonBoard:
             self._acknowledge(number, sequence, _reason_of_refusal(payload))
             return
         if kind is Kind.HELLO:
-            self._last_command = None
-            reply = protocol.encode_hello_reply(
-                sequence, self._serial, self._protocol_hash, self._build_hash, status=self._status
+            self._last_command = None  # another program, whose numbers begin anew
+            self._send(
+                protocol.encode_hello_reply(
+                    sequence,
+                    self._serial,
+                    self._protocol_hash,
+                    self._build_hash,
+                    status=self._status,
+                    offer=self._offer,
+                )
             )
-            self._send(reply)
         elif kind is Kind.PING:
+            if self._is_live(int(fields["session"])) and self._is_new(sequence):
+                self._hear(sequence)
             self._send(protocol.encode_pong(sequence, int(fields["token"]), self._now_us))
         elif kind is Kind.TRIP:
             self._send(self._trip_report(sequence))
@@ -198,22 +180,18 @@ class PythonBoard:
             self._acknowledge(kind, sequence, result)
 
     def _trip_report(self, sequence: int) -> bytes:
-        guard = self._drive.guard.tolist()
-        return protocol.encode_trip_report(
-            sequence,
-            guard[TRIP_CODE],
-            guard[TRIP_CHANNEL],
-            guard[TRIP_VALUE],
-            guard[TRIP_LIMIT],
-            self._trip_us,
-            guard[TRIP_LATE_US],
-        )
+        silent_us = self._silent_us
+        numbers = (silent_us, self._watchdog_us, self._trip_us, silent_us)
+        code = self._trip
+        return protocol.encode_trip_report(sequence, code, 255, *(numbers if code else (0,) * 4))
 
     def _execute(self, kind: Kind, payload: bytes, fields: np.void) -> Result:
         if kind is Kind.ARM:
             return self._arm(fields)
         if kind is Kind.SETPOINTS:
-            return self._take_setpoints(payload)
+            return self._take_setpoints(payload, fields)
+        if kind is Kind.CLEAR:
+            return self._clear(int(fields["code"]))
         if kind is Kind.START:
             self._sequence = 0
             self._streaming = True
@@ -221,40 +199,75 @@ class PythonBoard:
             self._streaming = False
         elif kind is Kind.DISARM:
             self._release()
+            self._last_command = None
         else:
             return Result.UNKNOWN_KIND
         return Result.OK
 
     def _arm(self, fields: np.void) -> Result:
+        session = int(fields["session"])
+        if session != self._offer:
+            return Result.WRONG_SESSION
+        self._offers += 1  # an attempt spends it
+        if self._trip:
+            return Result.TRIPPED
+        if self._armed:
+            return Result.ALREADY_ARMED
         names = self._profile.arm.names or ()
-        values = [fields[name] for name in names[len(protocol.HEADER_FIELDS) :]]
+        values = [fields[name] for name in names[len(protocol.SESSION_FIELDS) :]]
         split = self._profile.motors * len(GAIN_NAMES)
         gains = np.array(values[:split], np.float64).reshape(self._profile.motors, -1)
-        limits = [int(value) for value in values[split:]]
-        if not (np.abs(gains) <= MAX_GAIN).all():  # NaN fails too
+        patience_us = int(fields["watchdog_us"])
+        if not protocol.MIN_WATCHDOG_US <= patience_us <= protocol.MAX_WATCHDOG_US:
             return Result.BAD_VALUE
-        weight, command = gains[:, VELOCITY_FILTER], gains[:, LIMIT]
-        if not ((weight >= 0) & (weight <= 1) & (command >= 0) & (command <= FULL_SCALE_E4)).all():
-            return Result.BAD_VALUE
-        if not self._logic.limits_are_valid(limits):
+        if not np.isfinite(gains).all():
             return Result.BAD_VALUE
         self._release()
-        self._drive = self._logic.armed(gains, limits)
-        self._trip_us = 0
+        self._watchdog_us = patience_us
+        self._session = session
+        self._drive = Drive.armed(gains, engaged=False)
+        self._hear(int(fields["sequence"]))
         return Result.OK
 
-    def _take_setpoints(self, payload: bytes) -> Result:
+    def _take_setpoints(self, payload: bytes, fields: np.void) -> Result:
+        sequence = int(fields["sequence"])
         if not self._armed:
             return Result.NOT_ARMED
+        if not self._is_live(int(fields["session"])):
+            return Result.WRONG_SESSION
+        if not self._is_new(sequence):
+            return Result.OLD_SEQUENCE
         block = self._profile.decode_setpoints(payload)
-        columns = [block[name].astype(np.int64) for name in self._profile.setpoint_names]
-        setpoints = np.stack(columns, axis=1)
-        if not self._logic.allows(setpoints, self._drive.limits):
-            return Result.BAD_VALUE
         if len(block) > self._queue_free():
             return Result.QUEUE_FULL
-        self._queued = np.concatenate((self._queued, setpoints.astype(np.int32)))
+        columns = [block[name].astype(np.int32) for name in self._profile.setpoint_names]
+        self._queued = np.concatenate((self._queued, np.stack(columns, axis=1)))
+        self._hear(sequence)
         return Result.OK
+
+    def _clear(self, code: int) -> Result:
+        if self._armed:
+            return Result.ALREADY_ARMED
+        if code != self._trip:
+            return Result.WRONG_TRIP
+        self._release()
+        self._drive.state[STATE] = 0
+        return Result.OK
+
+    @property
+    def _offer(self) -> int:
+        """The session the next arming needs; only that it changes matters in a simulation."""
+        return 0x5E55_0000 + self._offers
+
+    def _is_live(self, session: int) -> bool:
+        return self._armed and session == self._session
+
+    def _is_new(self, sequence: int) -> bool:
+        return 0 < (sequence - self._newest) % 2**16 < 2**15
+
+    def _hear(self, sequence: int) -> None:
+        self._newest = sequence
+        self._host_heard = True
 
     def _queue_free(self) -> int:
         return protocol.QUEUE_CAPACITY - len(self._queued)
@@ -274,7 +287,7 @@ class PythonBoard:
 
     @property
     def _state(self) -> int:
-        return int(self._drive.guard[STATE])
+        return int(self._drive.state[STATE])
 
     @property
     def _status(self) -> int:
@@ -282,42 +295,34 @@ class PythonBoard:
         return self._state | STATUS_REFERENCED
 
     @property
-    def _armed(self) -> bool:
-        return bool(self._state & STATUS_ARMED)
+    def _trip(self) -> int:
+        return self._state >> TRIP_SHIFT
 
     @property
-    def _silent_us(self) -> int:
-        return (self._next_tick_us - self._last_host_us) % 2**32
+    def _armed(self) -> bool:
+        return bool(self._state & STATUS_ARMED)
 
     def _ticks_to_watchdog(self) -> int:
         """Return how many ticks may run before the one on which the watchdog trips."""
         if not self._armed:
             return 2**31
-        patience_us = int(self._drive.limits[WATCHDOG_US])
-        return max(0, (patience_us - self._silent_us) // self._profile.tick_us + 1)
+        silent_us = (self._next_tick_us - self._last_host_us) % 2**32
+        return max(0, (self._watchdog_us - silent_us) // self._profile.tick_us + 1)
 
     def _release(self) -> None:
-        """Take the motors out of force and forget what was to be done; the latches stay."""
-        self._drive.guard[STATE] &= _LATCHED
-        self._forget()
-
-    def _forget(self) -> None:
+        """Take the motors out of force and forget what was to be done; a trip stays."""
+        self._drive.state[STATE] &= ~STATUS_ARMED
+        self._drive.state[ENGAGED] = 0
+        self._session = None
         self._queued = self._queued[:0]
         self._held = None
 
     def _run_block(self, ticks: int) -> None:
-        """Run ticks in which no command comes and the watchdog trips on the first if at all."""
-        guard = self._drive.guard
+        """Run ticks in which no command comes and the watchdog does not trip."""
         engaged = self._armed and (self._held is not None or len(self._queued) > 0)
-        guard[ENGAGED] = engaged
-        tripped, first_tick = int(guard[TRIP_CODE]), int(guard[TICKS])
+        self._drive.state[ENGAGED] = engaged
         setpoints, fed = self._play(ticks, engaged)
         counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), self._drive)
-        if guard[TRIP_CODE] != tripped:
-            since_us = self._profile.tick_us * (int(guard[TRIP_TICK]) - first_tick)
-            self._trip_us = (self._next_tick_us + since_us) % 2**32
-        if not self._armed:
-            self._forget()
         status = counts[:, self._logic.status_column].astype(np.uint16)
         dry = (status[fed:] & STATUS_ARMED) != 0
         status[fed:][dry] |= STATUS_QUEUE_DRY

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from drivers.device import Device
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.guard import (
+from drivers.teensy.logic import Drive
+from drivers.teensy.reference_board import (
     COLUMNS,
     CURRENT,
     DISTAL,
@@ -15,7 +16,6 @@ from drivers.teensy.guard import (
     MOTOR,
     PROXIMAL,
     SPINDLE,
-    Drive,
     run_ticks,
 )
 from drivers.transport.faulty import Faults, FaultyTransport

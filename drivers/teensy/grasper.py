@@ -10,14 +10,14 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.profile import Profile, choice_is_valid
+from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import (
     CHOICE_NAMES,
     GAIN_NAMES,
-    HEADER_FIELDS,
     LOOP_LIMIT_NAMES,
     MOTOR_LIMIT_NAMES,
     SAMPLE_FIELDS,
+    SESSION_FIELDS,
     TOP,
     WATCHDOG_US,
     SafeState,
@@ -50,7 +50,7 @@ GRASPER = Profile(
         "dropped u2",
     ),
     layout(
-        *HEADER_FIELDS,
+        *SESSION_FIELDS,
         *(f"{name}_{k} f8" for k in MOTORS for name in GAIN_NAMES),
         *(f"{name}_{k} i4" for k in MOTORS for name in AXIS_LIMIT_NAMES),
         *(f"{name} i4" for name in CHOICE_NAMES),
@@ -77,6 +77,7 @@ class AxisLimits:
         stall_current: Current, counts, above which a motor that does not move is stalled.
         stall_motion: Motor counts within which it does not move.
         max_motor_jump: This and the following as in `drivers.teensy.reference.Limits`.
+        max_target_step: Farthest a setpoint may be from the one before it, counts.
         max_following: Farthest the motor may be from its target, counts.
         following_ticks: How long it may be farther.
         full_scale_current: Measured current at a command of 10000, counts; 0 for no comparison.
@@ -97,6 +98,7 @@ class AxisLimits:
     stall_current: int = TOP
     stall_motion: int = 0
     max_motor_jump: int = TOP
+    max_target_step: int = TOP
     max_following: int = TOP
     following_ticks: int = TOP
     full_scale_current: int = 0
@@ -105,18 +107,6 @@ class AxisLimits:
     current_ticks: int = 1
     frozen_current: int = TOP
     frozen_motion: int = 0
-
-    @property
-    def valid(self) -> bool:
-        """Whether a board takes them."""
-        sizes = (self.max_current, self.max_force, self.max_motor_step, self.continuous_current)
-        return (
-            min(*sizes, self.i2t, self.stall_current, self.stall_motion) >= 0
-            and min(self.max_motor_jump, self.max_following, self.max_current_error) >= 0
-            and min(self.frozen_current, self.frozen_motion) >= 0
-            and min(self.following_ticks, self.current_ticks) >= 1
-            and self.min_motor <= self.max_motor
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,25 +118,24 @@ class GrasperLimits:
         stall_ticks: How long a motor may be stalled.
         saturated_ticks: How long a current or force count may be at the end of its range.
         stale_ticks: How long a current or force count may stay the same.
+        dry_ticks: How long the last setpoint is held while none follows.
         watchdog_us: How long the host may be silent, 5 ms to 1 s.
         safe_state: `SafeState`; what is held, holds all three motors.
         hold_command_e4: Largest command while holding, 1e-4 of full scale.
+        hold_ticks: How long it may hold; then it releases.
     """
 
     axes: tuple[AxisLimits, AxisLimits, AxisLimits] = (AxisLimits(), AxisLimits(), AxisLimits())
     stall_ticks: int = TOP
     saturated_ticks: int = TOP
     stale_ticks: int = TOP
+    dry_ticks: int = TOP
     watchdog_us: int = WATCHDOG_US
     safe_state: int = SafeState.RELEASE
     hold_command_e4: int = 0
-
-    @property
-    def valid(self) -> bool:
-        """Whether a board accepts them, by the same checks as in the firmware."""
-        return all(axis.valid for axis in self.axes) and choice_is_valid(self)
+    hold_ticks: int = TOP
 
     def as_array(self) -> NDArray[np.int64]:
-        """Return the limits in the order of the wire, shape (60,)."""
+        """Return the limits in the order of the wire, shape (65,)."""
         axes, *choice = astuple(self)
         return np.array([*(limit for axis in axes for limit in axis), *choice], np.int64)

@@ -1,27 +1,57 @@
-"""What a board in Python does a tick, by profile: the part of `PythonBoard` that differs."""
+"""What the plain simulated board does a tick, by profile."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.teensy.control import new_state
 from drivers.teensy.profile import Profile
+from drivers.teensy.protocol import STATUS_ARMED
+
+STATE, ENGAGED = range(2)
+"""Places in a drive's state, int64: the board's status, and whether a setpoint has come."""
 
 
-class BoardDrive(Protocol):
-    """All that a tick of a board needs and changes, besides its inputs.
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """All that a tick of the plain board needs and changes, besides its inputs.
 
     Attributes:
-        guard: State of the guard, int64, beginning with the places of `drivers.teensy.watches`.
-        limits: The limits it was armed with, in the order of the wire, int64.
+        state: See the places above; changed in place.
+        control_state: State of each controller, shape (motors, 4); changed in place.
+        gains: Gains of each controller, shape (motors, 5).
     """
 
+    state: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
+    control_state: NDArray[np.float64] = field(default_factory=lambda: new_state()[None])
+    gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros((1, 5)))
+
+    @classmethod
+    def armed(cls, gains: Any, engaged: bool = True) -> "Drive":
+        """Return a drive that was just armed; `engaged` where a setpoint has come already.
+
+        Args:
+            gains: Shape (5,) or (motors, 5).
+            engaged: Whether its motors move.
+        """
+        rows = np.atleast_2d(np.array(gains, np.float64))
+        state = np.array((STATUS_ARMED, engaged), np.int64)
+        return cls(state, np.stack([new_state()] * len(rows)), rows)
+
+    @classmethod
+    def idle(cls, motors: int = 1) -> "Drive":
+        """Return a drive that was never armed."""
+        drive = cls.armed(np.zeros((motors, 5)), engaged=False)
+        drive.state[STATE] = 0
+        return drive
+
     @property
-    def guard(self) -> NDArray[np.int64]: ...  # noqa: D102
-    @property
-    def limits(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """Return state, controllers and gains, as a profile's tick takes them."""
+        return self.state, self.control_state, self.gains
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,20 +60,12 @@ class BoardLogic:
 
     Attributes:
         profile: The profile.
-        idle: Gives a drive that was never armed.
-        armed: Gives a drive just armed with gains, shape (motors, 5), and limits.
-        limits_are_valid: Whether a board takes these limits, in the order of the wire.
-        allows: Whether limits allow all of some setpoints, shape (n, fields).
         columns: Field of a sample to the column of a tick's row.
         status_column: Column of the board's state.
         converted: Column of each converter to the counts from which down and up it is saturated.
     """
 
     profile: Profile
-    idle: Callable[[], BoardDrive]
-    armed: Callable[[NDArray[np.float64], Sequence[int]], BoardDrive]
-    limits_are_valid: Callable[[Sequence[int]], bool]
-    allows: Callable[[NDArray[np.int64], NDArray[np.int64]], bool]
     columns: Mapping[str, int]
     status_column: int
     converted: Mapping[int, tuple[int, int]]

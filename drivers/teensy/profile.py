@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 from drivers.teensy.protocol import (
     ACK_DTYPE,
+    CLEAR_DTYPE,
     HEADER_DTYPE,
     HELLO_REPLY_DTYPE,
-    MAX_WATCHDOG_US,
-    MIN_WATCHDOG_US,
     PING_DTYPE,
     PONG_DTYPE,
     REFERENCE_DTYPE,
+    SESSION_DTYPE,
     STATUS_ARMED,
     STATUS_HOLDING,
     STATUS_LIMIT_TRIPPED,
@@ -35,10 +35,8 @@ from drivers.teensy.protocol import (
     VERSION,
     Kind,
     Result,
-    SafeState,
     Trip,
     TripReport,
-    encode_command,
 )
 
 
@@ -48,33 +46,6 @@ class ArmLimits(Protocol):
     def as_array(self) -> NDArray[np.int64]:
         """Return the limits in the order of the wire."""
         ...
-
-
-class SafetyChoice(Protocol):
-    """How the limits of every profile end, see `drivers.teensy.protocol.CHOICE_NAMES`."""
-
-    @property
-    def stall_ticks(self) -> int: ...  # noqa: D102
-    @property
-    def saturated_ticks(self) -> int: ...  # noqa: D102
-    @property
-    def stale_ticks(self) -> int: ...  # noqa: D102
-    @property
-    def watchdog_us(self) -> int: ...  # noqa: D102
-    @property
-    def safe_state(self) -> int: ...  # noqa: D102
-    @property
-    def hold_command_e4(self) -> int: ...  # noqa: D102
-
-
-def choice_is_valid(choice: SafetyChoice) -> bool:
-    """Whether a board accepts these, as `SafetyChoice::valid` of the firmware."""
-    return (
-        min(choice.stall_ticks, choice.saturated_ticks, choice.stale_ticks) >= 1
-        and MIN_WATCHDOG_US <= choice.watchdog_us <= MAX_WATCHDOG_US
-        and choice.safe_state in (SafeState.RELEASE, SafeState.HOLD)
-        and 0 <= choice.hold_command_e4 <= 10_000
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +61,8 @@ class Profile:
         setpoint: Layout of one setpoint, one field a motor.
         max_setpoints: Most setpoints in one frame.
         motors: Motors with a position loop.
-        input_names: Fields of a sample a trip can name, in the order of its channel number.
+        input_names: Fields of a sample that the guards check, in the order of their channels.
+        further_names: Fields a trip can name behind those.
     """
 
     name: str
@@ -102,6 +74,7 @@ class Profile:
     max_setpoints: int
     motors: int
     input_names: tuple[str, ...]
+    further_names: tuple[str, ...] = ()
 
     @property
     def rate_hz(self) -> float:
@@ -125,12 +98,13 @@ class Profile:
             Kind.HELLO: HEADER_DTYPE,
             Kind.ARM: self.arm,
             Kind.START: HEADER_DTYPE,
-            Kind.SETPOINTS: HEADER_DTYPE,
+            Kind.SETPOINTS: SESSION_DTYPE,
             Kind.STOP: HEADER_DTYPE,
             Kind.DISARM: HEADER_DTYPE,
             Kind.PING: PING_DTYPE,
             Kind.TRIP: HEADER_DTYPE,
             Kind.REFERENCE: REFERENCE_DTYPE,
+            Kind.CLEAR: CLEAR_DTYPE,
         }
 
     @cached_property
@@ -156,17 +130,22 @@ class Profile:
         """CRC-32 of `text`; the board's hello carries its own."""
         return zlib.crc32(self.text.encode())
 
-    def encode_arm(self, sequence: int, gains: NDArray[np.float64], limits: ArmLimits) -> bytes:
+    def encode_arm(
+        self, sequence: int, gains: NDArray[np.float64], limits: ArmLimits, session: int
+    ) -> bytes:
         """Return the payload of the arm command; gains motor after motor."""
-        fields = (VERSION, Kind.ARM, sequence, *gains.ravel().tolist(), *limits.as_array().tolist())
-        return np.array(fields, self.arm).tobytes()
+        values = (*gains.ravel().tolist(), *limits.as_array().tolist())
+        return np.array((VERSION, Kind.ARM, sequence, session, *values), self.arm).tobytes()
 
-    def encode_setpoints(self, sequence: int, columns: Sequence[NDArray[Any]]) -> bytes:
+    def encode_setpoints(
+        self, sequence: int, columns: Sequence[NDArray[Any]], session: int
+    ) -> bytes:
         """Return the payload of one block of setpoints: a column a field, each of shape (n,)."""
         block = np.empty(len(columns[0]), self.setpoint)
         for name, values in zip(self.setpoint_names, columns, strict=True):
             block[name] = values
-        return encode_command(Kind.SETPOINTS, sequence) + block.tobytes()
+        head = np.array((VERSION, Kind.SETPOINTS, sequence, session), SESSION_DTYPE)
+        return head.tobytes() + block.tobytes()
 
     def decode(self, payload: bytes) -> tuple[Kind, int, np.void]:
         """Return kind, sequence and fields of any frame but a sample.
@@ -194,7 +173,7 @@ class Profile:
 
     def decode_setpoints(self, payload: bytes) -> NDArray[np.void]:
         """Return the setpoints of a block, shape (n,), fields as in `setpoint`."""
-        return np.frombuffer(payload, self.setpoint, offset=HEADER_DTYPE.itemsize)
+        return np.frombuffer(payload, self.setpoint, offset=SESSION_DTYPE.itemsize)
 
     def decode_trip_report(self, fields: np.void) -> TripReport:
         """Return the crossed limit that a board reports.
@@ -203,11 +182,12 @@ class Profile:
             FrameError: The reported reason is unknown.
         """
         code, channel = int(fields["code"]), int(fields["channel"])
+        named = self.input_names + self.further_names
         if code not in Trip.__members__.values():
             raise FrameError(f"A board tripped for the unknown reason {code}.")
         return TripReport(
             code=Trip(code),
-            channel=self.input_names[channel] if channel < len(self.input_names) else "",
+            channel=named[channel] if channel < len(named) else "",
             value=int(fields["value"]),
             limit=int(fields["limit"]),
             tick_us=int(fields["tick_us"]),

@@ -39,6 +39,7 @@ class Kind(IntEnum):
     PING = 22
     TRIP = 23
     REFERENCE = 24
+    CLEAR = 25
 
 
 STATUS_ARMED = 1
@@ -48,9 +49,9 @@ STATUS_WATCHDOG_TRIPPED = 8
 STATUS_LIMIT_TRIPPED = 16
 STATUS_HOLDING = 32
 STATUS_REFERENCED = 64
-"""Bits of the board's state, in every sample and every acknowledgement. A trip stays until arm."""
+"""Bits of the board's state, in every sample and every acknowledgement. Trips stay until clear."""
 TRIP_SHIFT = 8
-"""The high byte of the state is the `Trip` that came first, until arm."""
+"""The high byte of the state is the `Trip` that came first, until clear."""
 
 
 class Trip(IntEnum):
@@ -76,6 +77,8 @@ class Trip(IntEnum):
     CURRENT_MISMATCH = 17
     ENCODER_JUMP = 18
     ENCODER_FROZEN = 19
+    QUEUE_RAN_DRY = 20
+    EMERGENCY_STOP = 21
 
 
 class SafeState(IntEnum):
@@ -99,6 +102,14 @@ class Result(IntEnum):
     WRONG_VERSION = 6
     NOT_REFERENCED = 7
     NOT_AT_REST = 8
+    WRONG_SESSION = 9
+    OLD_SEQUENCE = 10
+    TRIPPED = 11
+    WRONG_TRIP = 12
+    ALREADY_ARMED = 13
+    TOO_HOT = 14
+    BEYOND_BOARD = 15
+    TOO_FAST = 16
 
 
 def layout(*fields: str) -> np.dtype[np.void]:
@@ -110,6 +121,8 @@ def layout(*fields: str) -> np.dtype[np.void]:
 
 
 HEADER_FIELDS = ("version u1", "kind u1", "sequence u2")
+SESSION_FIELDS = (*HEADER_FIELDS, "session u4")
+"""How what only the host that armed may send begins: arm, setpoints and ping."""
 SAMPLE_FIELDS = ("version u1", "kind u1", "status u2", "sequence u4", "tick_us u4")
 """How every sample begins; it ends with `dropped`, the frames the board could not queue."""
 HEADER_DTYPE = layout(*HEADER_FIELDS)
@@ -121,9 +134,11 @@ HELLO_REPLY_DTYPE = layout(
     "serial S24",
     "boot u4",
     "status u2",
+    "offer u4",
 )
 ACK_DTYPE = layout(*HEADER_FIELDS, "command u1", "result u1", "status u2", "queue_free u2")
 PONG_DTYPE = layout(*HEADER_FIELDS, "token u8", "tick_us u4")
+SESSION_DTYPE = layout(*SESSION_FIELDS)
 GAIN_NAMES = ("kp", "ki", "kd", "velocity_filter", "limit")
 """Of one position loop."""
 MOTOR_LIMIT_NAMES = (
@@ -136,6 +151,7 @@ MOTOR_LIMIT_NAMES = (
 """What is watched over time of every motor with a position loop."""
 LOOP_LIMIT_NAMES = (
     "max_motor_jump",
+    "max_target_step",
     "max_following",
     "following_ticks",
     "full_scale_current",
@@ -150,19 +166,34 @@ CHOICE_NAMES = (
     "stall_ticks",
     "saturated_ticks",
     "stale_ticks",
+    "dry_ticks",
     "watchdog_us",
     "safe_state",
     "hold_command_e4",
+    "hold_ticks",
 )
 """How the limits of every profile end: how long each watch lasts, and what a tripped board does."""
-PING_DTYPE = layout(*HEADER_FIELDS, "token u8")
+LEAST_LIMITS = ("min_spindle", "min_jaw", "min_motor")
+"""Limits that are the stricter the larger they are."""
+HIGHEST_LIMITS = ("max_spindle", "max_jaw", "max_motor")
+"""The other ends, which may be negative; all other limits are sizes, the stricter the smaller."""
+FIXED_LIMITS = (
+    *("full_scale_current", "motor_per_turn", "spindle_per_turn", "jaw_per_turn", "torque_e3"),
+)
+"""What a rig is built like: a board that holds such a number takes no other."""
+FREE_LIMITS = (
+    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "safe_state"),
+)
+"""What a host may choose on any board."""
+PING_DTYPE = layout(*SESSION_FIELDS, "token u8")
+CLEAR_DTYPE = layout(*HEADER_FIELDS, "code u1")
 REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4")
 """Counts of each encoder at the present place, in the order of a sample."""
 TRIP_REPORT_DTYPE = layout(
     *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
 
-FIRMWARE_VERSION = 0x000400
+FIRMWARE_VERSION = 0x000500
 """Version of the firmware that goes with this program: major, minor, patch, one byte each."""
 
 
@@ -172,7 +203,7 @@ TOP = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class TripReport:
-    """What a board tripped over first since it was armed.
+    """What a board tripped over first since it was cleared.
 
     Attributes:
         code: What it was.
@@ -202,8 +233,20 @@ class Identity:
     """CRC-32 of the sources the firmware was built from; 0 where it was not built."""
     boot: int = 0
     """Number of this start of the board; it changes with every reset."""
-    referenced: bool = False
-    """Whether its counts have their zeros."""
+    status: int = 0
+    """State of the board."""
+    offer: int = 0
+    """The session the board takes at the next arming; it changes with every arming."""
+
+    @property
+    def referenced(self) -> bool:
+        """Whether its counts have their zeros."""
+        return bool(self.status & STATUS_REFERENCED)
+
+    @property
+    def trip(self) -> int:
+        """Code of what it tripped over and nobody has cleared; 0 for nothing."""
+        return self.status >> TRIP_SHIFT
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,9 +278,17 @@ def encode_command(kind: Kind, sequence: int) -> bytes:
     return np.array((VERSION, kind, sequence), HEADER_DTYPE).tobytes()
 
 
-def encode_ping(sequence: int, token: int) -> bytes:
-    """Return the payload of a clock ping; `token` comes back in the pong."""
-    return np.array((VERSION, Kind.PING, sequence, token), PING_DTYPE).tobytes()
+def encode_ping(sequence: int, token: int, session: int = 0) -> bytes:
+    """Return the payload of a clock ping; `token` comes back in the pong.
+
+    Only one with the session that armed is a sign of life to the board's watchdog.
+    """
+    return np.array((VERSION, Kind.PING, sequence, session, token), PING_DTYPE).tobytes()
+
+
+def encode_clear(sequence: int, code: int) -> bytes:
+    """Return the payload of the command that clears a trip, by the trip's code."""
+    return np.array((VERSION, Kind.CLEAR, sequence, code), CLEAR_DTYPE).tobytes()
 
 
 def encode_reference(sequence: int, counts: Sequence[int]) -> bytes:
@@ -252,6 +303,7 @@ def encode_hello_reply(
     build_hash: int = 0,
     boot: int = 1,
     status: int = STATUS_REFERENCED,
+    offer: int = 0,
 ) -> bytes:
     """Return the payload of the answer to a hello."""
     fields = (
@@ -264,6 +316,7 @@ def encode_hello_reply(
         serial.encode()[:24],
         boot,
         status,
+        offer,
     )
     return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
 
@@ -305,7 +358,8 @@ def decode_identity(fields: np.void) -> Identity:
         protocol_hash=int(fields["protocol_hash"]),
         build_hash=int(fields["build_hash"]),
         boot=int(fields["boot"]),
-        referenced=bool(fields["status"] & STATUS_REFERENCED),
+        status=int(fields["status"]),
+        offer=int(fields["offer"]),
     )
 
 

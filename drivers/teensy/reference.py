@@ -8,14 +8,14 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.profile import Profile, choice_is_valid
+from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import (
     CHOICE_NAMES,
     GAIN_NAMES,
-    HEADER_FIELDS,
     LOOP_LIMIT_NAMES,
     MOTOR_LIMIT_NAMES,
     SAMPLE_FIELDS,
+    SESSION_FIELDS,
     TOP,
     WATCHDOG_US,
     SafeState,
@@ -53,6 +53,8 @@ LIMIT_NAMES = (
     "max_spindle",
     "min_jaw",
     "max_jaw",
+    "continuous_load_ma",
+    "load_i2t",
     *MOTOR_LIMIT_NAMES,
     *LOOP_LIMIT_NAMES,
     "motor_per_turn",
@@ -69,7 +71,7 @@ LIMIT_NAMES = (
     *CHOICE_NAMES,
 )
 ARM_DTYPE = layout(
-    *HEADER_FIELDS, *(f"{name} f8" for name in GAIN_NAMES), *(f"{name} i4" for name in LIMIT_NAMES)
+    *SESSION_FIELDS, *(f"{name} f8" for name in GAIN_NAMES), *(f"{name} i4" for name in LIMIT_NAMES)
 )
 SETPOINT_DTYPE = layout("target i4", "load_ma i2")
 INPUT_NAMES = ("motor", "spindle", "jaw", "proximal", "distal", "current")
@@ -85,6 +87,7 @@ REFERENCE = Profile(
     max_setpoints=100,
     motors=1,
     input_names=INPUT_NAMES,
+    further_names=("load_ma",),
 )
 
 
@@ -92,7 +95,7 @@ REFERENCE = Profile(
 class Limits:
     """Limits that the board checks on every sample while armed, in counts.
 
-    What has a default is not held unless it is given.
+    One that is not given is not held.
 
     Attributes:
         max_current: Largest size of the measured current, counts of 1 mA.
@@ -103,6 +106,8 @@ class Limits:
         max_spindle: Highest spindle count.
         min_jaw: Lowest jaw count.
         max_jaw: Highest jaw count.
+        continuous_load_ma: Load setpoint that warms the load motor no further, mA.
+        load_i2t: Heat above it that the load motor can take, mA^2 s.
         max_motor_step: Fastest motor, counts a tick, in three ticks on end.
         continuous_current: Current that warms the motor no further, counts.
         i2t: Heat above it that the motor can take, counts^2 s: the integral of the measured current
@@ -110,6 +115,8 @@ class Limits:
         stall_current: Current, counts, above which a motor that does not move is stalled.
         stall_motion: Motor counts within which it does not move.
         max_motor_jump: Farthest the motor's count may go in one tick.
+        max_target_step: Farthest a setpoint may be from the one before it, counts; the first after
+            arming may be `max_following` from where the shaft stands.
         max_following: Farthest the spindle may be from its target, counts.
         following_ticks: How long it may be farther.
         full_scale_current: Measured current at a command of 10000, counts, signed; 0 where current
@@ -136,26 +143,31 @@ class Limits:
         stall_ticks: How long it may be stalled.
         saturated_ticks: How long a torque or current count may be at the end of its range.
         stale_ticks: How long a torque or current count may stay the same.
+        dry_ticks: How long the last setpoint is held while none follows.
         watchdog_us: How long the host may be silent, 5 ms to 1 s.
         safe_state: `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor;
             any other crossing releases whatever is asked for.
         hold_command_e4: Largest command while holding, 1e-4 of full scale.
+        hold_ticks: How long it may hold; then it releases.
     """
 
-    max_current: int
-    max_load_ma: int
-    max_proximal: int
-    max_distal: int
-    min_spindle: int
-    max_spindle: int
+    max_current: int = TOP
+    max_load_ma: int = TOP
+    max_proximal: int = TOP
+    max_distal: int = TOP
+    min_spindle: int = -TOP - 1
+    max_spindle: int = TOP
     min_jaw: int = -TOP - 1
     max_jaw: int = TOP
+    continuous_load_ma: int = TOP
+    load_i2t: int = TOP
     max_motor_step: int = TOP
     continuous_current: int = TOP
     i2t: int = TOP
     stall_current: int = TOP
     stall_motion: int = 0
     max_motor_jump: int = TOP
+    max_target_step: int = TOP
     max_following: int = TOP
     following_ticks: int = TOP
     full_scale_current: int = 0
@@ -178,34 +190,12 @@ class Limits:
     stall_ticks: int = TOP
     saturated_ticks: int = TOP
     stale_ticks: int = TOP
+    dry_ticks: int = TOP
     watchdog_us: int = WATCHDOG_US
     safe_state: int = SafeState.RELEASE
     hold_command_e4: int = 0
-
-    @classmethod
-    def widest(cls) -> "Limits":
-        """Return limits that nothing can cross: for a board that moves nothing real."""
-        return cls(TOP, TOP, TOP, TOP, -TOP - 1, TOP)
-
-    @property
-    def valid(self) -> bool:
-        """Whether a board accepts them, as `Limits::valid` in the firmware."""
-        sizes = (
-            *(self.max_current, self.max_load_ma, self.max_proximal, self.max_distal),
-            *(self.max_motor_step, self.continuous_current, self.i2t),
-            *(self.stall_current, self.stall_motion),
-            *(self.max_motor_jump, self.max_following, self.max_current_error),
-            *(self.frozen_current, self.frozen_motion, self.max_twist, self.max_stretch),
-            *(self.max_spindle_jump, self.max_jaw_jump, self.max_still_torque),
-        )
-        return (
-            min(sizes) >= 0
-            and min(self.following_ticks, self.current_ticks) >= 1
-            and self.min_spindle <= self.max_spindle
-            and self.min_jaw <= self.max_jaw
-            and choice_is_valid(self)
-        )
+    hold_ticks: int = TOP
 
     def as_array(self) -> NDArray[np.int64]:
-        """Return the limits in the order of the wire, shape (39,)."""
+        """Return the limits in the order of the wire, shape (44,)."""
         return np.array(astuple(self), np.int64)

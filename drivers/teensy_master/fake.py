@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from drivers.device import Device
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import COLUMNS, GRASPER_LOGIC, INPUTS, GrasperDrive, run_ticks
+from drivers.teensy.grasper_board import COLUMNS, GRASPER_LOGIC, INPUTS, run_ticks
+from drivers.teensy.logic import Drive
 from drivers.teensy_master.driver import TeensyMaster
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
@@ -26,7 +27,7 @@ class TurnedByHand:
         one: NDArray[np.int32],
         two: NDArray[np.int32],
         three: NDArray[np.int32],
-        drive: GrasperDrive,
+        drive: Drive,
     ) -> NDArray[np.int32]:
         """Return the rows of the next ticks; commands move nothing."""
         rows = np.zeros((ticks, COLUMNS), np.int32)

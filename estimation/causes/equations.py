@@ -155,8 +155,7 @@ class Equation:
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).
 
-        A column that is not proportional to its channel is left out: small noise is not a guide
-        there.
+        A column that is not proportional to its channel is left out.
         """
         parts = []
         for term in self.terms:

@@ -49,7 +49,7 @@ class Function:
         return KNOTS_ALONE if len({*self.variables} - {"velocity_sign"}) == 1 else KNOTS
 
     def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return the effect of its readings' noise on its columns: nothing that counts."""
+        """Return the change of its columns by the noise of its readings: none that counts."""
         return {}
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:

@@ -22,7 +22,7 @@ def add_instruments(layout: Layout, train: Sequence[str]) -> None:
     """Add to every run the efforts of every equation, predicted without that equation's sensors.
 
     A prediction stands in for a reading where it is the better of the two: where its discrepancy
-    to the reading is not larger than the equation's residual, which holds the reading's noise. Else
+    to the reading is at most the equation's residual, which holds the reading's noise. Else
     a target is replaced by its own equation's estimate if that is quieter.
 
     Args:

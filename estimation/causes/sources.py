@@ -133,7 +133,7 @@ class Source:
         return found
 
     def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return the effect of its readings' noise on its columns, if its memory may follow it."""
+        """Return the change of its columns by noise, where its memory may follow that."""
         if not self.follows:
             return {}
         readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}

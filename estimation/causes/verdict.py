@@ -18,7 +18,7 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
-from estimation.causes.search import Candidate, Found, Scored, search
+from estimation.causes.search import Candidate, Found, Scored, posterior, search
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
@@ -169,17 +169,15 @@ def answer(
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
     """Return the posterior over families of one slot, the likeliest first."""
-    scores = np.array([s.score for s in ranked])
-    weights = np.exp(numbers.sharpness * (scores - scores.max()))
-    weights /= weights.sum()
     shares: dict[str, float] = {}
     best: dict[str, Scored] = {}
-    for scored, weight in zip(ranked, weights, strict=True):
+    for scored, weight in zip(ranked, posterior(ranked, numbers), strict=True):
         family = scored.candidate.cause.family
         shares[family] = shares.get(family, 0.0) + float(weight)
         best.setdefault(family, scored)
     return sorted(
-        (Probability(f, share, best[f]) for f, share in shares.items()), key=lambda p: -p.share
+        (Probability(f, share, best[f]) for f, share in shares.items() if share > 0.0),
+        key=lambda p: -p.share,
     )
 
 

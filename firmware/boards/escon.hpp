@@ -19,7 +19,7 @@ struct EsconLine {
 };
 
 struct EsconWiring {
-    EsconLine set_value;
+    EsconLine set_value;  // of the size of a current; its sign is a line of its own
     double set_full;  // V of the DAC's full scale; 1 for a duty
     EsconLine read_back;
     double adc_full_v;
@@ -29,15 +29,19 @@ struct EsconWiring {
 
     // Never beyond the limit, whatever was commanded.
     std::int32_t code(double current_a) const {
-        const double within = current_a > limit_a ? limit_a : current_a < -limit_a ? -limit_a : current_a;
-        const double asked = std::isfinite(within) ? within : 0.0;
+        const double size = std::fabs(current_a);
+        const double asked = std::isfinite(current_a) ? (size < limit_a ? size : limit_a) : 0.0;
         const double top = static_cast<double>((1 << output_bits) - 1);
         return static_cast<std::int32_t>(std::floor(set_value.input(asked) / set_full * top + 0.5));
     }
 
-    // Actual current in counts of 1 mA, as the logger's frames carry it.
+    // Actual current in counts of 1 mA, as the logger's frames carry it. A converter at its end has not measured:
+    // that is the end of the field, which the guards find.
     std::int32_t milliampere(std::int32_t reading) const {
-        const double top = static_cast<double>((1 << adc_bits) - 1);
+        const std::int32_t last = (1 << adc_bits) - 1;
+        if (reading <= 0) return INT16_MIN;
+        if (reading >= last) return INT16_MAX;
+        const double top = static_cast<double>(last);
         return static_cast<std::int32_t>(
             std::floor(1000 * read_back.current(reading * adc_full_v / top) + 0.5));
     }

@@ -7,6 +7,7 @@
 //   std::size_t read(std::uint8_t* out, std::size_t room);  bytes from the host, without waiting
 //   std::size_t write(const std::uint8_t*, std::size_t);    takes what it can without waiting
 //   void feed();                                           keeps the chip's own watchdog from resetting it
+//   bool stopped();                                        whether an emergency stop is asked for
 //   class Lock;                                            keeps the tick out while it lives
 #pragma once
 
@@ -21,14 +22,19 @@ namespace rig {
 template <class Profile, class Hardware, std::size_t TransmitCapacity>
 class App {
   public:
+    using Settings = typename Profile::Settings;
+
     App(Hardware& hardware, const char* serial) : hardware_(hardware), board_(serial) {}
 
-    // Before the first tick; see Board::booted.
-    void begin(std::uint32_t boot, bool referenced = false) { board_.booted(boot, referenced); }
+    // Before the first tick; see Board::booted and Board::limit_to.
+    void begin(std::uint32_t boot, const Settings& own, bool simulated = false) {
+        board_.booted(boot, simulated);
+        board_.limit_to(own);
+    }
 
     // Once every Profile::kTickUs, from the sampling timer.
     void tick(std::uint32_t tick_us) {
-        hardware_.drive(board_.tick(tick_us, hardware_.sample()));
+        hardware_.drive(board_.tick(tick_us, hardware_.sample(), hardware_.stopped()));
         if (liveness_.ticked()) hardware_.feed();
     }
     void tick() { tick(hardware_.now_us()); }
@@ -37,10 +43,7 @@ class App {
     void exchange() {
         std::uint8_t bytes[kChunk];
         const std::size_t received = hardware_.read(bytes, kChunk);
-        if (received != 0) {
-            const typename Hardware::Lock lock;
-            board_.receive(bytes, received);
-        }
+        board_.template receive<typename Hardware::Lock>(bytes, received);
         if (first_ == last_) fill();
         if (first_ < last_) first_ += hardware_.write(waiting_ + first_, last_ - first_);
         liveness_.turned();
@@ -48,11 +51,14 @@ class App {
 
   private:
     static constexpr std::size_t kChunk = 512;
+    static constexpr std::size_t kPiece = 64;  // what is copied while the tick is kept out
 
     void fill() {
-        const typename Hardware::Lock lock;
-        first_ = 0;
-        last_ = board_.transmit(waiting_, kChunk);
+        first_ = last_ = 0;
+        for (std::size_t got = 1; got != 0 && last_ < kChunk; last_ += got) {
+            const typename Hardware::Lock lock;
+            got = board_.transmit(waiting_ + last_, kPiece);
+        }
     }
 
     Hardware& hardware_;

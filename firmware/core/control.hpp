@@ -26,6 +26,9 @@ struct Gains {
         for (double* gain : {&kp, &ki, &kd, &velocity_filter, &limit}) *gain = reader.f64();
     }
 
+    // Whether the largest command is no larger than the board's own.
+    bool within(const Gains& own) const { return limit <= own.limit; }
+
     // False for NaN too: no such number ever reaches a set-point.
     bool valid() const {
         for (double gain : {kp, ki, kd, velocity_filter, limit}) {
@@ -45,6 +48,11 @@ class Controller {
     // From now on no command is larger, to hold rather than to follow.
     void limit_to(double command) {
         if (command < gains_.limit) gains_.limit = command;
+    }
+
+    // See MotorGuard::late.
+    void late(std::int32_t motor, std::int64_t ticks) {
+        previous_motor_ = motor - (motor - previous_motor_) / static_cast<double>(ticks);
     }
 
     // One tick; returns the command in ticks of 1e-4 of full scale.

@@ -13,8 +13,6 @@ struct PairLimits {
     std::int32_t second_per_turn = 0;  // either 0 where the two are not compared
     std::int32_t twist_e6 = 0;         // counts of the first, signed, for 1e6 counts of torque
     std::int32_t window = 0;           // counts of the first, from end to end
-
-    bool valid() const { return window >= 0; }
 };
 
 class EncoderPair {

@@ -100,27 +100,39 @@ class FrameReceiver {
     bool overlong_ = false;
 };
 
+// A short payload as it goes over the wire, with its delimiter.
+struct Frame {
+    static constexpr std::size_t kMostPayload = 64;  // more than the longest a board sends
+
+    Frame(const std::uint8_t* payload, std::size_t payload_size) {
+        std::uint8_t body[kMostPayload + kCrcSize];
+        for (std::size_t i = 0; i < payload_size; ++i) body[i] = payload[i];
+        const std::uint16_t crc = crc16(payload, payload_size);
+        body[payload_size] = static_cast<std::uint8_t>(crc & 0xFF);
+        body[payload_size + 1] = static_cast<std::uint8_t>(crc >> 8);
+        size = cobs_encode(body, payload_size + kCrcSize, bytes);
+        bytes[size++] = 0;
+    }
+
+    std::uint8_t bytes[kMostPayload + kCrcSize + 2];
+    std::size_t size;
+};
+
 // Bytes that wait for the host, whole frames only: one that does not fit is dropped and counted.
 template <std::size_t Capacity>
 class FrameTransmitter {
   public:
-    void send(const std::uint8_t* payload, std::size_t size) {
-        std::uint8_t body[kMaxBody];
-        for (std::size_t i = 0; i < size; ++i) body[i] = payload[i];
-        const std::uint16_t crc = crc16(payload, size);
-        body[size] = static_cast<std::uint8_t>(crc & 0xFF);
-        body[size + 1] = static_cast<std::uint8_t>(crc >> 8);
-        std::uint8_t wire[kMaxWire + 1];
-        std::size_t length = cobs_encode(body, size + kCrcSize, wire);
-        wire[length++] = 0;
-        if (length > Capacity - used_) {
+    void send(const Frame& frame) {
+        if (frame.size > Capacity - used_) {
             ++dropped_;
             return;
         }
-        for (std::size_t i = 0; i < length; ++i) {
-            ring_[(first_ + used_ + i) % Capacity] = wire[i];
+        std::size_t at = (first_ + used_) % Capacity;
+        for (std::size_t i = 0; i < frame.size; ++i) {
+            ring_[at] = frame.bytes[i];
+            at = at + 1 == Capacity ? 0 : at + 1;
         }
-        used_ += length;
+        used_ += frame.size;
     }
 
     // Gives up to `room` bytes to `out`; returns how many.

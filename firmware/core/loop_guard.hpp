@@ -3,42 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
 
 #include "crossing.hpp"
+#include "limits.hpp"
 
 namespace rig {
 
 constexpr std::int64_t kEnableUs = 20000;  // a motor controller acts within 8 ms of its enable
-
-// In the order of the wire.
-struct LoopLimits {
-    std::int32_t max_jump = 0;            // motor counts in one tick
-    std::int32_t max_following = 0;       // counts of the encoder that is followed
-    std::int32_t following_ticks = 1;     // how long it may be farther
-    std::int32_t full_scale_current = 0;  // counts at a command of 10000, signed; 0 where it is not known
-    std::int32_t current_offset = 0;      // counts at a command of 0
-    std::int32_t max_current_error = 0;   // counts, of the mean over the time below
-    std::int32_t current_ticks = 1;
-    std::int32_t frozen_current = 0;  // counts the current may change while the motor is within
-    std::int32_t frozen_motion = 0;   // so many counts
-
-    void read(Reader& reader) {
-        for (std::int32_t* limit :
-             {&max_jump, &max_following, &following_ticks, &full_scale_current, &current_offset,
-              &max_current_error, &current_ticks, &frozen_current, &frozen_motion}) {
-            *limit = reader.i32();
-        }
-    }
-
-    bool valid() const {
-        for (std::int32_t size : {max_jump, max_following, max_current_error, frozen_current,
-                                  frozen_motion}) {
-            if (size < 0) return false;
-        }
-        return following_ticks >= 1 && current_ticks >= 1;
-    }
-};
 
 // Numbers of the channels a crossing names.
 struct LoopChannels {
@@ -52,6 +23,11 @@ class LoopGuard {
     void prime(std::int32_t motor, std::int32_t current) {
         last_motor_ = anchor_ = motor;
         still_mean_ = anchor_current_ = kFine * current;
+    }
+
+    // See MotorGuard::late.
+    void late(std::int32_t motor, std::int64_t ticks) {
+        last_motor_ = motor - (motor - last_motor_) / ticks;
     }
 
     // What the tick asked for; the next one is held against it.
@@ -68,12 +44,12 @@ class LoopGuard {
     // Mean of the current over some ticks, counts.
     std::int64_t mean_current() const { return still_mean_ / kFine; }
 
-    Crossing check(const LoopLimits& limits, std::int64_t tick_us, std::int32_t followed,
+    Crossing check(const LoopFields& limits, std::int64_t tick_us, std::int32_t followed,
                    std::int32_t motor, std::int32_t current, const LoopChannels& channels) {
         const std::int64_t step = std::int64_t{motor} - last_motor_;
         last_motor_ = motor;
-        if (exceeds(step, limits.max_jump)) {
-            return {kEncoderJump, channels.motor, step, limits.max_jump, 0};
+        if (exceeds(step, limits.max_motor_jump)) {
+            return {kEncoderJump, channels.motor, step, limits.max_motor_jump, 0};
         }
         const Crossing frozen = check_frozen(limits, tick_us, motor, current, channels.motor);
         if (frozen.code != kNoTrip || driven_ticks_ == 0) return frozen;
@@ -92,7 +68,7 @@ class LoopGuard {
     static constexpr std::int64_t kRestTicks = 20;
 
     // A motor whose count stays while the current goes from one value to quite another.
-    Crossing check_frozen(const LoopLimits& limits, std::int64_t tick_us, std::int32_t motor,
+    Crossing check_frozen(const LoopFields& limits, std::int64_t tick_us, std::int32_t motor,
                           std::int32_t current, std::uint8_t channel) {
         still_mean_ += (kFine * current - still_mean_) / kStillTicks;
         if (magnitude(std::int64_t{motor} - anchor_) > limits.frozen_motion) {
@@ -108,7 +84,7 @@ class LoopGuard {
         return {};
     }
 
-    Crossing check_current(const LoopLimits& limits, std::int64_t tick_us, std::int32_t current,
+    Crossing check_current(const LoopFields& limits, std::int64_t tick_us, std::int32_t current,
                            std::uint8_t channel) {
         if (limits.full_scale_current == 0 || driven_ticks_ * tick_us <= kEnableUs) return {};
         const std::int64_t commanded =

@@ -1,15 +1,14 @@
 // The profile of the 3-DOF grasper: three motors, each in a position loop over its own encoder, with its
-// own guard; three current read-backs, three force sensors; 2 kHz. Its Python twin:
-// drivers/teensy/grasper.py.
+// own guard; three current read-backs, three force sensors; 2 kHz.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "control.hpp"
+#include "limits.hpp"
 #include "loop_guard.hpp"
 #include "motor_guard.hpp"
-#include "safety_choice.hpp"
 #include "sensor_guard.hpp"
 
 namespace rig {
@@ -17,35 +16,48 @@ namespace rig {
 class GrasperProfile {
   public:
     static constexpr std::size_t kMotors = 3;
-    static constexpr std::int64_t kTickUs = 500;
-    static constexpr std::uint32_t kProtocolHash = protocol_hash(
-        "rig teensy protocol 1, grasper\n",
-        "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor_1 i4, motor_2 "
-        "i4, motor_3 i4, target_1 i4, target_2 i4, target_3 i4, current_1 i2, current_2 i2, "
-        "current_3 i2, force_1 u2, force_2 u2, force_3 u2, command_1_e4 i2, command_2_e4 i2, "
-        "command_3_e4 i2, dropped u2\n",
-        "17 ARM: version u1, kind u1, sequence u2, kp_1 f8, ki_1 f8, kd_1 f8, velocity_filter_1 "
-        "f8, limit_1 f8, kp_2 f8, ki_2 f8, kd_2 f8, velocity_filter_2 f8, limit_2 f8, kp_3 f8, "
-        "ki_3 f8, kd_3 f8, velocity_filter_3 f8, limit_3 f8, max_current_1 i4, max_force_1 i4, "
-        "min_motor_1 i4, max_motor_1 i4, max_motor_step_1 i4, continuous_current_1 i4, i2t_1 i4, "
-        "stall_current_1 i4, stall_motion_1 i4, max_motor_jump_1 i4, max_following_1 i4, "
-        "following_ticks_1 i4, full_scale_current_1 i4, current_offset_1 i4, max_current_error_1 "
-        "i4, current_ticks_1 i4, frozen_current_1 i4, frozen_motion_1 i4, max_current_2 i4, "
-        "max_force_2 i4, min_motor_2 i4, max_motor_2 i4, max_motor_step_2 i4, "
-        "continuous_current_2 i4, i2t_2 i4, stall_current_2 i4, stall_motion_2 i4, "
-        "max_motor_jump_2 i4, max_following_2 i4, following_ticks_2 i4, full_scale_current_2 i4, "
-        "current_offset_2 i4, max_current_error_2 i4, current_ticks_2 i4, frozen_current_2 i4, "
-        "frozen_motion_2 i4, max_current_3 i4, max_force_3 i4, min_motor_3 i4, max_motor_3 i4, "
-        "max_motor_step_3 i4, continuous_current_3 i4, i2t_3 i4, stall_current_3 i4, "
-        "stall_motion_3 i4, max_motor_jump_3 i4, max_following_3 i4, following_ticks_3 i4, "
-        "full_scale_current_3 i4, current_offset_3 i4, max_current_error_3 i4, current_ticks_3 "
-        "i4, frozen_current_3 i4, frozen_motion_3 i4, stall_ticks i4, saturated_ticks i4, "
-        "stale_ticks i4, watchdog_us i4, safe_state i4, hold_command_e4 i4\n",
-        "19 SETPOINTS: version u1, kind u1, sequence u2, 50 x (target_1 i4, target_2 i4, target_3 "
-        "i4)\n");
-    static constexpr std::size_t kArmSize = kMotors * (8 * 5 + 4 * 18) + 4 * 6;
-    static constexpr std::size_t kSetpointSize = 4 * kMotors;
-    static constexpr std::size_t kMaxSetpoints = 50;
+    static constexpr std::int64_t kTickUs = grasper::kTickUs;
+    static constexpr std::uint32_t kProtocolHash = crc32(grasper::kContract);
+    static constexpr std::size_t kArmSize = grasper::kArmSize;
+    static constexpr std::size_t kSetpointSize = grasper::kSetpointSize;
+    static constexpr std::size_t kMaxSetpoints = grasper::kMaxSetpoints;
+
+    // What a host arms the board with, and what a board is built with.
+    struct Settings {
+        Gains gains[kMotors];
+        AxisFields axes[kMotors];
+        ChoiceFields choice;
+
+        static Settings widest() {
+            Settings settings;
+            for (std::size_t k = 0; k < kMotors; ++k) {
+                settings.gains[k].limit = kFullScaleE4;
+                settings.axes[k] = rig::widest<AxisFields>();
+            }
+            settings.choice = rig::widest<ChoiceFields>();
+            return settings;
+        }
+        void read(Reader& reader) {
+            for (Gains& one : gains) one.read(reader);
+            for (AxisFields& axis : axes) rig::read(reader, axis);
+            rig::read(reader, choice);
+        }
+        bool valid() const {
+            bool valid = choice_is_valid(choice);
+            for (std::size_t k = 0; k < kMotors; ++k) {
+                valid = valid && gains[k].valid() && sizes_are_valid(axes[k]) &&
+                        axes[k].min_motor <= axes[k].max_motor;
+            }
+            return valid;
+        }
+        bool within(const Settings& own) const {
+            bool inside = rig::within(choice, own.choice);
+            for (std::size_t k = 0; k < kMotors; ++k) {
+                inside = inside && gains[k].within(own.gains[k]) && rig::within(axes[k], own.axes[k]);
+            }
+            return inside;
+        }
+    };
 
     // What is sampled at the beginning of a tick, in counts; a motor's place is the same in each.
     struct Inputs {
@@ -71,31 +83,75 @@ class GrasperProfile {
         bool in_force = false;  // whether the current controllers are to be enabled
     };
 
-    bool arm(Reader& reader) {
-        Gains gains[kMotors];
-        for (Gains& one : gains) one.read(reader);
+    // Takes the settings of a host and forgets what was watched, but not the motors' heat.
+    void begin(const Settings& settings) {
         GrasperProfile fresh;
-        for (Axis& axis : fresh.axes_) axis.limits.read(reader);
-        fresh.choice_.read(reader);
-        bool valid = fresh.choice_.valid();
+        fresh.choice_ = settings.choice;
         for (std::size_t k = 0; k < kMotors; ++k) {
-            valid = valid && gains[k].valid() && fresh.axes_[k].limits.valid();
-            fresh.axes_[k].controller.reset(gains[k]);
+            fresh.axes_[k].heat = axes_[k].heat;
+            fresh.axes_[k].limits = settings.axes[k];
+            fresh.axes_[k].controller.reset(settings.gains[k]);
         }
-        if (valid) *this = fresh;
-        return valid;
+        *this = fresh;
     }
 
-    const SafetyChoice& choice() const { return choice_; }
+    const ChoiceFields& choice() const { return choice_; }
+
+    void assume_hot() {
+        for (Axis& axis : axes_) axis.heat.assume_hot();
+    }
+    bool too_hot(const Settings& settings) {
+        bool hot = false;
+        for (std::size_t k = 0; k < kMotors; ++k) {
+            const MotorFields& limits = settings.axes[k].motor;
+            axes_[k].heat.settle(limits.continuous_current, limits.i2t);
+            hot = hot || axes_[k].heat.too_hot(limits.i2t);
+        }
+        return hot;
+    }
+
+    // Armed or not: what `ticks` ticks with these currents did to the motors.
+    void warm(const Inputs& now, std::int64_t ticks) {
+        for (std::size_t k = 0; k < kMotors; ++k) {
+            axes_[k].heat.take(axes_[k].limits.motor.continuous_current, kTickUs, ticks,
+                               now.current[k]);
+        }
+    }
+
+    void late(const Inputs& now, std::int64_t ticks) {
+        for (std::size_t k = 0; primed_ && k < kMotors; ++k) {
+            if (now.motor[k] == kMissing) continue;
+            axes_[k].guard.late(now.motor[k], ticks);
+            axes_[k].loop.late(now.motor[k], ticks);
+            axes_[k].controller.late(now.motor[k], ticks);
+        }
+    }
 
     bool allow(const Setpoint& setpoint) const {
+        bool allowed = true;
         for (std::size_t k = 0; k < kMotors; ++k) {
-            const AxisLimits& limits = axes_[k].limits;
-            if (setpoint.target[k] < limits.min_motor || setpoint.target[k] > limits.max_motor) {
-                return false;
-            }
+            const AxisFields& limits = axes_[k].limits;
+            allowed = allowed && limits.min_motor <= setpoint.target[k] &&
+                      setpoint.target[k] <= limits.max_motor;
         }
-        return true;
+        return allowed;
+    }
+    bool follows(const Setpoint& setpoint, const Setpoint& before) const {
+        bool near = true;
+        for (std::size_t k = 0; k < kMotors; ++k) {
+            near = near && !exceeds(std::int64_t{setpoint.target[k]} - before.target[k],
+                                    axes_[k].limits.loop.max_target_step);
+        }
+        return near;
+    }
+    // A first setpoint far from where a motor stands would make it leap.
+    Crossing leap(const Setpoint& setpoint, const Inputs& now) const {
+        for (std::size_t k = 0; k < kMotors; ++k) {
+            const std::int64_t far = std::int64_t{setpoint.target[k]} - now.motor[k];
+            const std::int32_t most = axes_[k].limits.loop.max_following;
+            if (exceeds(far, most)) return {kFollowingError, channel(k), far, most, 0};
+        }
+        return {};
     }
 
     Crossing check(const Inputs& now) {
@@ -117,9 +173,11 @@ class GrasperProfile {
         }
         for (std::size_t k = 0; k < kMotors; ++k) {
             Axis& axis = axes_[k];
-            const Crossing motion =
-                axis.guard.check(axis.limits.motor, choice_.stall_ticks, kTickUs, now.motor[k],
-                                 now.current[k], channel(k), channel(kMotors + k));
+            const Crossing heat =
+                axis.heat.check(axis.limits.motor.i2t, kTickUs, channel(kMotors + k));
+            if (heat.code != kNoTrip) return heat;
+            const Crossing motion = axis.guard.check(axis.limits.motor, choice_.stall_ticks, kTickUs,
+                                                     now.motor[k], now.current[k], channel(k));
             if (motion.code != kNoTrip) return motion;
             const Crossing loop =
                 axis.loop.check(axis.limits.loop, kTickUs, now.motor[k], now.motor[k],
@@ -173,38 +231,16 @@ class GrasperProfile {
     }
 
   private:
-    // In the order of the wire.
-    struct AxisLimits {
-        std::int32_t max_current = 0;
-        std::int32_t max_force = 0;
-        std::int32_t min_motor = 0;
-        std::int32_t max_motor = 0;
-        MotorLimits motor;
-        LoopLimits loop;
-
-        void read(Reader& reader) {
-            for (std::int32_t* limit : {&max_current, &max_force, &min_motor, &max_motor}) {
-                *limit = reader.i32();
-            }
-            motor.read(reader);
-            loop.read(reader);
-        }
-
-        bool valid() const {
-            return max_current >= 0 && max_force >= 0 && min_motor <= max_motor && motor.valid() &&
-                   loop.valid();
-        }
-    };
-
     struct Axis {
-        AxisLimits limits;
+        AxisFields limits = widest<AxisFields>();
+        Heat heat;
         MotorGuard guard;
         LoopGuard loop;
         Controller controller;
     };
 
     Crossing check_levels(const Inputs& now, std::size_t k) const {
-        const AxisLimits& limits = axes_[k].limits;
+        const AxisFields& limits = axes_[k].limits;
         if (magnitude(now.current[k]) > limits.max_current) {
             return {kOverCurrent, channel(kMotors + k), now.current[k], limits.max_current, 0};
         }
@@ -229,9 +265,9 @@ class GrasperProfile {
     static constexpr std::int32_t kForceMax = 4095;
 
     Axis axes_[kMotors];
-    SafetyChoice choice_;
+    ChoiceFields choice_ = widest<ChoiceFields>();
     SensorGuard<kMotors> currents_{kMotors, INT16_MIN, INT16_MAX};
-    SensorGuard<kMotors> forces_{2 * kMotors, kMissing, kForceMax};
+    SensorGuard<kMotors> forces_{2 * kMotors, kMissing, kForceMax, 0};
     bool primed_ = false;
 };
 

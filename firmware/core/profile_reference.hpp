@@ -1,42 +1,47 @@
 // The profile of the reference rig: one drive motor in a position loop over the spindle, one load motor
-// given its current, three encoders, two torque channels; 1 kHz. Its Python twin: drivers/teensy/guard.py.
+// given its current, three encoders, two torque channels; 1 kHz.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 
 #include "control.hpp"
 #include "encoder_pair.hpp"
+#include "limits.hpp"
 #include "loop_guard.hpp"
 #include "motor_guard.hpp"
-#include "safety_choice.hpp"
 #include "sensor_guard.hpp"
 
 namespace rig {
 
 class ReferenceProfile {
   public:
-    static constexpr std::int64_t kTickUs = 1000;
-    static constexpr std::uint32_t kProtocolHash = protocol_hash(
-        "rig teensy protocol 1\n",
-        "1 SAMPLE: version u1, kind u1, status u2, sequence u4, tick_us u4, motor i4, spindle i4, "
-        "jaw i4, target i4, proximal i2, distal i2, current i2, fsr u2, command_e4 i2, load_ma "
-        "i2, dropped u2\n",
-        "17 ARM: version u1, kind u1, sequence u2, kp f8, ki f8, kd f8, velocity_filter f8, limit "
-        "f8, max_current i4, max_load_ma i4, max_proximal i4, max_distal i4, min_spindle i4, "
-        "max_spindle i4, min_jaw i4, max_jaw i4, max_motor_step i4, continuous_current i4, i2t "
-        "i4, stall_current i4, stall_motion i4, max_motor_jump i4, max_following i4, "
-        "following_ticks i4, full_scale_current i4, current_offset i4, max_current_error i4, "
-        "current_ticks i4, frozen_current i4, frozen_motion i4, motor_per_turn i4, "
-        "spindle_per_turn i4, jaw_per_turn i4, twist_e6 i4, stretch_e6 i4, max_twist i4, "
-        "max_stretch i4, max_spindle_jump i4, max_jaw_jump i4, torque_e3 i4, max_still_torque i4, "
-        "stall_ticks i4, saturated_ticks i4, stale_ticks i4, watchdog_us i4, safe_state i4, "
-        "hold_command_e4 i4\n",
-        "19 SETPOINTS: version u1, kind u1, sequence u2, 100 x (target i4, load_ma i2)\n");
-    static constexpr std::size_t kArmSize = 8 * 5 + 4 * 39;
-    static constexpr std::size_t kSetpointSize = 6;
-    static constexpr std::size_t kMaxSetpoints = 100;
+    static constexpr std::int64_t kTickUs = reference::kTickUs;
+    static constexpr std::uint32_t kProtocolHash = crc32(reference::kContract);
+    static constexpr std::size_t kArmSize = reference::kArmSize;
+    static constexpr std::size_t kSetpointSize = reference::kSetpointSize;
+    static constexpr std::size_t kMaxSetpoints = reference::kMaxSetpoints;
+
+    // What a host arms the board with, and what a board is built with.
+    struct Settings {
+        Gains gains;
+        ReferenceFields limits;
+
+        static Settings widest() {
+            return {{0, 0, 0, 0, kFullScaleE4}, rig::widest<ReferenceFields>()};
+        }
+        void read(Reader& reader) {
+            gains.read(reader);
+            rig::read(reader, limits);
+        }
+        bool valid() const {
+            return gains.valid() && sizes_are_valid(limits) && choice_is_valid(limits.choice) &&
+                   limits.min_spindle <= limits.max_spindle && limits.min_jaw <= limits.max_jaw;
+        }
+        bool within(const Settings& own) const {
+            return gains.within(own.gains) && rig::within(limits, own.limits);
+        }
+    };
 
     // What is sampled at the beginning of a tick, in counts.
     struct Inputs {
@@ -71,23 +76,62 @@ class ReferenceProfile {
         bool in_force = false;  // whether the current controllers are to be enabled
     };
 
-    bool arm(Reader& reader) {
-        Gains gains;
-        gains.read(reader);
-        Limits limits;
-        limits.read(reader);
-        if (!gains.valid() || !limits.valid()) return false;
+    // Takes the settings of a host and forgets what was watched, but not the motors' heat.
+    void begin(const Settings& settings) {
+        const Heat heat = heat_;
+        const Heat load_heat = load_heat_;
         *this = ReferenceProfile();
-        limits_ = limits;
-        controller_.reset(gains);
-        return true;
+        heat_ = heat;
+        load_heat_ = load_heat;
+        limits_ = settings.limits;
+        controller_.reset(settings.gains);
+        twist_limits_ = {limits_.motor_per_turn, limits_.spindle_per_turn, limits_.twist_e6,
+                         limits_.max_twist};
+        stretch_limits_ = {limits_.jaw_per_turn, limits_.spindle_per_turn, limits_.stretch_e6,
+                           limits_.max_stretch};
     }
 
-    const SafetyChoice& choice() const { return limits_.choice; }
+    const ChoiceFields& choice() const { return limits_.choice; }
+
+    void assume_hot() {
+        heat_.assume_hot();
+        load_heat_.assume_hot();
+    }
+    bool too_hot(const Settings& settings) {
+        const ReferenceFields& limits = settings.limits;
+        heat_.settle(limits.motor.continuous_current, limits.motor.i2t);
+        load_heat_.settle(limits.continuous_load_ma, limits.load_i2t);
+        return heat_.too_hot(limits.motor.i2t) || load_heat_.too_hot(limits.load_i2t);
+    }
+
+    // Armed or not: what `ticks` ticks with this current did to the motors.
+    void warm(const Inputs& now, std::int64_t ticks) {
+        heat_.take(limits_.motor.continuous_current, kTickUs, ticks, now.current);
+        load_heat_.take(limits_.continuous_load_ma, kTickUs, ticks, load_ma_);
+        load_ma_ = 0;  // until a tick asks for some
+    }
+
+    void late(const Inputs& now, std::int64_t ticks) {
+        if (!primed_ || now.motor == kMissing) return;
+        motor_.late(now.motor, ticks);
+        loop_.late(now.motor, ticks);
+        controller_.late(now.motor, ticks);
+        if (now.spindle != kMissing) last_.spindle = late(now.spindle, last_.spindle, ticks);
+        if (now.jaw != kMissing) last_.jaw = late(now.jaw, last_.jaw, ticks);
+    }
 
     bool allow(const Setpoint& setpoint) const {
         return -limits_.max_load_ma <= setpoint.load_ma && setpoint.load_ma <= limits_.max_load_ma &&
                limits_.min_spindle <= setpoint.target && setpoint.target <= limits_.max_spindle;
+    }
+    bool follows(const Setpoint& setpoint, const Setpoint& before) const {
+        return !exceeds(std::int64_t{setpoint.target} - before.target, limits_.loop.max_target_step);
+    }
+    // A first setpoint far from where the spindle stands would make it leap.
+    Crossing leap(const Setpoint& setpoint, const Inputs& now) const {
+        const std::int64_t far = std::int64_t{setpoint.target} - now.spindle;
+        if (!exceeds(far, limits_.loop.max_following)) return {};
+        return {kFollowingError, 1, far, limits_.loop.max_following, 0};
     }
 
     Crossing check(const Inputs& now) {
@@ -107,8 +151,12 @@ class ReferenceProfile {
         }
         const Crossing crossing = check_levels(now);
         if (crossing.code != kNoTrip) return crossing;
+        const Crossing heat = heat_.check(limits_.motor.i2t, kTickUs, 5);
+        if (heat.code != kNoTrip) return heat;
+        const Crossing load = load_heat_.check(limits_.load_i2t, kTickUs, kLoadChannel);
+        if (load.code != kNoTrip) return load;
         const Crossing motion = motor_.check(limits_.motor, limits_.choice.stall_ticks, kTickUs,
-                                             now.motor, now.current, 0, 5);
+                                             now.motor, now.current, 0);
         if (motion.code != kNoTrip) return motion;
         const Crossing implausible = check_encoders(now);
         return implausible.code != kNoTrip ? implausible
@@ -130,6 +178,7 @@ class ReferenceProfile {
         const std::int32_t command_e4 =
             controller_.tick(setpoint.target, now.spindle, now.motor);
         loop_.drove(setpoint.target, command_e4);
+        load_ma_ = setpoint.load_ma;
         return {command_e4, setpoint.load_ma, true};
     }
 
@@ -146,52 +195,11 @@ class ReferenceProfile {
     }
 
   private:
-    // In the order of the wire.
-    struct Limits {
-        std::int32_t max_current = 0;
-        std::int32_t max_load_ma = 0;
-        std::int32_t max_proximal = 0;
-        std::int32_t max_distal = 0;
-        std::int32_t min_spindle = 0;
-        std::int32_t max_spindle = 0;
-        std::int32_t min_jaw = 0;
-        std::int32_t max_jaw = 0;
-        MotorLimits motor;
-        LoopLimits loop;
-        PairLimits twist;    // motor and spindle, twisted by the proximal torque
-        PairLimits stretch;  // jaw and spindle, by the distal torque
-        std::int32_t max_spindle_jump = 0;
-        std::int32_t max_jaw_jump = 0;
-        std::int32_t torque_e3 = 0;  // proximal counts, signed, for 1000 counts of current at rest
-        std::int32_t max_still_torque = 0;
-        SafetyChoice choice;
+    static constexpr std::uint8_t kLoadChannel = 6;
 
-        void read(Reader& reader) {
-            for (std::int32_t* limit : {&max_current, &max_load_ma, &max_proximal, &max_distal,
-                                        &min_spindle, &max_spindle, &min_jaw, &max_jaw}) {
-                *limit = reader.i32();
-            }
-            motor.read(reader);
-            loop.read(reader);
-            for (std::int32_t* limit :
-                 {&twist.first_per_turn, &twist.second_per_turn, &stretch.first_per_turn,
-                  &twist.twist_e6, &stretch.twist_e6, &twist.window, &stretch.window,
-                  &max_spindle_jump, &max_jaw_jump, &torque_e3, &max_still_torque}) {
-                *limit = reader.i32();
-            }
-            stretch.second_per_turn = twist.second_per_turn;
-            choice.read(reader);
-        }
-
-        bool valid() const {
-            for (std::int32_t size : {max_current, max_load_ma, max_proximal, max_distal,
-                                      max_spindle_jump, max_jaw_jump, max_still_torque}) {
-                if (size < 0) return false;
-            }
-            return motor.valid() && loop.valid() && twist.valid() && stretch.valid() && choice.valid() && min_spindle <= max_spindle &&
-                   min_jaw <= max_jaw;
-        }
-    };
+    static std::int32_t late(std::int32_t now, std::int32_t last, std::int64_t ticks) {
+        return static_cast<std::int32_t>(now - (std::int64_t{now} - last) / ticks);
+    }
 
     Crossing check_levels(const Inputs& now) const {
         if (magnitude(now.current) > limits_.max_current) {
@@ -225,9 +233,9 @@ class ReferenceProfile {
         if (exceeds(jaw_step, limits_.max_jaw_jump)) {
             return {kEncoderJump, 2, jaw_step, limits_.max_jaw_jump, 0};
         }
-        const Crossing twist = twist_.check(limits_.twist, now.motor, now.spindle, now.proximal, 0);
+        const Crossing twist = twist_.check(twist_limits_, now.motor, now.spindle, now.proximal, 0);
         if (twist.code != kNoTrip) return twist;
-        const Crossing stretch = stretch_.check(limits_.stretch, now.jaw, now.spindle, now.distal, 2);
+        const Crossing stretch = stretch_.check(stretch_limits_, now.jaw, now.spindle, now.distal, 2);
         if (stretch.code != kNoTrip) return stretch;
         const Crossing loop =
             loop_.check(limits_.loop, kTickUs, now.spindle, now.motor, now.current, {1, 0, 5});
@@ -247,7 +255,12 @@ class ReferenceProfile {
 
     static constexpr std::int32_t kFsrMax = 4095;
 
-    Limits limits_;
+    ReferenceFields limits_ = widest<ReferenceFields>();
+    PairLimits twist_limits_;    // motor and spindle, twisted by the proximal torque
+    PairLimits stretch_limits_;  // jaw and spindle, by the distal torque
+    Heat heat_;
+    Heat load_heat_;
+    std::int32_t load_ma_ = 0;
     Controller controller_;
     MotorGuard motor_;
     LoopGuard loop_;

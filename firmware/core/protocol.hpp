@@ -1,20 +1,15 @@
-// What the board and the host say to each other. The contract is a text, the lines below and those of
-// the board's profile: both sides compare its CRC-32 before anything moves. The twin is
-// drivers/teensy/protocol.py, which spells the same text out of its layouts.
+// The frames between board and host as numbers on a wire. What is in them is contract.hpp, generated from the
+// host's tables; both sides compare the CRC-32 of its text before anything moves.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <initializer_list>
+
+#include "contract.hpp"
+#include "framing.hpp"
 
 namespace rig {
-
-constexpr std::uint8_t kVersion = 1;
-constexpr std::uint32_t kFirmwareVersion = 0x000400;
-constexpr std::size_t kQueueCapacity = 2000;
-constexpr std::int32_t kMinWatchdogUs = 5000;
-constexpr std::int32_t kMaxWatchdogUs = 1000000;
 
 // CRC-32 of the sources, set by the build
 #ifndef RIG_BUILD_HASH
@@ -22,117 +17,15 @@ constexpr std::int32_t kMaxWatchdogUs = 1000000;
 #endif
 constexpr std::uint32_t kBuildHash = RIG_BUILD_HASH;
 
-// The lines of the contract that every profile has; its own are in its header.
-constexpr char kFramingLines[] = "COBS(payload, CRC-16/CCITT-FALSE u2) 00\n";
-constexpr char kAnswerLines[] =
-    "2 HELLO_REPLY: version u1, kind u1, sequence u2, protocol_hash u4, firmware_version u4, "
-    "build_hash u4, serial S24, boot u4, status u2\n"
-    "3 ACK: version u1, kind u1, sequence u2, command u1, result u1, status u2, queue_free u2\n"
-    "4 PONG: version u1, kind u1, sequence u2, token u8, tick_us u4\n"
-    "5 TRIP_REPORT: version u1, kind u1, sequence u2, code u1, channel u1, value i4, limit i4, "
-    "tick_us u4, late_us u4\n"
-    "16 HELLO: version u1, kind u1, sequence u2\n";
-constexpr char kStartLine[] = "18 START: version u1, kind u1, sequence u2\n";
-constexpr char kOtherLines[] =
-    "20 STOP: version u1, kind u1, sequence u2\n"
-    "21 DISARM: version u1, kind u1, sequence u2\n"
-    "22 PING: version u1, kind u1, sequence u2, token u8\n"
-    "23 TRIP: version u1, kind u1, sequence u2\n"
-    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4\n"
-    "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED, 32 "
-    "HOLDING, 64 REFERENCED, trip << 8\n"
-    "trip: 0 NONE, 1 HOST_SILENT, 2 OVER_CURRENT, 3 PROXIMAL_TORQUE, 4 DISTAL_TORQUE, 5 "
-    "SPINDLE_TRAVEL, 6 JAW_TRAVEL, 7 OVER_SPEED, 8 OVERHEATED, 9 STALLED, 10 SENSOR_SATURATED, "
-    "11 SENSOR_STALE, 12 SENSOR_MISSING, 13 MOTOR_TRAVEL, 14 OVER_FORCE, 15 ENCODERS_DISAGREE, "
-    "16 FOLLOWING_ERROR, 17 CURRENT_MISMATCH, 18 ENCODER_JUMP, 19 ENCODER_FROZEN\n"
-    "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, 6 "
-    "WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST\n";
+constexpr std::size_t kEncoders = 3;  // of every profile
+constexpr std::size_t kReferenceSize = 4 * kEncoders;
+constexpr std::size_t kTokenSize = 8;
 
-enum Kind : std::uint8_t {
-    kSample = 1,
-    kHelloReply = 2,
-    kAck = 3,
-    kPong = 4,
-    kTripReport = 5,
-    kHello = 16,
-    kArm = 17,
-    kStart = 18,
-    kSetpoints = 19,
-    kStop = 20,
-    kDisarm = 21,
-    kPing = 22,
-    kTrip = 23,
-    kReference = 24,
-};
-
-enum Status : std::uint16_t {
-    kArmed = 1,
-    kSaturated = 2,
-    kQueueDry = 4,
-    kWatchdogTripped = 8,
-    kLimitTripped = 16,
-    kHolding = 32,
-    kReferenced = 64,
-};
-constexpr unsigned kTripShift = 8;
-
-enum Trip : std::uint8_t {
-    kNoTrip = 0,
-    kHostSilent = 1,
-    kOverCurrent = 2,
-    kProximalTorque = 3,
-    kDistalTorque = 4,
-    kSpindleTravel = 5,
-    kJawTravel = 6,
-    kOverSpeed = 7,
-    kOverheated = 8,
-    kStalled = 9,
-    kSensorSaturated = 10,
-    kSensorStale = 11,
-    kSensorMissing = 12,
-    kMotorTravel = 13,
-    kOverForce = 14,
-    kEncodersDisagree = 15,
-    kFollowingError = 16,
-    kCurrentMismatch = 17,
-    kEncoderJump = 18,
-    kEncoderFrozen = 19,
-};
-
-enum Result : std::uint8_t {
-    kOk = 0,
-    kUnknownKind = 1,
-    kWrongSize = 2,
-    kBadValue = 3,
-    kQueueFull = 4,
-    kNotArmed = 5,
-    kWrongVersion = 6,
-    kNotReferenced = 7,
-    kNotAtRest = 8,
-};
-
-constexpr std::size_t kHeaderSize = 4;
-constexpr std::size_t kSerialSize = 24;
-constexpr std::size_t kReferenceSize = 4 * 3;
-constexpr std::size_t kPingSize = kHeaderSize + 8;
-
-constexpr std::uint32_t crc32_next(std::uint32_t crc, const char* text) {
+constexpr std::uint32_t crc32(const char* text) {
+    std::uint32_t crc = 0xFFFFFFFFU;
     for (; *text != '\0'; ++text) {
         crc ^= static_cast<std::uint8_t>(*text);
         for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
-    }
-    return crc;
-}
-
-constexpr std::uint32_t crc32(const char* text) { return ~crc32_next(0xFFFFFFFFU, text); }
-
-// CRC-32 of the whole contract of a profile, in the order of the twin.
-constexpr std::uint32_t protocol_hash(const char* title, const char* sample, const char* arm,
-                                      const char* setpoints) {
-    std::uint32_t crc = 0xFFFFFFFFU;
-    for (const char* lines : {title, kFramingLines, sample, kAnswerLines, arm, kStartLine, setpoints,
-                              kOtherLines}) {
-        crc = crc32_next(crc, lines);
     }
     return ~crc;
 }
@@ -174,7 +67,7 @@ class Writer {
         return *this;
     }
 
-    std::uint8_t bytes_[64];  // more than the longest frame a board sends
+    std::uint8_t bytes_[Frame::kMostPayload];
     std::size_t size_ = 0;
 };
 
@@ -183,9 +76,11 @@ class Reader {
   public:
     explicit Reader(const std::uint8_t* bytes) : bytes_(bytes) {}
 
+    std::uint8_t u8() { return static_cast<std::uint8_t>(take(1)); }
     std::uint16_t u16() { return static_cast<std::uint16_t>(take(2)); }
     std::int16_t i16() { return static_cast<std::int16_t>(u16()); }
     std::int32_t i32() { return static_cast<std::int32_t>(take(4)); }
+    std::uint32_t u32() { return static_cast<std::uint32_t>(take(4)); }
     std::uint64_t u64() { return take(8); }
     double f64() {
         const std::uint64_t bits = take(8);

@@ -9,8 +9,6 @@
 
 namespace rig {
 
-constexpr std::size_t kEncoders = 3;  // of every profile
-
 template <class Profile>
 class ReferencePoint {
   public:

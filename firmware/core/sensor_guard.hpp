@@ -1,12 +1,11 @@
-// The watch of converted sensors over time: at the end of their range, and not changing at all. The
-// twin of `sensor_crossing` in drivers/teensy/guard.py.
+// The watch of converted sensors over time: at the end of their range, and not changing at all.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "crossing.hpp"
-#include "safety_choice.hpp"
+#include "limits.hpp"
 
 namespace rig {
 
@@ -14,9 +13,11 @@ namespace rig {
 template <std::size_t Sensors>
 class SensorGuard {
   public:
-    // A count at or beyond `low` or `high` is saturated.
-    constexpr SensorGuard(std::uint8_t first, std::int32_t low, std::int32_t high)
-        : first_(first), low_(low), high_(high) {}
+    // A count at or beyond `low` or `high` is saturated; `idle` is that of a sound sensor with nothing to measure,
+    // which may stay.
+    constexpr SensorGuard(std::uint8_t first, std::int32_t low, std::int32_t high,
+                          std::int32_t idle = kMissing)
+        : first_(first), low_(low), high_(high), idle_(idle) {}
 
     void prime(const std::int32_t (&counts)[Sensors]) {
         for (std::size_t k = 0; k < Sensors; ++k) last_[k] = counts[k];
@@ -27,7 +28,7 @@ class SensorGuard {
         for (std::int64_t& ticks : same_ticks_) ticks = 0;
     }
 
-    Crossing check(const SafetyChoice& choice, std::int64_t tick_us,
+    Crossing check(const ChoiceFields& choice, std::int64_t tick_us,
                    const std::int32_t (&counts)[Sensors]) {
         std::size_t saturated = Sensors;
         for (std::size_t k = Sensors; k-- > 0;) {
@@ -39,7 +40,7 @@ class SensorGuard {
                     saturated_ticks_ * tick_us};
         }
         for (std::size_t k = 0; k < Sensors; ++k) {
-            same_ticks_[k] = counts[k] == last_[k] ? same_ticks_[k] + 1 : 0;
+            same_ticks_[k] = counts[k] == last_[k] && counts[k] != idle_ ? same_ticks_[k] + 1 : 0;
             last_[k] = counts[k];
             if (same_ticks_[k] >= choice.stale_ticks) {
                 return {kSensorStale, channel(k), counts[k], choice.stale_ticks,
@@ -62,6 +63,7 @@ class SensorGuard {
     std::uint8_t first_;
     std::int32_t low_;
     std::int32_t high_;
+    std::int32_t idle_;
     std::int64_t saturated_ticks_ = 0;
     std::int32_t last_[Sensors] = {};
     std::int64_t same_ticks_[Sensors] = {};

@@ -52,6 +52,7 @@ class PtyHardware {
     typename Profile::Inputs sample() { return plant_.sample(); }
     void drive(const typename Profile::Outputs& outputs) { plant_.step(outputs); }
 
+    bool stopped() { return false; }  // no emergency stop is wired to it
     void feed() {}  // a process has no watchdog of its own
 
     std::size_t read(std::uint8_t* out, std::size_t room) { return some(::read(master_, out, room)); }
@@ -83,7 +84,7 @@ void run(int master, const char* serial) {
     Hardware hardware(master);
     static rig::App<Profile, Hardware, kTransmitCapacity> app(hardware, serial);
     const std::uint64_t began_ns = now_ns();
-    app.begin(static_cast<std::uint32_t>(began_ns / 1000U), true);  // the plant's counters are absolute
+    app.begin(static_cast<std::uint32_t>(began_ns / 1000U), Profile::Settings::widest(), true);
     for (std::uint64_t tick = 1; !ended; ++tick) {
         // the clock decides when a tick is due, so a process that slept too long catches up
         const std::uint64_t due_ns = began_ns + tick * kTickNs;

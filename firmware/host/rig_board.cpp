@@ -17,7 +17,11 @@ constexpr std::size_t kTransmitCapacity = 65536;
 class HostBoard {
   public:
     virtual ~HostBoard() = default;
-    virtual void booted(std::uint32_t boot, bool referenced) = 0;
+    virtual void booted(std::uint32_t boot, bool simulated) = 0;
+    virtual bool limit_to(const std::uint8_t* settings) = 0;
+    virtual void stop(bool stopped) = 0;
+    virtual bool in_force() const = 0;
+    virtual void skip(std::uint32_t ticks) = 0;
     virtual void receive(const std::uint8_t* data, std::size_t size) = 0;
     virtual void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) = 0;
     virtual std::size_t transmit(std::uint8_t* out, std::size_t room) = 0;
@@ -46,15 +50,34 @@ void put(const rig::GrasperProfile::Outputs& outputs, std::int32_t* row) {
     for (std::int32_t command_e4 : outputs.command_e4) *row++ = command_e4;
 }
 
+// From the bytes of an arm command behind its session.
+template <class Profile>
+typename Profile::Settings settings_of(const std::uint8_t* bytes) {
+    typename Profile::Settings settings;
+    rig::Reader reader(bytes);
+    settings.read(reader);
+    return settings;
+}
+
 template <class Profile>
 class ProfileBoard final : public HostBoard {
   public:
     explicit ProfileBoard(const char* serial) : board_(serial) {}
 
-    void booted(std::uint32_t boot, bool referenced) override { board_.booted(boot, referenced); }
-    void receive(const std::uint8_t* data, std::size_t size) override { board_.receive(data, size); }
+    void booted(std::uint32_t boot, bool simulated) override { board_.booted(boot, simulated); }
+    bool limit_to(const std::uint8_t* bytes) override {
+        const auto settings = settings_of<Profile>(bytes);
+        if (settings.valid()) board_.limit_to(settings);
+        return settings.valid();
+    }
+    void stop(bool stopped) override { stopped_ = stopped; }
+    bool in_force() const override { return board_.in_force(); }
+    void skip(std::uint32_t ticks) override { board_.skip(ticks); }
+    void receive(const std::uint8_t* data, std::size_t size) override {
+        board_.template receive<rig::NoLock>(data, size);
+    }
     void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) override {
-        put(board_.tick(tick_us, inputs_of(inputs, Profile())), outputs);
+        put(board_.tick(tick_us, inputs_of(inputs, Profile()), stopped_), outputs);
     }
     std::size_t transmit(std::uint8_t* out, std::size_t room) override {
         return board_.transmit(out, room);
@@ -62,10 +85,39 @@ class ProfileBoard final : public HostBoard {
 
   private:
     rig::Board<Profile, kTransmitCapacity> board_;
+    bool stopped_ = false;
 };
 
-// the module of the tests: 10 to 90 % duty is -2 to 2 A, 0 to 3.3 V is -2 to 2 A
-constexpr rig::EsconWiring kEscon{{0.1, -2.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
+// The guards alone, for a host that holds a board's limits against the samples as they arrive.
+class HostGuard {
+  public:
+    virtual ~HostGuard() = default;
+    virtual void check(const std::int32_t* inputs, std::int64_t ticks, std::int64_t* crossing) = 0;
+};
+
+template <class Profile>
+class ProfileGuard final : public HostGuard {
+  public:
+    explicit ProfileGuard(const std::uint8_t* bytes) { profile_.begin(settings_of<Profile>(bytes)); }
+
+    void check(const std::int32_t* inputs, std::int64_t ticks, std::int64_t* row) override {
+        const auto now = inputs_of(inputs, Profile());
+        if (ticks > 1) profile_.late(now, ticks);
+        profile_.warm(now, ticks > 1 ? ticks : 1);
+        const rig::Crossing crossing = profile_.check(now);
+        row[0] = crossing.code;
+        row[1] = crossing.channel;
+        row[2] = crossing.value;
+        row[3] = crossing.limit;
+        row[4] = crossing.late_us;
+    }
+
+  private:
+    Profile profile_;
+};
+
+// the module of the tests: 10 to 90 % duty is 0 to 2 A, 0 to 3.3 V is -2 to 2 A
+constexpr rig::EsconWiring kEscon{{0.1, 0.0, 0.9, 2.0}, 1.0, {0.0, -2.0, 3.3, 2.0}, 3.3, 2.0};
 
 HostBoard* board_of(void* handle) { return static_cast<HostBoard*>(handle); }
 
@@ -86,10 +138,24 @@ void* rig_board_create(const char* profile, const char* serial) {
 
 void rig_board_destroy(void* board) { delete board_of(board); }
 
-// The number of this start, and whether the counts already have their zeros (1) or not (0).
-void rig_board_booted(void* board, std::uint32_t boot, std::int32_t referenced) {
-    board_of(board)->booted(boot, referenced != 0);
+// The number of this start, and whether it is a simulated rig (1): its counts have their zeros, its motors are cold.
+void rig_board_booted(void* board, std::uint32_t boot, std::int32_t simulated) {
+    board_of(board)->booted(boot, simulated != 0);
 }
+
+// The widest gains and limits the board takes, as in an arm command behind its session; 0 where they are not valid.
+std::int32_t rig_board_limit(void* board, const std::uint8_t* settings) {
+    return board_of(board)->limit_to(settings) ? 1 : 0;
+}
+
+// Whether somebody asks for an emergency stop from now on.
+void rig_board_stop(void* board, std::int32_t stopped) { board_of(board)->stop(stopped != 0); }
+
+// Whether motors are, or may at any tick be, given current.
+std::int32_t rig_board_in_force(void* board) { return board_of(board)->in_force() ? 1 : 0; }
+
+// Lets ticks pass that were not run.
+void rig_board_skip(void* board, std::uint32_t ticks) { board_of(board)->skip(ticks); }
 
 void rig_board_receive(void* board, const std::uint8_t* data, std::size_t size) {
     board_of(board)->receive(data, size);
@@ -137,6 +203,30 @@ std::int32_t rig_escon_milliampere(std::int32_t reading) { return kEscon.milliam
 
 // CRC-32 of the sources the core was built from.
 std::uint32_t rig_board_build_hash() { return rig::kBuildHash; }
+
+// The guards of a profile alone, with the gains and limits of an arm command behind its session.
+void* rig_guard_create(const char* profile, const std::uint8_t* settings) {
+    HostGuard* guard = nullptr;
+    if (std::strcmp(profile, "reference") == 0) {
+        guard = new (std::nothrow) ProfileGuard<rig::ReferenceProfile>(settings);
+    } else if (std::strcmp(profile, "grasper") == 0) {
+        guard = new (std::nothrow) ProfileGuard<rig::GrasperProfile>(settings);
+    }
+    return guard;
+}
+
+void rig_guard_destroy(void* guard) { delete static_cast<HostGuard*>(guard); }
+
+// Checks rows of `width` inputs, each `ticks` ticks behind the one before, up to the first that crosses a limit.
+// Returns its row, `count` where there is none; writes code, channel, value, limit and lateness, us.
+std::size_t rig_guard_check(void* guard, const std::int32_t* rows, std::size_t width,
+                            const std::int64_t* ticks, std::size_t count, std::int64_t* crossing) {
+    for (std::size_t k = 0; k < count; ++k) {
+        static_cast<HostGuard*>(guard)->check(rows + k * width, ticks[k], crossing);
+        if (crossing[0] != rig::kNoTrip) return k;
+    }
+    return count;
+}
 
 // Writes at most `room` waiting bytes to `out`; returns how many.
 std::size_t rig_board_transmit(void* board, std::uint8_t* out, std::size_t room) {

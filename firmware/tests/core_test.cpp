@@ -1,5 +1,5 @@
-// The core and the Teensy's layer on a host, under the sanitizers. What fake and core answer alike is
-// held by tests/drivers/test_firmware_twin.py; here is what is only in C++, and the published vectors.
+// The core and the Teensy's layer on a host, under the sanitizers. The core's guards and
+// sessions are tried by tests/drivers/test_guards.py and test_sessions.py; here is what no library shows.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
@@ -57,14 +57,13 @@ TEST_CASE("the watchdog counts over the wrap of the clock") {
 
 TEST_CASE("heat is the current squared above the continuous one, at any rate") {
     for (std::int64_t tick_us : {1000, 500}) {
-        rig::MotorLimits limits;
-        limits.max_step = limits.stall_current = std::numeric_limits<std::int32_t>::max();
-        limits.continuous_current = 100;
-        limits.i2t = 3000;  // counts^2 s
-        rig::MotorGuard guard;
-        std::int64_t ticks = 1;
-        // 30000 counts^2 above, so more than a tenth of a second of it is too much
-        while (guard.check(limits, 1, tick_us, 0, 200, 0, 5).code == rig::kNoTrip) ++ticks;
+        rig::Heat heat;
+        std::int64_t ticks = 0;
+        // 30000 counts^2 above, so more than a tenth of a second of it is more than 3000 counts^2 s
+        while (heat.check(3000, tick_us, 5).code == rig::kNoTrip) {
+            heat.take(100, tick_us, 1, 200);
+            ++ticks;
+        }
         CHECK(ticks == 100000 / tick_us + 1);
     }
 }
@@ -102,7 +101,7 @@ TEST_CASE_TEMPLATE("any bytes do no harm", Profile, rig::ReferenceProfile, rig::
     for (int round = 0; round < 200000; ++round) {
         random = random * 1664525U + 1013904223U;
         const auto byte = static_cast<std::uint8_t>(random >> 24 & (random & 1 ? 0xFF : 0x1F));
-        any.receive(&byte, 1);
+        any.template receive<rig::NoLock>(&byte, 1);
         if (round % 500 == 0) any.tick(static_cast<std::uint32_t>(round), {});
     }
 }
@@ -111,10 +110,10 @@ TEST_CASE("a Teensy starts with both motors off and 0 A asked for") {
     setup();
     CHECK(board.levels[rig::wiring::kDriveEnablePin] == LOW);
     CHECK(board.levels[rig::wiring::kLoadEnablePin] == LOW);
-    CHECK(board.duties[rig::wiring::kDriveSetPin] == 2048);
+    CHECK(board.duties[rig::wiring::kDriveSetPin] == 410);
     REQUIRE((timer.function != nullptr));
     timer.function();
-    CHECK(board.duties[rig::wiring::kDriveSetPin] == 2048);
+    CHECK(board.duties[rig::wiring::kDriveSetPin] == 410);
 }
 
 TEST_CASE("a Teensy answers a hello, with interrupts off only while it touches the board") {
@@ -186,15 +185,61 @@ TEST_CASE("an enabled controller that is not ready reports no current") {
     rig::ReferenceHardware teensy;
     teensy.begin();
     board.analog[rig::wiring::kDriveCurrentPin] = 2048;
-    board.levels[rig::wiring::kDriveReadyPin] = LOW;
+    board.levels[rig::wiring::kDriveReadyPin] = HIGH;  // a broken wire, or no power
+    board.levels[rig::wiring::kLoadReadyPin] = LOW;
     CHECK(teensy.sample().current != rig::kMissing);
     rig::ReferenceProfile::Outputs outputs;
     outputs.in_force = true;
     for (std::uint32_t tick = 0; tick < rig::wiring::kReadyAfterTicks; ++tick) teensy.drive(outputs);
     CHECK(board.levels[rig::wiring::kDriveEnablePin] == HIGH);
     CHECK(teensy.sample().current == rig::kMissing);
-    board.levels[rig::wiring::kDriveReadyPin] = HIGH;
+    board.levels[rig::wiring::kDriveReadyPin] = LOW;
     CHECK(teensy.sample().current != rig::kMissing);
+    board.levels[rig::wiring::kLoadReadyPin] = HIGH;
+    CHECK(teensy.sample().current == rig::kMissing);
+}
+
+TEST_CASE("a current is asked for by its size, and its sign by a line of its own") {
+    rig::ReferenceHardware teensy;
+    teensy.begin();
+    rig::ReferenceProfile::Outputs outputs;
+    outputs.in_force = true;
+    outputs.command_e4 = -5000;
+    outputs.load_ma = 500;
+    teensy.drive(outputs);
+    CHECK(board.duties[rig::wiring::kDriveSetPin] == rig::wiring::kDrive.code(1.0));
+    CHECK(board.duties[rig::wiring::kDriveSetPin] > board.duties[rig::wiring::kLoadSetPin]);
+    CHECK(board.levels[rig::wiring::kDriveDirectionPin] == LOW);
+    CHECK(board.levels[rig::wiring::kLoadDirectionPin] == HIGH);
+    CHECK(rig::wiring::kDrive.set_value.input(0.0) == doctest::Approx(0.1));  // and less is not more current
+}
+
+TEST_CASE("an emergency stop is pressed while its contact, or its wire, is open") {
+    rig::ReferenceHardware teensy;
+    teensy.begin();
+    board.levels.erase(rig::wiring::kStopPin);  // open: the pull-up's level
+    CHECK(teensy.stopped());
+    board.levels[rig::wiring::kStopPin] = LOW;
+    CHECK_FALSE(teensy.stopped());
+}
+
+TEST_CASE("a current converter at its ends is a saturated field") {
+    CHECK(rig::wiring::kDrive.milliampere(0) == INT16_MIN);
+    CHECK(rig::wiring::kDrive.milliampere(4095) == INT16_MAX);
+}
+
+TEST_CASE("two boards with the same image have serial numbers of their own") {
+    CHECK(std::strncmp(rig::TeensyLink::serial("NAME"), "NAME-0000444C", 24) == 0);
+}
+
+TEST_CASE("the settings that a board is built with are valid, and a host may ask for no more") {
+    rig::ReferenceProfile::Settings own = rig::wiring::own_limits();
+    own.limits.choice.watchdog_us = 50000;
+    CHECK(own.valid());
+    rig::ReferenceProfile::Settings asked = own;
+    CHECK(asked.within(rig::wiring::own_limits()));
+    ++asked.limits.max_current;
+    CHECK_FALSE(asked.within(rig::wiring::own_limits()));
 }
 
 TEST_CASE("each encoder of a Teensy 4.1 has inputs of the crossbar for itself") {

@@ -1,5 +1,5 @@
-// The grasper's profile and its layer on a host, under the sanitizers. What fake and core answer alike is
-// held by tests/drivers/test_grasper_twin.py; here is what is only in C++.
+// The grasper's profile and its layer on a host, under the sanitizers. The guards of a whole board
+// are tried by tests/drivers/test_grasper_board.py.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
@@ -16,43 +16,28 @@ using Profile = rig::GrasperProfile;
 
 constexpr std::int32_t kTop = std::numeric_limits<std::int32_t>::max();
 
-// The body of an arm command: gains, limits that nothing crosses, then what the test changes.
-struct Arming {
-    double gains[3][5] = {{2, 0, 0, 1, 5000}, {2, 0, 0, 1, 5000}, {2, 0, 0, 1, 5000}};
-    std::int32_t limits[3][18] = {};
-    std::int32_t choice[6] = {kTop, kTop, kTop, 50000, 0, 0};
+// Gains, and limits that nothing crosses.
+Profile::Settings arming() {
+    Profile::Settings settings = Profile::Settings::widest();
+    for (rig::Gains& one : settings.gains) one = {2, 0, 0, 1, 5000};
+    settings.choice.watchdog_us = 50000;
+    settings.choice.hold_command_e4 = 0;
+    REQUIRE(settings.valid());
+    return settings;
+}
 
-    Arming() {
-        for (auto& axis : limits) {
-            for (std::int32_t& limit : axis) limit = kTop;
-            axis[2] = -kTop - 1;
-            axis[12] = axis[13] = 0;  // current and command are not compared
-        }
-    }
-
-    bool reaches(Profile& profile) const {
-        std::vector<std::uint8_t> body(Profile::kArmSize);
-        std::uint8_t* at = body.data();
-        std::memcpy(at, gains, sizeof gains);
-        std::memcpy(at + sizeof gains, limits, sizeof limits);
-        std::memcpy(at + sizeof gains + sizeof limits, choice, sizeof choice);
-        rig::Reader reader(body.data());
-        return profile.arm(reader);
-    }
-};
-
-Profile armed(const Arming& arming) {
+Profile armed(const Profile::Settings& settings) {
     Profile profile;
-    REQUIRE(arming.reaches(profile));
+    profile.begin(settings);
     return profile;
 }
 
 }  // namespace
 
 TEST_CASE("every motor follows its own target by its own gains") {
-    Arming arming;
-    arming.gains[1][0] = 3;
-    Profile profile = armed(arming);
+    Profile::Settings settings = arming();
+    settings.gains[1].kp = 3;
+    Profile profile = armed(settings);
     Profile::Inputs inputs;
     const Profile::Outputs outputs = profile.drive({{10, 20, -3000}}, inputs);
     CHECK(outputs.in_force);
@@ -63,25 +48,25 @@ TEST_CASE("every motor follows its own target by its own gains") {
 
 TEST_CASE("each motor has guards of its own, and the channel says whose was crossed") {
     for (std::size_t k = 0; k < Profile::kMotors; ++k) {
-        Arming arming;
-        arming.limits[k][0] = 100;  // current
+        Profile::Settings settings = arming();
+        settings.axes[k].max_current = 100;
         Profile::Inputs inputs;
         for (std::int32_t& current : inputs.current) current = 101;
-        rig::Crossing crossing = armed(arming).check(inputs);
+        rig::Crossing crossing = armed(settings).check(inputs);
         CHECK(crossing.code == rig::kOverCurrent);
         CHECK(crossing.channel == 3 + k);
 
-        arming = Arming();
-        arming.limits[k][1] = 500;  // force
+        settings = arming();
+        settings.axes[k].max_force = 500;
         inputs = Profile::Inputs();
         for (std::int32_t& force : inputs.force) force = 501;
-        crossing = armed(arming).check(inputs);
+        crossing = armed(settings).check(inputs);
         CHECK(crossing.code == rig::kOverForce);
         CHECK(crossing.channel == 6 + k);
 
-        arming = Arming();
-        arming.limits[k][4] = 9;  // speed
-        Profile profile = armed(arming);
+        settings = arming();
+        settings.axes[k].motor.max_motor_step = 9;
+        Profile profile = armed(settings);
         inputs = Profile::Inputs();
         rig::Crossing fast;
         int ticks = 0;
@@ -96,29 +81,25 @@ TEST_CASE("each motor has guards of its own, and the channel says whose was cros
     }
 }
 
-TEST_CASE("nothing that is no number arms it, and what was armed stays") {
+TEST_CASE("nothing that is no number is valid") {
     for (double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e7}) {
         for (std::size_t k = 0; k < Profile::kMotors; ++k) {
-            Profile profile = armed(Arming());
-            Arming wrong;
-            wrong.gains[k][2] = bad;
-            CHECK_FALSE(wrong.reaches(profile));
-            CHECK(profile.choice().watchdog_us == 50000);
-            CHECK(profile.drive({{10, 0, 0}}, {}).command_e4[0] == 20);
+            Profile::Settings wrong = arming();
+            wrong.gains[k].kd = bad;
+            CHECK_FALSE(wrong.valid());
         }
     }
-    Arming wrong;
-    wrong.limits[2][2] = 5;
-    wrong.limits[2][3] = 4;
-    Profile profile;
-    CHECK_FALSE(wrong.reaches(profile));
+    Profile::Settings wrong = arming();
+    wrong.axes[2].min_motor = 5;
+    wrong.axes[2].max_motor = 4;
+    CHECK_FALSE(wrong.valid());
 }
 
 TEST_CASE("a setpoint beyond one motor's travel is refused") {
-    Arming arming;
-    arming.limits[1][2] = -10;
-    arming.limits[1][3] = 10;
-    const Profile profile = armed(arming);
+    Profile::Settings settings = arming();
+    settings.axes[1].min_motor = -10;
+    settings.axes[1].max_motor = 10;
+    const Profile profile = armed(settings);
     CHECK(profile.allow({{kTop, 10, 0}}));
     CHECK_FALSE(profile.allow({{0, 11, 0}}));
     CHECK_FALSE(profile.allow({{0, -11, 0}}));
@@ -128,12 +109,12 @@ TEST_CASE("a board starts with all motors off, 0 A asked of each, and ticks at 2
     setup();
     for (std::size_t k = 0; k < Profile::kMotors; ++k) {
         CHECK(board.levels[wiring::kEnablePin[k]] == LOW);
-        CHECK(board.duties[wiring::kSetPin[k]] == 2048);
+        CHECK(board.duties[wiring::kSetPin[k]] == 410);
     }
     CHECK(timer.period_us == 500);
     REQUIRE((timer.function != nullptr));
     timer.function();
-    CHECK(board.duties[wiring::kSetPin[2]] == 2048);
+    CHECK(board.duties[wiring::kSetPin[2]] == 410);
 }
 
 TEST_CASE("what is wired to a motor is read with it, and one that is not ready tells no current") {
@@ -142,9 +123,9 @@ TEST_CASE("what is wired to a motor is read with it, and one that is not ready t
     for (std::size_t k = 0; k < Profile::kMotors; ++k) {
         board.analog[wiring::kCurrentPin[k]] = static_cast<int>(2048 + 100 * k);
         board.analog[wiring::kForcePin[k]] = static_cast<int>(10 * k);
-        board.levels[wiring::kReadyPin[k]] = HIGH;
+        board.levels[wiring::kReadyPin[k]] = LOW;
     }
-    board.levels[wiring::kReadyPin[1]] = LOW;
+    board.levels[wiring::kReadyPin[1]] = HIGH;
     Profile::Outputs outputs;
     outputs.in_force = true;
     outputs.command_e4[2] = 5000;

@@ -32,11 +32,14 @@ TEST_CASE("it starts with both motors off, 0 A asked of both converters, and edg
     setup();
     CHECK(board.levels[wiring::kDriveEnablePin] == LOW);
     CHECK(board.levels[wiring::kLoadEnablePin] == LOW);
-    CHECK(board.duties[A21] == 2048);
-    CHECK(board.duties[A22] == 2048);
+    CHECK(board.duties[A21] == 0);
+    CHECK(board.duties[A22] == 0);
     CHECK(board.priorities[IRQ_PORTC] < timer.level);
-    CHECK(FTM1_QDCTRL == FTM_QDCTRL_QUADEN);
-    CHECK(FTM2_QDCTRL == FTM_QDCTRL_QUADEN);
+    const auto filtered = FTM_QDCTRL_QUADEN | FTM_QDCTRL_PHAFLTREN | FTM_QDCTRL_PHBFLTREN;
+    CHECK(FTM1_QDCTRL == filtered);
+    CHECK(FTM2_QDCTRL == filtered);
+    CHECK(FTM1_FILTER == FTM2_FILTER);
+    CHECK((FTM1_FILTER & 0xF) != 0);
     CHECK(FTM2_MOD == 0xFFFF);
 }
 
@@ -106,5 +109,5 @@ TEST_CASE("no voltage goes beyond the limit of the current controller") {
         CHECK(wiring::kDrive.code(current) >= 0);
         CHECK(wiring::kDrive.code(current) <= 4095);
     }
-    CHECK(wiring::kDrive.code(std::nan("")) == 2048);
+    CHECK(wiring::kDrive.code(std::nan("")) == 0);
 }

@@ -20,18 +20,16 @@ from rig.machines.choose import machine_of
 
 @dataclass(frozen=True, slots=True)
 class Latch:
-    """What was latched, and what became of it.
+    """What was latched, and what is left to do.
 
     Attributes:
         what: The fault or trip in words; empty when nothing was latched.
         code: Its code, 0 for none.
-        is_cleared: Whether nothing is latched any more.
         then: What is left to do; may be empty.
     """
 
     what: str
     code: int
-    is_cleared: bool
     then: str
 
 
@@ -56,7 +54,7 @@ def _clear_drive(config: Config) -> Latch:
         code = drive.clear_fault()
     finally:
         drive.close()
-    return Latch(explain(code)[0] if code else "", code, True, "")
+    return Latch(explain(code)[0] if code else "", code, "")
 
 
 def _bus(config: Config) -> CanBus:
@@ -69,12 +67,13 @@ def _bus(config: Config) -> CanBus:
 
 
 def _clear_board(config: Config) -> Latch:
-    """Disarm a logger board and read its trip; its protocol clears a trip by arming alone."""
+    """Disarm a logger board, read its trip and clear that very one."""
     with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
         logger.identify()
         logger.disarm()
         report = logger.trip()
+        logger.clear(int(report.code))
     if report.code is Trip.NONE:
-        return Latch("", 0, True, "")
+        return Latch("", 0, "")
     what, fix = WORDS[report.code]
-    return Latch(f"{what}.", int(report.code), False, f"{fix} The next arming clears it.")
+    return Latch(f"{what}.", int(report.code), fix)

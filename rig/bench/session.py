@@ -5,11 +5,11 @@ trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM, a los
 logger is disarmed first, and the disarming is confirmed by the logger itself.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from time import sleep
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from calibration.zero import SensorZero, measure_zeros
 from drivers.clock import ClockFit
 from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import Identity, Trip, TripReport
+from drivers.teensy.profile import ArmLimits
+from drivers.teensy.protocol import Identity, Result, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.bench.board_start import require_same_start
 from rig.bench.companions import Companion, open_companions
@@ -28,7 +29,7 @@ from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
 from rig.bench.trips import HostWatch, trip_error, tripped
 from rig.configuration.config import Config
-from rig.errors import RigError, SafetyTripError, UsageError
+from rig.errors import ExitCode, RigError, SafetyTripError, UsageError
 from rig.machines.choose import machine_of
 from rig.machines.reading import Reading, reading_of, with_setpoints
 from rig.machines.safety import check_samples
@@ -52,8 +53,15 @@ STALL_S = 1.0
 """With no sample for this long, the logger is taken for dead, s."""
 
 
+COOLING_STEP_S = 0.25
+COOLING_S = 60.0
+"""How long a board whose motors are too warm to be armed is waited for, s, and in which steps."""
+
+
 class LoggerStalledError(RigError):
     """The logger sends nothing although it should stream."""
+
+    exit_code = ExitCode.DEVICE
 
 
 class Session:
@@ -204,9 +212,11 @@ class Session:
         """
         lead = round(lead_s * self.machine.profile.rate_hz)
         board = self.machine.board_limits(self.config, self.calibrations)
-        self._watch = HostWatch(board, self.machine)
-        self._watch.prepare()
-        self._logger.arm(self.machine.gains(self.config), board)
+        if self._watch is not None:
+            self.safe()  # the motion before this one is over
+        gains = self.machine.gains(self.config)
+        self._arm(gains, board)
+        self._watch = HostWatch(gains, board, self.machine)
         queued = played = 0
         is_over = False
         newest_sequence: int | None = None
@@ -227,6 +237,26 @@ class Session:
             played = max(played, int(reading.setpoint.max()) + 1)
             newest_sequence = int(reading.counts["sequence"][-1]) if played else None
             yield reading
+
+    def _arm(self, gains: Sequence[Any], limits: ArmLimits) -> None:
+        """Arm the board; one whose motors are warm is waited for.
+
+        Raises:
+            SafetyTripError: It has tripped before, and nobody has cleared that.
+        """
+        give_up_s = self._transport.now_s + COOLING_S
+        while True:
+            try:
+                return self._logger.arm(gains, limits)
+            except CommandRefusedError as error:
+                report = self._logger.trip()
+                if error.result == Result.TRIPPED and report.code is not Trip.NONE:
+                    state = "It tripped before this run and has not been cleared; nothing moved."
+                    raise self._tripped(report, state) from error
+                if error.result != Result.TOO_HOT or self._transport.now_s > give_up_s:
+                    raise
+            for _ in self.rest(COOLING_STEP_S):
+                pass
 
     def settle(self) -> None:
         """Move the unloaded rig a little, so that friction gives up the torque it holds."""
@@ -288,7 +318,7 @@ class Session:
             if report.code is Trip.NONE:
                 require_same_start(self._logger, self.identity.boot)
                 raise
-            state = "It is in its safe state, until armed again."
+            state = "It is in its safe state, until it is cleared."
             raise self._tripped(report, state) from error
 
     def _require_no_trip(self, reading: Reading) -> None:
@@ -301,7 +331,7 @@ class Session:
         trip = tripped(reading)
         if self._watch is not None and trip is not None:
             state = "It holds the spindle with a low command" if trip[1] else "It is released"
-            raise self._tripped(self._logger.trip(), f"{state}, until armed again.")
+            raise self._tripped(self._logger.trip(), f"{state}, until it is cleared.")
 
     def _follow_clock(self) -> None:
         exchange = self._logger.last_exchange

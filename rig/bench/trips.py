@@ -1,9 +1,13 @@
 """What tripped, in words: what happened, how late, how to clear it; and the host's own watch."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
+from drivers.teensy.core import CoreGuard, firmware_library
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import (
     STATUS_ARMED,
@@ -94,12 +98,20 @@ WORDS: dict[Trip, tuple[str, str]] = {
         "The current changed and the motor's encoder did not move",
         "Check the encoder's cable and supply; see [plausibility] frozen_current_a.",
     ),
+    Trip.QUEUE_RAN_DRY: (
+        "The board was kept alive and given no further setpoint",
+        "Look for what held up this program; [safety] dry_s sets the permitted time.",
+    ),
+    Trip.EMERGENCY_STOP: (
+        "The emergency stop was pressed, or its wire is broken",
+        "Release it when the rig is safe.",
+    ),
     Trip.SENSOR_MISSING: (
         "A sensor gave no reading",
         "Check its wiring and supply.",
     ),
 }
-"""What each trip is, and what to do before arming again."""
+"""What each trip is, and what to do before it is cleared."""
 
 _IN_UNITS = (
     *(Trip.OVER_CURRENT, Trip.PROXIMAL_TORQUE, Trip.DISTAL_TORQUE),
@@ -117,7 +129,7 @@ def trip_error(
     if report.channel:
         details.append(_numbers(report, calibrations, machine))
     details.append(f"{report.late_us / 1000:g} ms after it began")
-    return SafetyTripError(f"{what} ({', '.join(details)}).", state, f"{fix} Arming clears it.")
+    return SafetyTripError(f"{what} ({', '.join(details)}).", state, f"{fix} Then run: rig clear")
 
 
 def _numbers(report: TripReport, calibrations: CalibrationSet, machine: Machine) -> str:
@@ -140,39 +152,38 @@ def tripped(reading: Reading) -> tuple[Trip, bool] | None:
 
 
 class HostWatch:
-    """The board's limits held once more, on the samples as they arrived.
+    """The board's guards once more, on the samples as they arrived: the compiled core's own.
+
+    Without the compiled core this computer holds `[limits]` alone.
 
     Args:
-        limits: What the board was armed with.
+        gains: Gains the board was armed with.
+        limits: Limits the board was armed with.
         machine: What it moves.
     """
 
-    def __init__(self, limits: ArmLimits, machine: Machine) -> None:
-        self._limits = limits.as_array()
+    def __init__(self, gains: Sequence[Any], limits: ArmLimits, machine: Machine) -> None:
         self._machine = machine
-        self._guard = machine.guard().guard
+        is_built = firmware_library() is not None
+        self._guard = CoreGuard(machine.profile, gains, limits) if is_built else None
         self._newest_us: int | None = None
-
-    def prepare(self) -> None:
-        """Compile what `check` runs: the first time that takes longer than a board waits."""
-        no_rows = np.empty((0, len(self._machine.profile.input_names)), np.int32)
-        self._machine.first_crossing(no_rows, np.empty(0), self._guard, self._limits)
 
     def check(self, reading: Reading) -> TripReport | None:
         """Return the first crossing in the armed samples, None when there is none."""
         armed = has_status(reading.counts["status"], STATUS_ARMED)
-        if not armed.any():
+        if self._guard is None or not armed.any():
             return None
         samples = reading.counts[armed]
         names = self._machine.profile.input_names
         rows = np.stack([samples[name].astype(np.int32) for name in names], axis=1)
-        row, code, channel, value, limit, late_us = self._machine.first_crossing(
-            rows, self._ticks(samples["tick_us"]), self._guard, self._limits
+        row, code, channel, value, limit, late_us = self._guard.first_crossing(
+            rows, self._ticks(samples["tick_us"])
         )
         if code == Trip.NONE:
             return None
         tick_us = int(samples["tick_us"][row])
-        return TripReport(Trip(code), names[channel], value, limit, tick_us, late_us)
+        named = names + self._machine.profile.further_names
+        return TripReport(Trip(code), named[channel], value, limit, tick_us, late_us)
 
     def _ticks(self, tick_us: NDArray[np.uint32]) -> NDArray[np.float64]:
         """Return the ticks between each sample and the one before it, by the board's clock."""

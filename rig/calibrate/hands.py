@@ -10,7 +10,8 @@ from calibration.torque import weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.guard import COLUMNS, Drive
+from drivers.teensy.logic import Drive
+from drivers.teensy.reference_board import COLUMNS
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import Config
 from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench

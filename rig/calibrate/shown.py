@@ -35,7 +35,7 @@ SET_UP_S = 30.0
 
 
 def announced(procedure: Procedure) -> list[str]:
-    """Return what a session needs, how long it takes and what moves, a line each."""
+    """Return the needs of a session, its duration and its moving parts, a line each."""
     steps = procedure.steps()
     own = [step.instruction for step in steps if step.instruction]
     measured_s = sum(_seconds(step) for step in steps)

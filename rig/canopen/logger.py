@@ -4,32 +4,21 @@ The drive handles torque and position; guards, position loop, queue of setpoints
 the logger board's, run here tick by tick, a tick a SYNC. To the rest of the program it is a link to
 a logger like any other. What a board does better: a pause of this computer is a pause of the
 position loop; the drive then keeps its last torque until its own watch on this computer's heartbeat
-ends it.
+ends it. The logic is the firmware's own core, compiled for this computer.
 
 In virtual time a tick runs at every read. In real time the ticks run in a separate
 process (`rig.canopen.process`), so that nothing delays them.
 """
 
+import ctypes
+
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.epos4.drive import Epos4
 from drivers.errors import LinkLostError
-from drivers.teensy.control import PREVIOUS_MOTOR_COUNT
-from drivers.teensy.fake import PythonBoard
-from drivers.teensy.guard import (
-    COLUMNS,
-    COMMAND_E4,
-    CURRENT,
-    MOTOR,
-    MOTOR_WATCH,
-    SPINDLE,
-    Drive,
-    drive_tick,
-)
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.protocol import MISSING
 from drivers.teensy.reference import TICK_US
-from drivers.teensy.watches import LAST_MOTOR, PRIMED, STATE, is_in_force, judge_by_time
 from drivers.transport.can_bus import CanBus
 
 SERIAL_PREFIX = "EPOS4-"
@@ -40,8 +29,13 @@ MOST_MISSED = 3
 """SYNCs on end without an answer after which the motor's position is missing."""
 
 
+MOTOR, SPINDLE, CURRENT = 0, 1, 5
+"""Columns of the inputs of a reference rig's board; the others are 0."""
+_TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
+
+
 class Epos4Bench:
-    """The drive as `drivers.teensy.fake.Bench`: inputs from it, torque to it.
+    """The drive as `drivers.teensy.core.FirmwareBench`: inputs from it, torque to it.
 
     The spindle is the motor's encoder; current is computed from torque, 1 mA per count; quantities
     that the drive does not measure are 0.
@@ -58,28 +52,23 @@ class Epos4Bench:
         self._missed = 0
         self._powered = False
         self._lost = 0
-        self._measured_s: float | None = None
-        self._ticks_since = 1.0
+        self.board: FirmwareBoard | None = None
+        """The logic whose state the power stage follows."""
 
-    def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
-    ) -> NDArray[np.int32]:
-        """Run ticks, one a SYNC; see `drivers.teensy.fake.Bench.advance`."""
-        rows = np.zeros((ticks, COLUMNS), np.int32)
-        for k, row in enumerate(rows):
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        """Run ticks, one a SYNC; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
+        tick = _TICK(tick_address)
+        inputs, outputs = np.zeros(7, np.int32), np.zeros(2, np.int32)
+        for k in range(ticks):
             self._measure()
             missing = self._missed >= MOST_MISSED
-            row[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
-            row[CURRENT] = self._current_ma
-            if not missing:
-                self._judge_by_time(drive)
-            drive_tick(row, target[k], load_ma[k], *drive.arrays)
-            self._command(int(row[COMMAND_E4]), is_in_force(drive.guard[STATE]))
-        return rows
+            inputs[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
+            inputs[CURRENT] = self._current_ma
+            clock_us = (tick_us + TICK_US * k) % 2**32
+            tick(board_address, clock_us, inputs.ctypes.data, outputs.ctypes.data)
+            self._command(int(outputs[0]), self.board is not None and self.board.in_force)
 
     def follow(self, in_force: bool) -> None:
         """Switch the power stage on or off, and return when the drive has confirmed it.
@@ -99,13 +88,6 @@ class Epos4Bench:
         self._device.disarm()
         self._powered = False
 
-    def _judge_by_time(self, drive: Drive) -> None:
-        """Scale the travel to one tick for guard and controller where more time has passed."""
-        if drive.guard[PRIMED]:
-            watch = drive.guard[MOTOR_WATCH:]
-            judge_by_time(watch, self._position_count, self._ticks_since)
-            drive.control_state[PREVIOUS_MOTOR_COUNT] = watch[LAST_MOTOR]
-
     def _measure(self) -> None:
         """Wait for the next SYNC and take the drive's answer, if there is one."""
         batch = self._device.read(ANSWER_S)
@@ -116,10 +98,6 @@ class Epos4Bench:
             self._missed = 0
             self._position_count = int(batch.columns["position_count"][-1])
             self._current_ma = round(1000 * float(batch.columns["motor_current_a"][-1]))
-            now_s = float(batch.time_s[-1])
-            since_s = 0.0 if self._measured_s is None else now_s - self._measured_s
-            self._measured_s = now_s
-            self._ticks_since = since_s * 1e6 / TICK_US
         else:
             self._missed += 1
 
@@ -147,7 +125,8 @@ class CanopenLogger:
         device.start()
         self.bench = Epos4Bench(device)
         self.bench.release()  # an earlier program may have left it in force
-        self._board = PythonBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self._board = FirmwareBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self.bench.board = self._board
         self._began_s = bus.now_s
         self._late = round(late_s * 1e6) // TICK_US
         self._ticks = 0

@@ -8,22 +8,19 @@ def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
     """Clear the rig's latched fault or trip; the motors stay out of force.
 
     Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
-    up again, and its fault is cleared. A logger board is disarmed and its trip is reported; such a
-    board clears it when it is armed next.
+    up again, and its fault is cleared. A logger board is disarmed, and the trip it reports is
+    cleared by its code.
     """
     from rig.bench.clearing import clear_latch
 
     settings = chosen_rig(config, sim)
     latch = clear_latch(settings)
-    if not latch.code:
-        text = "nothing is latched."
-    elif latch.is_cleared:
-        text = f"cleared: {latch.what} (code {latch.code:#06x})"
-    else:
-        text = f"latched: {latch.what} (code {latch.code}) {latch.then}"
+    text = "nothing is latched."
+    if latch.code:
+        text = f"cleared: {latch.what} (code {latch.code:#06x}) {latch.then}".rstrip()
     screen = results(json)
     screen.print(f"{settings.name}: out of force; {text}", markup=False)
     if json:
         latched = {"what": latch.what, "code": latch.code} if latch.code else None
-        emit_json({"state": "disarmed", "latched": latched, "cleared": latch.is_cleared})
+        emit_json({"state": "disarmed", "latched": latched, "cleared": True})
     return 0

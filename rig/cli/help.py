@@ -5,7 +5,17 @@ from typing import Any
 from typer.core import TyperGroup
 
 GROUPS = {
-    "Begin": ("demo", "config", "machine", "doctor", "devices", "selftest", "udev", "firmware"),
+    "Begin": (
+        "demo",
+        "config",
+        "machine",
+        "doctor",
+        "devices",
+        "selftest",
+        "commission",
+        "udev",
+        "firmware",
+    ),
     "At the rig": (
         "live",
         "record",

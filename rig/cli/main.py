@@ -14,6 +14,7 @@ from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
 from rig.cli.campaigns import campaigns
 from rig.cli.clear import clear
+from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
@@ -79,6 +80,7 @@ app.add_typer(config_app, name="config")
 app.command()(doctor)
 app.command()(devices)
 app.command()(selftest)
+app.command()(commission)
 app.command()(reference)
 app.command()(stop)
 app.command()(clear)

@@ -113,6 +113,12 @@ class SafetySection(Section):
         jaw_open_rad: Jaw angle below which it must not open; likewise.
         saturated_s: How long a torque or current sensor may be at the end of its range.
         stale_s: How long its reading may not change at all.
+        load_continuous_a: Load current that warms the load motor no further, by its data sheet; the
+            limit of the load where it is not set, which is never exceeded.
+        load_heat_a2_s: Heat above it that the load motor can take; it has no current read-back, so
+            the current it is given counts.
+        dry_s: How long the last setpoint is held while none follows.
+        hold_s: How long a tripped board may hold; then it releases.
         watchdog_s: How long this computer may be silent.
     """
 
@@ -128,6 +134,10 @@ class SafetySection(Section):
     jaw_open_rad: Number | None = None
     saturated_s: float = Field(default=0.02, ge=0, le=60)
     stale_s: float = Field(default=0.5, ge=0, le=60)
+    load_continuous_a: Current | None = None
+    load_heat_a2_s: float = Field(default=0.5, ge=0, le=2000)
+    dry_s: float = Field(default=0.5, gt=0, le=60)
+    hold_s: float = Field(default=10.0, gt=0, le=600)
     watchdog_s: float = Field(default=0.25, ge=0.005, le=1)
 
 

@@ -3,12 +3,18 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from drivers.errors import DriverError
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Trip
 from rig.bench.devices import openers
+from rig.bench.logger import open_logger
+from rig.bench.trips import WORDS
 from rig.configuration.check import problems
 from rig.configuration.config import Config
 from rig.doctor.finding import Finding, Level
 from rig.doctor.ports import ROOT, port_findings, serial_ports
 from rig.doctor.stream import device_findings
+from rig.machines.choose import machine_of
 
 
 def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
@@ -28,3 +34,22 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
         return  # it would be opened as it must not be
     for name, open_it in openers(config):
         yield from device_findings(name, open_it)
+    if config.logger.driver != "epos4":
+        yield from board_findings(config)
+
+
+def board_findings(config: Config) -> Iterator[Finding]:
+    """Yield whether the logger board may be armed: its zeros, and what it tripped over."""
+    name = "logger"
+    try:
+        with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
+            identity = logger.identify()
+            trip = logger.trip().code
+    except DriverError:
+        return  # reported with the device
+    if not identity.referenced:
+        what = "The encoders have no zeros: the board was restarted, or an encoder was doubted."
+        yield Finding(name, "referenced", Level.WARNING, what, "Run: rig reference")
+    if trip is not Trip.NONE:
+        what, fix = WORDS[trip]
+        yield Finding(name, "tripped", Level.WARNING, f"{what}.", f"{fix} Then run: rig clear")

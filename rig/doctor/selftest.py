@@ -67,8 +67,11 @@ def _on_the_board(
         ):
             logger.identify()
             logger.start()
+            if logger.trip().code is not Trip.NONE:
+                return Check(name, False, "The board has tripped before. Run: rig clear")
             passed, detail = check(logger, config)
             logger.disarm()
+            _clear_own(logger)
             logger.stop()
     except (DriverError, CalibrationError) as error:
         return Check(name, False, str(error))
@@ -141,6 +144,11 @@ def _must_trip(
     status = int(_read(logger, within_s).samples["status"][-1])
     told = Trip(status >> TRIP_SHIFT)
     return told is trip, f"status {status:#06x}: {told.name.lower().replace('_', ' ')}"
+
+
+def _clear_own(logger: TeensyLogger) -> None:
+    """Clear what this self-test made the board trip over."""
+    logger.clear(int(logger.trip().code))
 
 
 def _read(logger: TeensyLogger, duration_s: float) -> SampleBatch:

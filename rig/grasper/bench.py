@@ -12,9 +12,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy import control, grasper_guard, watches
+from drivers.teensy import control, grasper_board
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import COLUMNS, FORCE_MAX, INPUTS, GrasperDrive
+from drivers.teensy.grasper_board import COLUMNS, FORCE_MAX, INPUTS
+from drivers.teensy.logic import Drive
 from rig.grasper import plant as grasper_plant
 from rig.grasper.plant import PROTOTYPES, Prototype, vary
 from rig.simulation import noise
@@ -50,15 +51,15 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
 
     @numba.njit(cache=True)
     def with_controllers(  # type: ignore[no-untyped-def]
-        state, axes, currents, seed, first_tick, targets, guard, limits, control_state, gains, rows
+        state, axes, currents, seed, first_tick, targets, board, control_state, gains, rows
     ):
         _ = source
         for k in range(rows.shape[0]):
             row = rows[k]
             _sample(state, axes, currents, seed, first_tick + k, row)
-            grasper_guard.grasper_tick(row, targets[k], guard, limits, control_state, gains)
+            grasper_board.grasper_tick(row, targets[k], board, control_state, gains)
             for motor in range(MOTORS):
-                command_e4 = row[grasper_guard.COMMAND_E4 + motor]
+                command_e4 = row[grasper_board.COMMAND_E4 + motor]
                 currents[motor] = FULL_SCALE_A * 1e-4 * command_e4
                 grasper_plant.step_axis(state[motor], axes[motor], currents[motor])
 
@@ -82,7 +83,7 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
 
 def _fingerprint() -> str:
     digest = hashlib.sha256()
-    for module in (control, grasper_guard, watches, grasper_plant, noise):
+    for module in (control, grasper_board, grasper_plant, noise):
         digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 
@@ -122,7 +123,7 @@ class GrasperBench:
     def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
         """Run ticks with the controllers inside; see `drivers.teensy.fake.Bench.advance`."""
         *targets, drive = plan
-        assert isinstance(drive, GrasperDrive)  # noqa: S101
+        assert isinstance(drive, Drive)  # noqa: S101
         rows = np.zeros((ticks, COLUMNS), np.int32)
         wanted = np.ascontiguousarray(np.stack(targets, axis=1), np.int32)
         shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
@@ -133,7 +134,7 @@ class GrasperBench:
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
-        """Run ticks with a board in the loop; see `drivers.teensy.firmware_fake.FirmwareBench`."""
+        """Run ticks with a board in the loop; see `drivers.teensy.core.FirmwareBench`."""
         shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
         _run_with_board(*shared, ticks, GRASPER.tick_us, tick_address, board_address, tick_us)
         self._ticks += ticks

@@ -1,9 +1,9 @@
 """The simulated grasper's board, as the simulated logger opens it."""
 
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import GRASPER_LOGIC
+from drivers.teensy.grasper_board import GRASPER_LOGIC
 from drivers.transport.simulated import Board
 from rig.configuration.sections import SimulationSection
 from rig.errors import UsageError

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from drivers.teensy import grasper_guard
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, SafeState, Trip
@@ -73,8 +72,6 @@ class GrasperMachine:
     }
     here_channels = tuple(f"{axis}_angle_rad" for axis in AXES)
     shown = ("grasp_force_n", "pitch_force_n", "yaw_force_n")
-    guard = grasper_guard.GrasperDrive
-    first_crossing = staticmethod(grasper_guard.first_crossing)
 
     def first_look(self, config: Config) -> str:
         """Return the grasper's own protocol."""
@@ -109,6 +106,7 @@ class GrasperMachine:
                 max_motor=high,
                 max_motor_step=max_motor_step,
                 max_motor_jump=jump_limit(max_motor_step),
+                max_target_step=min(TOP, max_motor_step + 1),
                 continuous_current=counts.size(current, safety.continuous_current_a),
                 i2t=counts.heat(current, safety.heat_a2_s),
                 stall_current=counts.size(current, safety.stall_current_a),
@@ -122,6 +120,8 @@ class GrasperMachine:
             stall_ticks=ticks_of(safety.stall_s, tick_s),
             saturated_ticks=ticks_of(safety.saturated_s, tick_s),
             stale_ticks=ticks_of(safety.stale_s, tick_s),
+            dry_ticks=ticks_of(safety.dry_s, tick_s),
+            hold_ticks=ticks_of(safety.hold_s, tick_s),
             watchdog_us=round(safety.watchdog_s * 1e6),
             safe_state=SafeState[safety.safe_state.upper()],
             hold_command_e4=round(safety.hold_command_ratio * 1e4),

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from drivers.teensy.logic import BoardDrive
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Trip
 from rig.configuration.config import Config
@@ -117,20 +116,6 @@ class Machine(Protocol):
 
     def settling(self, here: tuple[float, ...]) -> MachineMotion:
         """Return the motion that lets friction give up the torque it holds."""
-        ...
-
-    def guard(self) -> BoardDrive:
-        """Return a guard that has seen nothing yet, for `first_crossing`."""
-        ...
-
-    def first_crossing(
-        self,
-        rows: NDArray[np.int32],
-        ticks: NDArray[np.float64],
-        guard: NDArray[np.int64],
-        limits: NDArray[np.int64],
-    ) -> tuple[int, int, int, int, int, int]:
-        """Hold the board's limits against rows of inputs once more."""
         ...
 
     def too_narrow(self, limits: ArmLimits, sample: np.void) -> tuple[ArmLimits, Trip]:

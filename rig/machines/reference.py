@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from drivers.teensy.guard import Drive, first_crossing
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, Trip
 from drivers.teensy.reference import REFERENCE, Limits
@@ -33,12 +32,11 @@ class ReferenceMachine:
         "proximal": "proximal_torque_n_m",
         "distal": "distal_torque_n_m",
         "current": "motor_current_a",
+        "load_ma": "load_command_a",
     }
     here_channels = ("spindle_angle_rad",)
     shown = ("distal_torque_n_m",)
     board_limits = staticmethod(board_limits)
-    guard = Drive
-    first_crossing = staticmethod(first_crossing)
 
     def first_look(self, config: Config) -> str:
         """Return the quick protocol, without load where there is no load motor."""

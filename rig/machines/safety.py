@@ -1,6 +1,6 @@
 """The limits of the rig: refused setpoints, trips, and limits checked by the board itself."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,7 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
         closed_rad if safety.jaw_closed_rad is None else safety.jaw_closed_rad,
     )
     max_motor_step = size("motor_angle_rad", safety.motor_speed_rad_s * TICK_S)
+    load_a = safety.load_continuous_a or limits.load_command_a
     loop = {
         "motor": "motor_angle_rad",
         "followed": "spindle_angle_rad",
@@ -83,8 +84,11 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
         max_spindle=max_spindle,
         min_jaw=min_jaw,
         max_jaw=max_jaw,
+        continuous_load_ma=size("load_command_a", load_a),
+        load_i2t=counts.heat("load_command_a", safety.load_heat_a2_s),
         max_motor_step=max_motor_step,
         max_motor_jump=jump_limit(max_motor_step),
+        max_target_step=target_step(size, safety.motor_speed_rad_s, config.plausibility.gear_ratio),
         continuous_current=size("motor_current_a", safety.continuous_current_a),
         i2t=counts.heat("motor_current_a", safety.heat_a2_s),
         stall_current=size("motor_current_a", safety.stall_current_a),
@@ -94,10 +98,21 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
         stall_ticks=ticks_of(safety.stall_s, TICK_S),
         saturated_ticks=ticks_of(safety.saturated_s, TICK_S),
         stale_ticks=ticks_of(safety.stale_s, TICK_S),
+        dry_ticks=ticks_of(safety.dry_s, TICK_S),
+        hold_ticks=ticks_of(safety.hold_s, TICK_S),
         watchdog_us=round(safety.watchdog_s * 1e6),
         safe_state=SafeState[safety.safe_state.upper()],
         hold_command_e4=round(safety.hold_command_ratio * 1e4),
     )
+
+
+def target_step(
+    size: Callable[[str, float], int], motor_speed_rad_s: float, gear_ratio: float
+) -> int:
+    """Return how far one setpoint of the spindle may be from the next: at the motor's speed."""
+    if not gear_ratio:
+        return TOP
+    return min(TOP, 1 + size("spindle_angle_rad", motor_speed_rad_s * TICK_S / gear_ratio))
 
 
 def ticks_of(duration_s: float, tick_s: float) -> int:

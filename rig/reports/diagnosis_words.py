@@ -79,7 +79,7 @@ def meaning(family: str) -> str:
 
 
 def check_of(finding: Finding) -> str:
-    """Return what to check at the rig for a finding, one sentence at least."""
+    """Return the checks at the rig for a finding, one sentence at least."""
     if finding.verdict in ("identified", "one_of"):
         checks = [_check(family) for family in (finding.family, *finding.alternatives)]
         if any(checks):

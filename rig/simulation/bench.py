@@ -15,9 +15,9 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from drivers.teensy import control, watches
-from drivers.teensy import guard as board_guard
-from drivers.teensy.guard import COLUMNS, Drive
+from drivers.teensy import control, reference_board
+from drivers.teensy.logic import Drive
+from drivers.teensy.reference_board import COLUMNS
 from rig.errors import UsageError
 from rig.simulation import (
     hidden,
@@ -49,8 +49,7 @@ def _fingerprint() -> str:
     digest = hashlib.sha256()
     for module in (
         control,
-        board_guard,
-        watches,
+        reference_board,
         hidden,
         hidden_cable,
         hidden_drive,
@@ -107,8 +106,7 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         first_tick,
         target,
         load_ma,
-        guard,
-        limits,
+        board,
         control_state,
         gains,
         rows,
@@ -117,7 +115,7 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
-            board_guard.drive_tick(row, target[k], load_ma[k], guard, limits, control_state, gains)
+            reference_board.drive_tick(row, target[k], load_ma[k], board, control_state, gains)
             current = -p.command_full_scale_a * 1e-4 * row[sensors.COMMAND_E4]
             plant.step_tick(state, p, effects, current, 1e-3 * row[sensors.LOAD_MA])
 
@@ -188,17 +186,17 @@ class SimulatedBench:
         load_ma: NDArray[np.int32],
         drive: Drive,
     ) -> NDArray[np.int32]:
-        """Run closed-loop ticks with the board's guard and controller of `drivers.teensy.guard`.
+        """Run closed-loop ticks with the plain board's controller, without guards.
 
         Args:
             ticks: Number of ticks of 1 ms.
             target: Target of the spindle, encoder counts, shape (ticks,).
             load_ma: Current of the load motor, mA, shape (ticks,).
-            drive: The board's state, gains and limits, changed in place. From the tick on whose
-                counts cross a limit, the drive is in its safe state.
+            drive: The board's state and gains, changed in place.
 
         Returns:
-            Counts with raw signs, shape (ticks, 11), int32, columns as in `drivers.teensy.guard`.
+            Counts with raw signs, shape (ticks, 11), int32, columns as in
+            `drivers.teensy.reference_board`.
 
         Raises:
             BenchInputError: A shape does not fit.

@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-from drivers.teensy.firmware_fake import FirmwareMissingError
+from drivers.teensy.core import FirmwareMissingError
 from drivers.transport import Transport, open_transport
 
 PROGRAM = Path(__file__).parents[2] / "firmware" / "build" / "rig_firmware"

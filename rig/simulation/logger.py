@@ -1,7 +1,7 @@
 """Open the simulated logger: plant, board and a transport in virtual time."""
 
+from drivers.teensy.core import FirmwareBoard, firmware_library
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.firmware_fake import FirmwareBoard, firmware_library
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
 from rig.configuration.sections import SimulationSection

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.guard import Drive
+from drivers.teensy.logic import Drive
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import REFERENCE_GAINS
 from rig.simulation.sensors import TURN_RAD, columns_of

@@ -6,7 +6,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.guard import COLUMNS, Drive, drive_tick
+from drivers.teensy.logic import Drive
+from drivers.teensy.reference_board import COLUMNS, drive_tick
 
 START_SPINDLE = 1366
 MOTOR, VELOCITY, CURRENT_MA, LOAD_MA, TICK = range(5)
@@ -41,17 +42,17 @@ def step(state, command_e4, load_ma):
 
 
 @numba.njit  # not cached: the cache does not see changes in the functions of other files
-def run(state, rows, target, load_ma, guard, limits, control_state, gains):
+def run(state, rows, target, load_ma, board, control_state, gains):
     """Run closed-loop ticks with the controller inside."""
     for k in range(rows.shape[0]):
         row = rows[k]
         sample(state, row)
-        drive_tick(row, target[k], load_ma[k], guard, limits, control_state, gains)
+        drive_tick(row, target[k], load_ma[k], board, control_state, gains)
         step(state, row[7], row[8])
 
 
 class PlainBench:
-    """Implements `drivers.teensy.fake.Bench` and `drivers.teensy.firmware_fake.FirmwareBench`."""
+    """Implements `drivers.teensy.fake.Bench` and `drivers.teensy.core.FirmwareBench`."""
 
     def __init__(self) -> None:
         self.state = np.zeros(5)

@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.device import Batch, Device, SampleFlag
 from drivers.errors import DriverError, LinkLostError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_guard import GRASPER_LOGIC
+from drivers.teensy.grasper_board import GRASPER_LOGIC
+from drivers.teensy_master.fake import TurnedByHand
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.emulated_board import MISSING
 from tests.drivers.emulated_board import open_fake as open_emulated
-from tests.drivers.fault_names import EVIDENCE, SAID
-from tests.drivers.test_grasper_twin import ScriptedGrasper, moving
 
 pytestmark = pytest.mark.integration
 
@@ -43,8 +43,8 @@ def opened(name: str, faults: Faults | None = None) -> Device:
 
 
 def open_grasper(faults: Faults) -> Device:
-    """Open the logger's driver on a grasper's board, its motors turned by hand."""
-    board = PythonBoard(ScriptedGrasper(moving(100_000)), logic=GRASPER_LOGIC)
+    """Open the logger's driver on a grasper's board, its sensors turned by hand."""
+    board = PythonBoard(TurnedByHand(), logic=GRASPER_LOGIC)
     link = SimulatedTransport(board, "sim://grasper", tick_s=GRASPER.tick_us * 1e-6)
     return TeensyDevice(FaultyTransport(link, faults), profile=GRASPER)
 

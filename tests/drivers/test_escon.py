@@ -13,8 +13,8 @@ from drivers.escon.fake import EsconFake
 from drivers.escon.scaling import EsconWiring, Line, SetValueError
 from drivers.teensy.reference import SAMPLE_DTYPE
 
-PWM = EsconWiring(Line(0.1, -2.0, 0.9, 2.0), "pwm", Line(0.0, -2.0, 3.3, 2.0))
-ANALOG = EsconWiring(Line(0.0, -1.0, 3.3, 1.0), "analog", Line(0.3, -1.0, 3.0, 1.0), limit_a=1.0)
+PWM = EsconWiring(Line(0.1, 0.0, 0.9, 2.0), "pwm", Line(0.0, -2.0, 3.3, 2.0))
+ANALOG = EsconWiring(Line(0.0, 0.0, 3.3, 1.0), "analog", Line(0.3, -1.0, 3.0, 1.0), limit_a=1.0)
 BOTH = pytest.mark.parametrize("wiring", [PWM, ANALOG], ids=["pwm", "analog"])
 
 
@@ -32,7 +32,7 @@ def test_a_current_is_asked_for_to_half_a_step(wiring: EsconWiring, ratio: float
     current_a = ratio * wiring.limit_a
     code = wiring.output_code(current_a)
     step_a = abs(wiring.current_of_code(1) - wiring.current_of_code(0))
-    assert abs(wiring.current_of_code(code) - current_a) <= 0.5001 * step_a
+    assert abs(wiring.current_of_code(code) - abs(current_a)) <= 0.5001 * step_a
     if wiring.kind == "pwm":
         assert 0.0998 <= code / 4095 <= 0.9002
 
@@ -47,8 +47,8 @@ def test_what_cannot_be_asked_is_refused(wiring: EsconWiring, current_a: float) 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((Line(0.0, -2.0, 1.0, 4.0), "pwm", Line(0, -2, 3.3, 2)), "would need"),
-        ((Line(0.0, -1.0, 10.0, 1.0), "analog", Line(0, -2, 3.3, 2)), "would need"),
+        ((Line(0.0, 0.0, 1.0, 4.0), "pwm", Line(0, -2, 3.3, 2)), "would need"),
+        ((Line(0.0, 0.0, 10.0, 1.0), "analog", Line(0, -2, 3.3, 2)), "would need"),
     ],
 )
 def test_points_that_do_not_fit_the_output_are_refused(arguments: tuple, message: str) -> None:
@@ -100,10 +100,10 @@ def test_a_fault_takes_ready_away_until_enable_is_given_anew() -> None:
 
 def test_a_duty_outside_the_range_is_taken_as_its_end() -> None:
     module = EsconFake(PWM)
-    for code in (0, 4095):
+    for code, size_a in ((0, 0.0), (4095, 2.0)):
         for _ in range(12):
-            module.tick(code, enable=True)
-        assert abs(module.current_a) == pytest.approx(2.0, abs=1e-6)
+            module.tick(code, enable=True, positive=False)
+        assert module.current_a == pytest.approx(-size_a, abs=1e-6)
 
 
 def test_its_current_is_a_channel_of_the_logger() -> None:
@@ -114,7 +114,7 @@ def test_its_current_is_a_channel_of_the_logger() -> None:
     assert channel.channel.unit == "A"
 
 
-@given(st.floats(-3, 3), st.integers(0, 4095))
+@given(st.floats(-3, 3), st.integers(1, 4094))
 def test_the_board_scales_alike(library: Path, current_a: float, reading: int) -> None:
     core = ctypes.CDLL(str(library))
     core.rig_escon_code.argtypes = [ctypes.c_double]

@@ -1,5 +1,10 @@
 """The logger's layouts: fixed sizes and offsets, round trips, and refusal of anything else."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +15,7 @@ from drivers.teensy import protocol
 from drivers.teensy.protocol import Ack, Kind, Trip
 from drivers.teensy.reference import LIMIT_NAMES, REFERENCE, SAMPLE_DTYPE, SETPOINT_DTYPE, Limits
 
+ROOT = Path(__file__).parents[2]
 u16 = st.integers(0, 2**16 - 1)
 i32 = st.integers(-(2**31), 2**31 - 1)
 
@@ -39,9 +45,10 @@ def test_the_text_names_every_kind() -> None:
     st.tuples(*[i32] * len(LIMIT_NAMES)),
 )
 def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ...]) -> None:
-    payload = REFERENCE.encode_arm(sequence, np.array(gains), Limits(*limits))
+    payload = REFERENCE.encode_arm(sequence, np.array(gains), Limits(*limits), 2**32 - 5)
     kind, number, fields = REFERENCE.decode(payload)
     assert (kind, number) == (Kind.ARM, sequence)
+    assert fields["session"] == 2**32 - 5
     assert [float(fields[name]) for name in protocol.GAIN_NAMES] == gains
     assert tuple(int(fields[name]) for name in LIMIT_NAMES) == limits
 
@@ -62,7 +69,7 @@ def test_an_unknown_trip_is_refused() -> None:
 @given(u16, st.lists(st.tuples(i32, st.integers(-(2**15), 2**15 - 1)), min_size=1, max_size=100))
 def test_setpoints_come_back(sequence: int, setpoints: list[tuple[int, int]]) -> None:
     targets, loads = (np.array(values) for values in zip(*setpoints, strict=True))
-    payload = REFERENCE.encode_setpoints(sequence, (targets, loads))
+    payload = REFERENCE.encode_setpoints(sequence, (targets, loads), 77)
     assert REFERENCE.decode(payload)[:2] == (Kind.SETPOINTS, sequence)
     assert REFERENCE.decode_setpoints(payload).tolist() == setpoints
 
@@ -103,3 +110,14 @@ def test_identity_and_pong_come_back() -> None:
 def test_anything_else_is_refused(payload: bytes) -> None:
     with pytest.raises(FrameError):
         REFERENCE.decode(payload)
+
+
+def test_the_boards_header_is_the_one_made_from_these_tables() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "import contract; print(contract.header(), end='')"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "firmware")])},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == (ROOT / "firmware" / "core" / "contract.hpp").read_text()

@@ -1,6 +1,8 @@
 """The logger's driver, on the fake and on the firmware core: what a session sees of it."""
 
+import itertools
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +17,9 @@ from drivers.errors import (
 )
 from drivers.framing import encode_frame
 from drivers.teensy import protocol
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import Result
 from drivers.teensy.reference import REFERENCE, Limits
 from drivers.transport.faulty import FaultyTransport, once
@@ -25,7 +27,7 @@ from drivers.transport.simulated import Board, SimulatedTransport
 from tests.drivers.bench_physics import START_SPINDLE, PlainBench
 
 GAINS = [20.0, 0.05, -1.0, 0.2, 10000.0]
-WIDEST = Limits.widest()
+WIDEST = Limits()
 
 MakeBoard = Callable[..., Board]
 
@@ -135,16 +137,17 @@ def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: Ma
     with pytest.raises(CommandRefusedError, match="not armed") as refusal:
         logger.queue(np.array([0]), np.array([0]))
     assert refusal.value.result == Result.NOT_ARMED
+    with pytest.raises(CommandRefusedError, match="rig clear"):
+        logger.arm(GAINS, WIDEST)
+    logger.clear(logger.trip().code)
     logger.arm(GAINS, WIDEST)
     fresh = joined(read_for(logger, 50))
     assert not (fresh["status"][-50:] & protocol.STATUS_WATCHDOG_TRIPPED).any()
     logger.close()
 
 
-def test_a_crossed_limit_takes_the_motor_out_of_force_in_the_same_tick(
-    make_board: MakeBoard,
-) -> None:
-    logger = logger_of(make_board())
+def test_a_crossed_limit_takes_the_motor_out_of_force_in_the_same_tick(library: Path) -> None:
+    logger = logger_of(FirmwareBoard(PlainBench(), library=library))
     logger.start()
     limits = Limits(1500, 1000, 5800, 32767, -4000, 4000)
     logger.arm(GAINS, limits)
@@ -177,8 +180,8 @@ def test_a_dry_queue_holds_the_last_target_and_says_so(make_board: MakeBoard) ->
     logger.close()
 
 
-def test_the_board_refuses_what_must_not_be(make_board: MakeBoard) -> None:
-    logger = logger_of(make_board())
+def test_the_board_refuses_what_must_not_be(library: Path) -> None:
+    logger = logger_of(FirmwareBoard(PlainBench(), library=library))
     with pytest.raises(CommandRefusedError, match="finite"):
         logger.arm([np.nan, 0, 0, 0.5, 1], WIDEST)
     with pytest.raises(CommandRefusedError):
@@ -292,9 +295,10 @@ def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard)
 def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: MakeBoard) -> None:
     cable, logger = behind_a_bad_cable(make_board())
     logger.identify()
-    cable.incoming = once(lambda _: b"")
+    came = itertools.count()
+    cable.incoming = lambda data: b"" if data and next(came) == 1 else data  # behind the hello's
     with pytest.raises(CommandRefusedError, match="not any more"):
-        logger.arm(GAINS, Limits(0, 0, 0, 0, START_SPINDLE + 1, START_SPINDLE + 2))
+        logger.arm(GAINS, Limits(watchdog_us=50_000))
     assert logger.counters.retries == 1
     logger.close()
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.framing import encode_frame
+from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
-from drivers.teensy.grasper import GRASPER, GrasperLimits
+from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.protocol import Kind
 from drivers.teensy.reference import REFERENCE, Limits
 
@@ -71,29 +71,80 @@ def enable_writes(name: str, image: TeensyImage, since: int = 0) -> list[tuple[s
     ]
 
 
-def say(image: TeensyImage, *payloads: bytes) -> None:
-    """Hand commands to the main loop."""
+def say(image: TeensyImage, *payloads: bytes) -> int:
+    """Hand commands to the main loop; return the most instructions on end with interrupts off."""
+    longest = 0
     for payload in payloads:
         image.received += b"\x00" + encode_frame(payload)
         while image.received:
             image.call("loop")
+            longest = max(longest, image.longest_locked)
+    return longest
 
 
-def set_in_motion(name: str, image: TeensyImage) -> None:
-    """Arm the board and let it follow set-points for some ticks."""
+def offered(image: TeensyImage) -> int:
+    """Say hello and return the session the board offers."""
+    image.sent.clear()
+    say(image, protocol.encode_command(Kind.HELLO, 1))
+    replies: list[bytes] = []
+    while not replies:  # behind the samples that wait
+        image.call("loop")
+        frames = FrameStream(0).feed(bytes(image.sent)).others
+        replies = [frame for frame in frames if frame[1] == Kind.HELLO_REPLY]
+    (reply,) = replies
+    return int(np.frombuffer(reply, protocol.HELLO_REPLY_DTYPE)["offer"][0])
+
+
+MOTOR = {
+    "max_current": 900,
+    "max_motor_step": 80,
+    "max_motor_jump": 300,
+    "max_target_step": 10,
+    "max_following": 500,
+    "following_ticks": 100,
+    "continuous_current": 500,
+    "i2t": 20_000,
+}
+CHOICE = {"stall_ticks": 100, "dry_ticks": 100, "hold_ticks": 100, "watchdog_us": 50_000}
+
+
+def arming(name: str, session: int) -> tuple[bytes, bytes]:
+    """Return commands that arm within the board's own limits, and the longest setpoints."""
     if name.endswith("grasper"):
-        arm = GRASPER.encode_arm(2, np.tile([1.0, 0, 0, 1, 100], (3, 1)), GrasperLimits())
-        moves = GRASPER.encode_setpoints(3, [np.zeros(9, np.int32)] * 3)
-    else:
-        arm = REFERENCE.encode_arm(2, np.array([[1.0, 0, 0, 1, 100]]), Limits.widest())
-        moves = REFERENCE.encode_setpoints(3, [np.zeros(9, np.int32)] * 2)
+        axis = AxisLimits(min_motor=-9, max_motor=9, **MOTOR)
+        arm = GRASPER.encode_arm(
+            2, np.tile([1.0, 0, 0, 1, 100], (3, 1)), GrasperLimits((axis,) * 3, **CHOICE), session
+        )
+        return arm, GRASPER.encode_setpoints(3, [np.zeros(50, np.int32)] * 3, session)
+    load = {"max_load_ma": 9, "continuous_load_ma": 500, "load_i2t": 20_000}
+    limits = Limits(min_spindle=-9, max_spindle=9, **load, **MOTOR, **CHOICE)
+    arm = REFERENCE.encode_arm(2, np.array([[1.0, 0, 0, 1, 100]]), limits, session)
+    return arm, REFERENCE.encode_setpoints(3, [np.zeros(100, np.int32)] * 2, session)
+
+
+def set_in_motion(name: str, image: TeensyImage) -> int:
+    """Arm the board and let it follow set-points for some ticks.
+
+    Returns the most instructions on end with interrupts off on the way.
+    """
     for _ in range(110):  # it stands still, and is referenced where it stands
         image.tick()
-    say(image, protocol.encode_command(Kind.HELLO, 1), protocol.encode_reference(1, [0, 0, 0]))
-    say(image, arm, moves)
+    longest = say(image, protocol.encode_reference(1, [0, 0, 0]))
+    longest = max(longest, say(image, *arming(name, offered(image))))
     for _ in range(3):
         image.tick()
         image.call("loop")
+        longest = max(longest, image.longest_locked)
+    return longest
+
+
+@pytest.mark.parametrize(("name", "mhz"), [("teensy35", 120), ("teensy41", 600)])
+def test_a_frame_from_the_host_keeps_no_edge_waiting(images: Images, name: str, mhz: int) -> None:
+    """At one instruction a cycle; the longest set-point frame, its acknowledgement, and samples."""
+    image = images(name)
+    say(image, protocol.encode_command(Kind.START, 9))
+    longest = set_in_motion(name, image)
+    assert 0 < longest <= 20 * mhz
 
 
 @pytest.mark.parametrize("name", ["teensy41", "teensy41-grasper"])

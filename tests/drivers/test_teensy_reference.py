@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivers.errors import CommandRefusedError
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.firmware_fake import FirmwareBoard
 from drivers.teensy.protocol import STATUS_REFERENCED, Result
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
@@ -20,7 +20,7 @@ STANDS = np.array([[700, -40, 9, 1, -1, 2, 0], [700, -40, 9, 2, 1, -2, 0]] * 500
 
 def logger_of(library: Path, inputs: np.ndarray = STANDS, boot: int = 7) -> TeensyLogger:
     bench = ScriptedBench(inputs)
-    board = FirmwareBoard(bench, library=library, boot=boot, referenced=False)
+    board = FirmwareBoard(bench, library=library, boot=boot, simulated=False)
     return TeensyLogger(SimulatedTransport(board, "sim://"))
 
 
@@ -42,14 +42,14 @@ def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library: 
         logger.start()
         assert not newest(logger)["status"] & STATUS_REFERENCED
         with pytest.raises(CommandRefusedError, match="rig reference") as refused:
-            logger.arm(GAINS, Limits.widest())
+            logger.arm(GAINS, Limits())
         assert refused.value.result == Result.NOT_REFERENCED
         at_rest(logger)
         logger.reference([0, 1000, 500])
         sample = newest(logger)
         assert [int(sample[name]) for name in ("motor", "spindle", "jaw")] == [0, 1000, 500]
         assert sample["status"] & STATUS_REFERENCED
-        logger.arm(GAINS, Limits.widest())
+        logger.arm(GAINS, Limits())
         logger.disarm()
         assert logger.identify().referenced
 
@@ -69,7 +69,7 @@ def test_an_armed_board_is_not_referenced(library: Path) -> None:
         logger.start()
         at_rest(logger)
         logger.reference([0, 0, 0])
-        logger.arm(GAINS, Limits.widest())
+        logger.arm(GAINS, Limits())
         with pytest.raises(CommandRefusedError):
             logger.reference([5, 5, 5])
 
@@ -81,10 +81,11 @@ def test_a_trip_that_doubts_an_encoder_takes_its_reference(library: Path) -> Non
         logger.start()
         at_rest(logger)
         logger.reference([0, 0, 0])
-        limits = replace(Limits.widest(), max_spindle_jump=100, watchdog_us=1_000_000)
+        limits = replace(Limits(), max_spindle_jump=100, watchdog_us=1_000_000)
         logger.arm(GAINS, limits)
         while newest(logger)["sequence"] < 700:
             logger.heartbeat()
         assert not newest(logger)["status"] & STATUS_REFERENCED
+        logger.clear(logger.trip().code)
         with pytest.raises(CommandRefusedError, match="rig reference"):
             logger.arm(GAINS, limits)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.teensy.firmware_fake import FirmwareBoard
+from drivers.teensy.core import FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.board_start import BoardResetError
 from rig.bench.session import Session
@@ -28,9 +28,7 @@ class BoardThatIsReset:
 
     def advance(self, ticks: int) -> None:
         if 0 < self._left <= ticks:
-            self._board = FirmwareBoard(
-                self._bench, library=self._library, boot=5, referenced=False
-            )
+            self._board = FirmwareBoard(self._bench, library=self._library, boot=5, simulated=False)
         self._left -= ticks
         self._board.advance(ticks)
 

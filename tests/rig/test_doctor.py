@@ -9,6 +9,7 @@ import pytest
 
 from drivers.device import Batch, Device, SampleFlag
 from drivers.registry import fakes
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
@@ -23,6 +24,7 @@ from rig.doctor.ports import Port, can_interfaces, port_findings
 from rig.doctor.stream import device_findings
 from rig.doctor.udev import USB, has_rule, udev_rules
 from rig.errors import ExitCode, UsageError
+from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
 
 pytestmark = pytest.mark.integration
@@ -34,6 +36,16 @@ def by_check(findings: list[Finding]) -> dict[str, Finding]:
 
 def test_a_healthy_simulated_rig_has_no_complaint() -> None:
     assert worst(examine(simulated())) is Level.OK
+
+
+def test_a_board_that_was_restarted_needs_its_reference(
+    monkeypatch: pytest.MonkeyPatch, library: Path
+) -> None:
+    board = FirmwareBoard(SimulatedBench(), library=library, simulated=False)
+    link = SimulatedTransport(board)
+    monkeypatch.setattr("rig.doctor.examine.open_logger", lambda _: link)
+    findings = by_check(list(examine(simulated())))
+    assert findings["referenced"].fix == "Run: rig reference"
 
 
 @pytest.mark.parametrize("name", sorted(fakes()))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from drivers.errors import LinkLostError
+from drivers.teensy.core import FirmwareMissingError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.firmware_fake import FirmwareMissingError
 from drivers.teensy.protocol import STATUS_ARMED, Trip
 from drivers.transport import open_transport
 from rig.bench.logger import open_logger

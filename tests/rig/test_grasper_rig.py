@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.teensy.firmware_fake import FirmwareBoard
+from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.protocol import Trip
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.logger import open_logger
@@ -78,15 +78,15 @@ def test_a_campaign_at_2_khz_closes_the_jaws_and_measures_their_force(
     [
         ({"limits": {"jaw_2_force_n": 0.4}}, (0, 0, 0.14), Trip.OVER_FORCE),
         ({"limits": {"yaw_current_a": 0.01}}, (0.14, 0, 0), Trip.OVER_CURRENT),
-        ({"safety": {"motor_speed_rad_s": 5.0}}, (0, 0.14, 0), Trip.OVER_SPEED),
+        ({"safety": {"motor_speed_rad_s": 14.0}}, (0, 0.13, 0), Trip.OVER_SPEED),
         ({"safety": {"stall_current_a": 0.015, "stall_s": 0.3}}, (0, 0, 0.2), Trip.STALLED),
         ({"safety": {"continuous_current_a": 0.004, "heat_a2_s": 1e-5}}, (0.12, 0, 0), 8),
     ],
 )
 def test_a_trip_of_any_motor_takes_all_three_out_of_force(
-    config: Config, change: dict, motion: tuple[float, ...], trip: int
+    library: Path, change: dict, motion: tuple[float, ...], trip: int
 ) -> None:
-    settings = config.changed(**change)
+    settings = grasper(simulation={"firmware": True}, **change)
     link = open_logger(settings)
     ramp = np.minimum(np.arange(3000) / 1000, 1.0)
     tripped = pytest.raises(SafetyTripError, match=f"code {int(trip)}")

@@ -18,7 +18,7 @@ from tests.rig.simulated import simulated, transport
 pytestmark = pytest.mark.integration
 
 MAX_STEP = 100
-LIMITS = dataclasses.replace(Limits.widest(), max_motor_step=MAX_STEP)
+LIMITS = dataclasses.replace(Limits(), max_motor_step=MAX_STEP)
 TICKS = 400
 
 
@@ -40,7 +40,7 @@ def watch_motor(rested: Reading, step: int, came: np.ndarray, first_tick: int) -
     counts["sequence"] = tick
     counts["motor"] = step * tick
     counts["status"] = STATUS_ARMED
-    watch = HostWatch(LIMITS, ReferenceMachine())
+    watch = HostWatch([0.0] * 5, LIMITS, ReferenceMachine())
     half = len(tick) // 2
     for part in (counts[:half], counts[half:]):
         crossing = watch.check(dataclasses.replace(rested, counts=part))

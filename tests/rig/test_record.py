@@ -6,7 +6,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from drivers.teensy.firmware_fake import firmware_library
+from drivers.teensy.core import firmware_library
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
 from rig.cli.main import main

@@ -13,13 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.framing import FrameStream, encode_frame
-from drivers.teensy import protocol
-from drivers.teensy.firmware_fake import FirmwareBoard
-from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, TRIP_SHIFT, Kind, Trip
-from drivers.teensy.reference import REFERENCE
+from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, TRIP_SHIFT, Kind, Result, Trip
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
+from tests.drivers.raw_host import RawHost
 
 pytestmark = pytest.mark.integration
 
@@ -126,21 +124,17 @@ def ride(
     limits = machine.board_limits(config, config.calibration_set())
     rig = SmallRig(fault, start_rad)
     board = FirmwareBoard(rig, library=library)
-    gains = np.atleast_2d(machine.gains(config))
-    board.receive(encode_frame(protocol.encode_command(Kind.START, 1)))
-    board.receive(encode_frame(REFERENCE.encode_arm(2, gains, limits)))
+    host = RawHost(board, gains=machine.gains(config))
+    host.command(Kind.START)
+    board.advance(1)
+    assert host.arm(limits) is Result.OK
     moved = np.arange(ticks) * 1e-3 * math.copysign(0.2, stop_rad - start_rad)
     target_rad = start_rad + np.clip(moved, *sorted((0.0, stop_rad - start_rad)))
     targets = np.round(target_rad * PER_RAD[SPINDLE]).astype(np.int32)
-    data = b""
     for first in range(0, ticks, 50):
-        block = targets[first : first + 50]
-        payload = REFERENCE.encode_setpoints(3 + first // 50, [block, np.zeros(50, np.int16)])
-        board.receive(encode_frame(payload))
-        board.advance(50)
-        data += board.transmit()
-    samples = FrameStream(REFERENCE.sample.itemsize).feed(data).payloads.view(REFERENCE.sample)
-    return rig, samples[:, 0]
+        host.setpoints(targets[first : first + 50], [0] * 50)
+        host.run(50)
+    return rig, host.samples()
 
 
 def test_a_sound_rig_trips_over_nothing(library: Path) -> None:
@@ -216,17 +210,15 @@ def test_a_grasper_with_a_wrong_decoder_input_stops(library: Path, shares_an_inp
     limits = machine.board_limits(config, config.calibration_set())
     rig = SmallGrasper(shares_an_input)
     board = FirmwareBoard(rig, library=library, profile=profile)
-    board.receive(encode_frame(protocol.encode_command(Kind.START, 1)))
-    gains = np.atleast_2d(machine.gains(config))
-    board.receive(encode_frame(profile.encode_arm(2, gains, limits)))
-    data = b""
+    host = RawHost(board, profile, machine.gains(config))
+    host.command(Kind.START)
+    board.advance(1)
+    assert host.arm(limits) is Result.OK
     for block in range(60):
         move = np.clip((np.arange(50) + 50 * block) / 2000, 0, 1) * 0.2 * 2048 * 66 / math.tau
-        columns = [move.astype(np.int32)] * 3
-        board.receive(encode_frame(profile.encode_setpoints(3 + block, columns)))
-        board.advance(50)
-        data += board.transmit()
-    samples = FrameStream(profile.sample.itemsize).feed(data).payloads.view(profile.sample)
+        host.setpoints(*[move.astype(np.int32)] * 3)
+        host.run(50)
+    samples = host.samples()
     tripped = (samples["status"] & STATUS_LIMIT_TRIPPED) != 0
     assert tripped.any() == shares_an_input
     assert (rig.farthest_rad < [1.4, 1.0, 1.0]).all()

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numba import types
 
 from drivers.teensy import control
-from drivers.teensy.guard import Drive
-from drivers.teensy.reference import Limits
+from drivers.teensy.logic import Drive
 from rig.simulation.bench import BenchInputError, SimulatedBench
 from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.parameters import REFERENCE_GAINS
@@ -64,27 +63,15 @@ def test_sensors_are_sampled_before_the_command_acts() -> None:
     bench = SimulatedBench(seed=0)
     away = np.full(2, 0, np.int32)
     rows = bench.advance(2, away, np.zeros(2, np.int32), Drive.armed(GAINS))
-    at_rest = SimulatedBench(seed=0).advance(1, away[:1], np.zeros(1, np.int32), Drive())
+    at_rest = SimulatedBench(seed=0).advance(1, away[:1], np.zeros(1, np.int32), Drive.idle())
     np.testing.assert_array_equal(rows[0, :7], at_rest[0, :7])
     assert rows[0, 7] != 0
     assert rows[1, 5] > rows[0, 5] + 100  # the current has answered one tick later
 
 
-def test_a_limit_takes_the_motors_out_of_force_from_its_tick_on() -> None:
-    free, _ = run(3)
-    limits = Limits(32767, 1000, 2000, 32767, -(2**31), 2**31 - 1)
-    bench = SimulatedBench(seed=3)
-    rows = bench.advance(TICKS, TARGET, LOAD, Drive.armed(GAINS, limits))
-    breach = int(np.argmax(np.abs(free[:, 3]) > 2000))
-    assert 0 < breach < TICKS
-    np.testing.assert_array_equal(rows[:breach], free[:breach])
-    np.testing.assert_array_equal(rows[breach, :7], free[breach, :7])
-    np.testing.assert_array_equal(rows[breach:, 7:9], 0)
-
-
 def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(BenchInputError, match="target has shape"):
-        SimulatedBench().advance(5, TARGET, LOAD[:5], Drive())
+        SimulatedBench().advance(5, TARGET, LOAD[:5], Drive.idle())
     with pytest.raises(BenchInputError, match="address 0x0"):
         SimulatedBench().advance_with_board(5, 0, 0, 0)
 

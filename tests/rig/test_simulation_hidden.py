@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.teensy.guard import Drive
+from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
@@ -247,7 +247,7 @@ def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
     idle = np.zeros(2000, np.int32)
     bench._state[plant.JAW_ANGLE] -= 0.1
-    bench.advance(2000, idle, idle, Drive())
+    bench.advance(2000, idle, idle, Drive.idle())
     speeds = bench.state[[plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]]
     np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
 

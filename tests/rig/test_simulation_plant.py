@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.teensy.guard import Drive
+from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
 from rig.simulation import plant
 from rig.simulation.bench import SimulatedBench
@@ -48,7 +48,7 @@ def energies_after_a_pluck(parameters: PlantParameters, ticks: int) -> NDArray[n
     """Stretch the cable by 0.1 rad, let go with the motor off, and return energy tick by tick."""
     bench = SimulatedBench(parameters, start_count=683)
     bench._state[plant.JAW_ANGLE] -= 0.1
-    none, drive = np.zeros(1, np.int32), Drive()
+    none, drive = np.zeros(1, np.int32), Drive.idle()
     energies = [energy_j(bench.state, parameters)]
     for _ in range(ticks):
         bench.advance(1, none, none, drive)
@@ -68,7 +68,7 @@ def test_an_eccentric_gear_keeps_energy_too() -> None:
     bench._state[plant.JAW_ANGLE] -= 0.1
     bench._state[plant.MOTOR_SPEED] = 60.0
     bench._state[plant.SPINDLE_SPEED] = 60.0 / 35.0
-    none, drive = np.zeros(1, np.int32), Drive()
+    none, drive = np.zeros(1, np.int32), Drive.idle()
     energies = []
     for _ in range(300):  # before the jaw meets its stop
         angle = 16.0 * float(bench.state[plant.SPINDLE_ANGLE])
@@ -83,7 +83,7 @@ def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
     clamped = replace(FREE, spindle_friction_n_m=10.0)
     bench = SimulatedBench(clamped, start_count=683)
     bench._state[plant.MOTOR_ANGLE] += 0.5
-    none, drive = np.zeros(1, np.int32), Drive()
+    none, drive = np.zeros(1, np.int32), Drive.idle()
     seen, gear = [], []
     for _ in range(1000):
         bench.advance(1, none, none, drive)
@@ -126,7 +126,7 @@ def test_friction_holds_without_creep_or_chatter() -> None:
     rest_rad = -1000 * 2 * np.pi / 8192
     closing = trajectory.minimum_jerk(rest_rad, rest_rad + 0.4, 1.0)
     play(bench, closing, np.full(closing.size, 0.1))
-    idle, drive = np.zeros(300, np.int32), Drive()
+    idle, drive = np.zeros(300, np.int32), Drive.idle()
     bench.advance(300, idle, idle, drive)
     before = bench.state
     bench.advance(300, idle, idle, drive)

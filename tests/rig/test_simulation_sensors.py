@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.teensy.guard import Drive
+from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
 from rig.simulation import sensors
 from rig.simulation.bench import SimulatedBench
@@ -32,7 +32,7 @@ def rest(parameters: SensorParameters, ticks: int, seed: int = 0) -> np.ndarray:
     """Counts of the disarmed rig at rest."""
     idle = np.zeros(ticks, np.int32)
     bench = SimulatedBench(sensors_parameters=parameters, seed=seed)
-    return bench.advance(ticks, idle, idle, Drive())
+    return bench.advance(ticks, idle, idle, Drive.idle())
 
 
 def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
@@ -129,7 +129,7 @@ def test_the_force_sensor_reads_grip_over_the_lever_arm() -> None:
 
 
 def test_disarmed_commands_are_zero_and_the_controller_rests() -> None:
-    drive = Drive()
+    drive = Drive.idle()
     far = np.full(100, -5000, np.int32)
     bench = SimulatedBench()
     rows = bench.advance(100, far, np.full(100, 700, np.int32), drive)

@@ -40,6 +40,7 @@ class Mps2Hardware {
     ReferenceProfile::Inputs sample() { return plant_.sample(); }
     void drive(const ReferenceProfile::Outputs& outputs) { plant_.step(outputs); }
 
+    bool stopped() { return false; }  // no emergency stop is wired to it
     void feed() {}  // no watchdog: it runs in the host's time
 
     std::size_t read(std::uint8_t* out, std::size_t room) {

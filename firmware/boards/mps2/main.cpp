@@ -31,7 +31,7 @@ rig::Mps2Hardware* hardware() {
 [[noreturn]] void run() {
     static rig::App<rig::ReferenceProfile, rig::Mps2Hardware, kTransmitCapacity> app(*hardware(), "MPS2-0001");
     hardware()->begin();
-    app.begin(1, true);  // the plant's counters are absolute
+    app.begin(1, decltype(app)::Settings::widest(), true);
     for (std::uint32_t tick_us = 0;;) {
         const std::uint32_t ticks = hardware()->take_turn();
         do app.exchange();

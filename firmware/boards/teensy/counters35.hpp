@@ -18,8 +18,10 @@ class Counters {
         PORTA_PCR13 = PORT_PCR_MUX(7);
         PORTB_PCR18 = PORT_PCR_MUX(6);  // pins 29 and 30: FTM2's phases
         PORTB_PCR19 = PORT_PCR_MUX(6);
-        decode(FTM1_MODE, FTM1_SC, FTM1_CNTIN, FTM1_MOD, FTM1_CNT, FTM1_QDCTRL);
-        decode(FTM2_MODE, FTM2_SC, FTM2_CNTIN, FTM2_MOD, FTM2_CNT, FTM2_QDCTRL);
+        decode(FTM1_MODE, FTM1_SC, FTM1_CNTIN, FTM1_MOD, FTM1_CNT, FTM1_FILTER,
+               FTM1_QDCTRL);
+        decode(FTM2_MODE, FTM2_SC, FTM2_CNTIN, FTM2_MOD, FTM2_CNT, FTM2_FILTER,
+               FTM2_QDCTRL);
         motor_.start(0);
         jaw_.start(0);
 
@@ -40,13 +42,15 @@ class Counters {
 
     // The core has left the timer as PWM: its clock off first, then its limits, then the decoder.
     static void decode(Register& mode, Register& status, Register& first, Register& last,
-                       Register& count, Register& quadrature) {
+                       Register& count, Register& filter, Register& quadrature) {
         mode = FTM_MODE_WPDIS | FTM_MODE_FTMEN;
         status = 0;
         first = 0;
         last = 0xFFFF;
         count = 0;
-        quadrature = FTM_QDCTRL_QUADEN;
+        // a level counts after it was the same for 5 x 4 cycles of the 60 MHz bus, 0.33 us
+        filter = 5 | 5 << 4;
+        quadrature = FTM_QDCTRL_QUADEN | FTM_QDCTRL_PHAFLTREN | FTM_QDCTRL_PHBFLTREN;
     }
 
     static bool high(int pin) { return digitalReadFast(pin) != LOW; }

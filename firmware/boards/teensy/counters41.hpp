@@ -3,6 +3,7 @@
 
 #include <QuadEncoder.h>
 
+#include "encoder_filter41.hpp"
 #include "wiring41.hpp"
 
 namespace rig {
@@ -11,7 +12,7 @@ class Counters {
   public:
     void begin() {
         for (QuadEncoder* encoder : {&motor_, &spindle_, &jaw_}) {
-            encoder->setInitConfig();
+            filter(*encoder);
             encoder->init();
         }
     }

@@ -7,6 +7,7 @@
 
 #include "../../core/app.hpp"
 #include "../../core/profile_grasper.hpp"
+#include "encoder_filter41.hpp"
 #include "link.hpp"
 #include "wiring41_grasper.hpp"
 
@@ -42,12 +43,14 @@ class GrasperHardware : public TeensyLink {
         take_faults();
         analogWriteResolution(wiring::kSetBits);
         for (int pin : wiring::kSetPin) analogWriteFrequency(pin, wiring::kPwmHz);
+        for (int pin : wiring::kDirectionPin) pinMode(pin, OUTPUT);
         drive(Outputs());
         for (int pin : wiring::kReadyPin) pinMode(pin, INPUT_PULLUP);
+        pinMode(wiring::kStopPin, INPUT_PULLUP);
         analogReadResolution(wiring::kAdcBits);
         analogReadAveraging(4);
         for (QuadEncoder& encoder : encoders_) {
-            encoder.setInitConfig();
+            filter(encoder);
             encoder.init();
         }
         Serial.begin(115200);  // the rate has no effect on USB
@@ -55,6 +58,8 @@ class GrasperHardware : public TeensyLink {
 
     void begin_watch() { watch_.begin(); }
     void feed() { watch_.feed(); }
+
+    bool stopped() { return digitalRead(wiring::kStopPin) == HIGH; }
 
     Inputs sample() {
         Inputs counts;
@@ -70,6 +75,7 @@ class GrasperHardware : public TeensyLink {
     void drive(const Outputs& outputs) {
         for (std::size_t k = 0; k < Profile::kMotors; ++k) {
             const double current_a = 1e-4 * outputs.command_e4[k] * wiring::kFullScaleA;
+            digitalWrite(wiring::kDirectionPin[k], current_a < 0 ? LOW : HIGH);
             analogWrite(wiring::kSetPin[k], wiring::kEscon.code(current_a));
             digitalWrite(wiring::kEnablePin[k], outputs.in_force ? HIGH : LOW);
         }
@@ -77,10 +83,10 @@ class GrasperHardware : public TeensyLink {
     }
 
   private:
-    // A controller that has a fault after it was enabled reports no current.
+    // A controller that is not ready after it was enabled reports no current; a broken wire leaves the line high.
     bool ready(std::size_t k) const {
         return enabled_ticks_ < wiring::kReadyAfterTicks ||
-               digitalRead(wiring::kReadyPin[k]) == HIGH;
+               digitalRead(wiring::kReadyPin[k]) == LOW;
     }
 
     QuadEncoder encoders_[Profile::kMotors] = {{1, wiring::kMotorA[0], wiring::kMotorB[0]},

@@ -46,8 +46,11 @@ class ReferenceHardware : public TeensyLink {
                 analogWriteFrequency(pin, wiring::kPwmHz);
             }
         }
+        for (int pin : {wiring::kDriveDirectionPin, wiring::kLoadDirectionPin}) pinMode(pin, OUTPUT);
         drive(Outputs());
-        for (int pin : {wiring::kDriveReadyPin, wiring::kLoadReadyPin}) pinMode(pin, INPUT_PULLUP);
+        for (int pin : {wiring::kDriveReadyPin, wiring::kLoadReadyPin, wiring::kStopPin}) {
+            pinMode(pin, INPUT_PULLUP);
+        }
         analogReadResolution(wiring::kAdcBits);
         analogReadAveraging(4);
         encoders_.begin();
@@ -57,6 +60,8 @@ class ReferenceHardware : public TeensyLink {
     void begin_watch() { watch_.begin(); }
     void feed() { watch_.feed(); }
 
+    bool stopped() { return digitalRead(wiring::kStopPin) == HIGH; }
+
     Inputs sample() {
         Inputs counts;
         counts.motor = encoders_.motor();
@@ -64,7 +69,7 @@ class ReferenceHardware : public TeensyLink {
         counts.jaw = encoders_.jaw();
         counts.proximal = torque(wiring::kProximalPin);
         counts.distal = torque(wiring::kDistalPin);
-        counts.current = drive_ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
+        counts.current = ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
                                        : kMissing;
         counts.fsr = analogRead(wiring::kFsrPin);
         return counts;
@@ -72,8 +77,11 @@ class ReferenceHardware : public TeensyLink {
 
     void drive(const Outputs& outputs) {
         const double drive_a = 1e-4 * outputs.command_e4 * wiring::kDriveFullScaleA;
+        const double load_a = 1e-3 * outputs.load_ma;
+        digitalWrite(wiring::kDriveDirectionPin, drive_a < 0 ? LOW : HIGH);
+        digitalWrite(wiring::kLoadDirectionPin, load_a < 0 ? LOW : HIGH);
         analogWrite(wiring::kDriveSetPin, wiring::kDrive.code(drive_a));
-        analogWrite(wiring::kLoadSetPin, wiring::kLoad.code(1e-3 * outputs.load_ma));
+        analogWrite(wiring::kLoadSetPin, wiring::kLoad.code(load_a));
         digitalWrite(wiring::kDriveEnablePin, outputs.in_force ? HIGH : LOW);
         digitalWrite(wiring::kLoadEnablePin, outputs.in_force ? HIGH : LOW);
         enabled_ticks_ = outputs.in_force ? enabled_ticks_ + 1 : 0;
@@ -86,9 +94,11 @@ class ReferenceHardware : public TeensyLink {
         return reading >= wiring::kTorqueZero - 1 ? INT16_MAX : reading * 16;
     }
 
-    // A controller that has a fault after it was enabled reports no current.
-    bool drive_ready() const {
-        return enabled_ticks_ < wiring::kReadyAfterTicks || digitalRead(wiring::kDriveReadyPin) == HIGH;
+    // Either controller that is not ready after it was enabled makes the current missing. A broken wire or a
+    // controller without power leaves the line high, which is not ready.
+    bool ready() const {
+        return enabled_ticks_ < wiring::kReadyAfterTicks ||
+               (digitalRead(wiring::kDriveReadyPin) == LOW && digitalRead(wiring::kLoadReadyPin) == LOW);
     }
 
     Counters encoders_;

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../../core/protocol.hpp"
+
 namespace rig {
 
 class TeensyLink {
@@ -26,6 +28,24 @@ class TeensyLink {
         const std::uint32_t boot = eeprom_read_dword(at) + 1;
         eeprom_write_dword(at, boot);
         return boot;
+    }
+
+    // A board's own number behind the wiring's name: two boards with the same image differ.
+    static const char* serial(const char* name) {
+        static char text[kSerialSize + 1] = {};
+        std::size_t size = 0;
+        for (; size < kSerialSize - 9 && name[size] != '\0'; ++size) text[size] = name[size];
+        text[size++] = '-';
+#if defined(ARDUINO_TEENSY35)
+        const std::uint32_t number = SIM_UIDML ^ SIM_UIDL;
+#else
+        const std::uint32_t number = HW_OCOTP_CFG0 ^ HW_OCOTP_CFG1;
+#endif
+        for (int nibble = 28; nibble >= 0; nibble -= 4) {
+            text[size++] = "0123456789ABCDEF"[number >> nibble & 0xF];
+        }
+        text[size] = '\0';
+        return text;
     }
 
     std::uint32_t now_us() { return micros(); }

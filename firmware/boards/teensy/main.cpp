@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kTransmitCapacity = 65536;
 
 Hardware hardware;
-rig::App<Hardware::Profile, Hardware, kTransmitCapacity> app(hardware, rig::wiring::kSerial);
+rig::App<Hardware::Profile, Hardware, kTransmitCapacity> app(hardware, Hardware::serial(rig::wiring::kSerial));
 IntervalTimer timer;
 
 void sample() { app.tick(); }
@@ -22,7 +22,7 @@ void sample() { app.tick(); }
 
 void setup() {
     hardware.begin();
-    app.begin(Hardware::boot());
+    app.begin(Hardware::boot(), rig::wiring::own_limits());
     timer.priority(rig::wiring::kSamplePriority);
     hardware.begin_watch();
     // without a timer no tick feeds the watchdog, and the chip starts anew

@@ -72,6 +72,10 @@ constexpr int A21 = 66, A22 = 67, IRQ_PORTC = 61;
 constexpr std::uint32_t FTM_MODE_WPDIS = 4, FTM_MODE_FTMEN = 1, FTM_QDCTRL_QUADEN = 1;
 constexpr std::uint32_t PORT_PCR_MUX(std::uint32_t function) { return function << 8; }
 inline volatile std::uint32_t PORTA_PCR12, PORTA_PCR13, PORTB_PCR18, PORTB_PCR19;
+constexpr std::uint32_t FTM_QDCTRL_PHAFLTREN = 0x80, FTM_QDCTRL_PHBFLTREN = 0x40;
+inline volatile std::uint32_t FTM1_FILTER, FTM2_FILTER;
+constexpr std::uint32_t SIM_UIDML = 0x1234, SIM_UIDL = 0x5678;     // the chips' own numbers
+constexpr std::uint32_t HW_OCOTP_CFG0 = 0x1234, HW_OCOTP_CFG1 = 0x5678;
 inline volatile std::uint32_t FTM1_MODE, FTM1_SC, FTM1_CNTIN, FTM1_MOD, FTM1_CNT, FTM1_QDCTRL;
 inline volatile std::uint32_t FTM2_MODE, FTM2_SC, FTM2_CNTIN, FTM2_MOD, FTM2_CNT, FTM2_QDCTRL;
 
