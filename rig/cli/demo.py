@@ -48,7 +48,6 @@ def demo(
 
 def _told(result: "Demo") -> list[str]:
     """Return the findings, their files and the next command."""
-    from rig.cli.demonstration import MODEL
     from rig.reports.diagnosis_words import sentences
 
     lines = [f"{len(result.runs)} runs, {sum(r.samples for r in result.runs)} samples."]
@@ -62,10 +61,9 @@ def _told(result: "Demo") -> list[str]:
         "",
         f"Report: {result.report}",
         "",
-        "This was the quick form: one equation, tested against permuted residuals only. The full",
-        "form also tests against simulated nulls of the complete model. It uses the same test runs",
-        "again, so its result is marked as exploratory:",
-        f"  rig diagnose {logs} --balance {MODEL} --workers 2 --ledger {result.ledger}",
+        "This was one equation. With all four the same test runs are used again, so the result is",
+        "marked as exploratory:",
+        f"  rig diagnose {logs} --ledger {result.ledger}",
         "The model with the identified effect, as it runs:",
         f"  rig replay {logs} --model {result.model}",
         "To choose and record further experiments automatically, until the effect is unique:",

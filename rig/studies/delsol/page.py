@@ -38,8 +38,8 @@ NAMED_NOTE = (
     f"The joints are torque equations of the diagnosis, on {RUNS} further runs per arm along finite"
     " Fourier series (equation 14); one run in three was held out before any fit, and"
     " the errors are of those. Hoses drag on joint 1 alone, k q (1 + q^2), and every joint has"
-    " Dahl's friction, which the catalogue has; a pull on another joint is false. Chance is"
-    " estimated from permutation nulls alone. How many runs there are, how large and about"
+    " Dahl's friction, which the catalogue has; a pull on another joint is false. How"
+    " many runs there are, how large and about"
     " how many poses was chosen on arms 0 to 3, which are among these. Effects found are fitted to"
     " the paper's points together with its parameters: the rows with identified effects."
 )
