@@ -43,7 +43,7 @@ def write_table(folder, kind):
 
 def walk():
     """Return the page's files, by name, and its commands, up to the heading after the walk."""
-    text = PAGE.read_text().split("## What changed")[0].split("## The machine")[0]
+    text = PAGE.read_text().split("## The machine")[0]
     names = re.findall(r"Save this as `([^`]+)`", text)
     blocks = re.findall(r"```(\w+)\n(.*?)```", text, flags=re.DOTALL)
     files = dict(zip(names, [body for kind, body in blocks if kind == "toml"], strict=True))
