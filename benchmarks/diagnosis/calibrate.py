@@ -2,7 +2,7 @@
 
 `python -m benchmarks.diagnosis.calibrate` searches the training runs of drawn campaigns whose seeds
 are kept for calibration. Named causes give `sharpness`: the one with the best mean log probability
-of the true family. Clean campaigns give `cause_cost`: the least one that leaves a share of false
+of the true family. Clean campaigns give `cause_cost`: the least one with a share of false
 findings below the bound, by split conformal prediction. Resumes where it stopped.
 """
 
@@ -96,7 +96,7 @@ def log_score(cases: Sequence[Searched], sharpness: float) -> float:
 
 
 def least_cost(clean: Sequence[Searched], share: float) -> float | None:
-    """Return the cost of a cause that leaves a share of false findings; None with too few cases."""
+    """Return the cost of a cause for a share of false findings; None with too few cases."""
     rank = math.ceil((len(clean) + 1) * (1.0 - share))
     if rank > len(clean):
         return None

@@ -26,6 +26,7 @@ from rig.campaigns.index import DIAGNOSIS
 from rig.configuration.config import Config, load_config
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import remember, run_diagnosis
+from rig.diagnosis.traces import traces
 from rig.diagnosis.written import written_models
 from rig.importers.registry import open_campaign
 from rig.output.console import plain
@@ -123,7 +124,7 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     )
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write_all(written_models(done), model_path)
-    page = diagnosis_page.page(done.diagnosis, done.traces(), Provenance.now(seed))
+    page = diagnosis_page.page(done.diagnosis, traces(done.answer), Provenance.now(seed))
     kept = logs / DIAGNOSIS
     report = write_report(kept.with_suffix(".html"), page)
     write_text_atomic(kept, json.dumps(plain(done.diagnosis.to_json()), indent=2) + "\n")
@@ -162,7 +163,7 @@ def _first_look(
     firmware: bool,
     seed: int,
 ) -> str:
-    board = "the compiled firmware core" if firmware else "the Python fake of the board"
+    board = "the compiled firmware core" if firmware else "a plain board without guards"
     story = (
         "The simulated rig, with one effect that no model declares, was recorded through"
         f" {board} and its driver. The declared model {fitted.name!r} was fitted on"

@@ -65,6 +65,7 @@ def diagnose(
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import subject
+    from rig.diagnosis.traces import traces
     from rig.diagnosis.written import with_cost_of_causal_filters, written_models
     from rig.output.provenance import Provenance
     from rig.output.render import write_report
@@ -97,7 +98,7 @@ def diagnose(
         model_file.write_all(written_models(done), model_out)
         written.append(f"Model: {model_out}")
     if page_file is not None:
-        write_report(page_file, page(done.diagnosis, done.traces(), Provenance.now(seed)))
+        write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))

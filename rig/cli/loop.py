@@ -42,6 +42,7 @@ def loop(
     from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
+    from rig.diagnosis.traces import traces
     from rig.errors import UsageError
     from rig.output.provenance import Provenance
     from rig.output.render import write_report
@@ -86,7 +87,7 @@ def loop(
             for line in sentences(one.done.diagnosis):
                 screen.print(line, markup=False)
             report = folder / f"round-{one.number}"
-            text = page(one.done.diagnosis, one.done.traces(), Provenance.now(number))
+            text = page(one.done.diagnosis, traces(one.done.answer), Provenance.now(number))
             where = write_report(report / "diagnosis.html", text)
             screen.print(f"Report: {where}", markup=False)
             screen.print(one.stopped or next_sentence(one.done.diagnosis), markup=False)

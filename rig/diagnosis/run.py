@@ -22,7 +22,6 @@ from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.noise import noise_floors
 from rig.diagnosis.propose import propose
-from rig.diagnosis.traces import EquationTraces, traces
 
 Stage = Callable[[str], None]
 
@@ -46,14 +45,6 @@ class Diagnosed:
     sealed: Sealed
     seen: tuple[str, ...]
     looked_at: tuple[Recording, ...]
-
-    def traces(self) -> dict[str, EquationTraces]:
-        """Return the signals of each equation's runs, for a page to draw."""
-        declared, found = self.answer.layout.equations, self.answer.models
-        return {
-            m.balance: traces(self.recordings, self.sealed, declared[m.balance].model, m)
-            for m in found
-        }
 
 
 def remember(done: Diagnosed, ledger: Ledger) -> None:
@@ -102,7 +93,8 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
-    arm = balances_of(recordings[0])
+    of_arm = any(model.balance.startswith("joint.") for model in models)
+    arm = balances_of(recordings[0]) if of_arm else None
     if arm is not None:
         on_stage("fitting the links that all joints share")
         recordings = laid_out(arm, recordings, sealed.discover)

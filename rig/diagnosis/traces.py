@@ -1,118 +1,102 @@
-"""Measured and estimated signals of the runs, with the declared model and with the findings.
+"""Measured signals of the held-out test runs and the residuals before and after, for a page.
 
-A page draws them. They follow from recordings and two fitted models an equation, whatever method
-found the difference between the two.
+They are those that the reported errors are made of: the same samples, the same refitted equations.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from estimation.causes.functions import Function
+from estimation.causes.verdict import VARIABLE_OF_ROLE, Answer, Kept
+from estimation.derived import zero_phase_channels
+from estimation.model import Model
+from estimation.recording import FloatArray
 
-from estimation.derived import settled_places, zero_phase_channels
-from estimation.diagnosis.split import Sealed
-from estimation.model import Model, Term, estimate
-from estimation.recording import FloatArray, Recording
+MOST = 2
+"""Most channels that the residual of one finding is drawn over."""
 
 
 @dataclass(frozen=True)
 class RunTrace:
-    """One run in one equation.
+    """One held-out test run in one equation, at the samples that its error counts.
 
     Attributes:
         run: Name of the run.
-        held_out: Whether it is a held-out test run.
         time_s: Time since the run began, shape (n,), s.
         measured: The target, zero-phase filtered, shape (n,).
-        before: Estimate of the declared model, with this run's mean error added, shape (n,).
-        after: The same of the model with the findings.
-        counted: Samples that fits and errors are over, shape (n,).
+        before: Measured less estimated with the declared model, its mean removed, shape (n,).
+        after: The same with the findings.
         channels: Channels that the findings read, shape (n,) each.
     """
 
     run: str
-    held_out: bool
     time_s: FloatArray
     measured: FloatArray
     before: FloatArray
     after: FloatArray
-    counted: NDArray[np.bool_]
     channels: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True)
 class EquationTraces:
-    """All runs in one equation.
+    """The held-out test runs in one equation.
 
     Attributes:
-        before: The declared model, fitted.
-        after: The model with the findings.
+        model: The declared model.
         runs: The runs, in the order of the campaign.
     """
 
-    before: Model
-    after: Model
+    model: Model
     runs: tuple[RunTrace, ...]
 
-    @property
-    def held_out(self) -> tuple[RunTrace, ...]:
-        """The held-out test runs."""
-        return tuple(run for run in self.runs if run.held_out)
 
-    @property
-    def added(self) -> tuple[Term, ...]:
-        """The terms that only the model with the findings has."""
-        declared = [(t.effect.id, dict(t.channels)) for t in self.before.terms]
-        return tuple(t for t in self.after.terms if (t.effect.id, dict(t.channels)) not in declared)
+@dataclass(frozen=True)
+class Traces:
+    """What the charts of a diagnosis are drawn from.
 
-
-def traces(
-    recordings: Sequence[Recording], sealed: Sealed, before: Model, after: Model
-) -> EquationTraces:
-    """Return the traces of one equation.
-
-    Args:
-        recordings: All runs.
-        sealed: Which of them are held-out test runs.
-        before: The declared model, fitted.
-        after: The model with the findings, fitted.
-
-    Raises:
-        NotFittedError: A parameter has no value.
-        MissingChannelError: A recording lacks a channel.
-        FilterError: A run cannot be filtered.
+    Attributes:
+        equations: Equation to its runs; those without a sample are left out.
+        over: For each finding the channels that its residual is drawn over.
     """
-    found = EquationTraces(before, after, ())
-    read = [c for term in found.added for c in term.channels.values()]
-    runs = (_run(r, r.name in sealed.confirm, found, read) for r in recordings)
-    return EquationTraces(before, after, tuple(run for run in runs if run is not None))
+
+    equations: Mapping[str, EquationTraces]
+    over: tuple[tuple[str, ...], ...]
 
 
-def _run(
-    recording: Recording, held_out: bool, models: EquationTraces, read: Sequence[str]
-) -> RunTrace | None:
-    before, after = models.before, models.after
-    speeds = [c for c in before.channels if c.endswith(("_velocity_rad_s", "_velocity_m_s"))]
-    names = [*before.channels, *after.channels, before.target, *read, *speeds]
-    channels = zero_phase_channels(recording, names, before.low_pass)
-    places = settled_places(channels, before.low_pass, samples=before.samples)
-    if not len(places):
-        return None
-    counted = np.zeros(len(channels), bool)
-    counted[places] = True
-    measured = channels[before.target]
-    estimates = []
-    for model in (before, after):
-        values = estimate(model, channels)
-        estimates.append(values + (measured - values)[counted].mean())
-    return RunTrace(
-        recording.name,
-        held_out,
-        channels.time_s - channels.time_s[0],
-        measured,
-        estimates[0],
-        estimates[1],
-        counted,
-        {name: channels[name] for name in dict.fromkeys(read)},
-    )
+def traces(answer: Answer) -> Traces:
+    """Return the traces of a diagnosis."""
+    over = tuple(_channels(kept) for kept in answer.kept)
+    wanted: dict[str, list[str]] = {name: [] for name in answer.refits.of}
+    for finding, channels in zip(answer.diagnosis.findings, over, strict=True):
+        wanted[finding.balance] += channels
+    found = {name: _equation(answer, name, channels) for name, channels in wanted.items()}
+    return Traces({name: one for name, one in found.items() if one.runs}, over)
+
+
+def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
+    refit = answer.refits.of[name]
+    before, after = answer.refits.before(name), answer.refits.after(name)
+    runs = []
+    for run in refit.test_names:
+        sides = [refit.residuals(solved, run) for solved in (before, after)]
+        measured = refit.channel(after, run, refit.model.target)
+        if sides[0] is None or sides[1] is None or measured is None:
+            continue
+        (places, old), (_, new) = sides[0], sides[1]
+        clock = refit.recordings[run].time_s
+        # a cause that no model file holds is no term of the equation: its channels are read here
+        filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
+        read = {channel: filtered[channel][places] for channel in wanted}
+        time_s = clock[places] - clock[0]
+        runs.append(RunTrace(run, time_s, measured, old - old.mean(), new - new.mean(), read))
+    return EquationTraces(refit.model, tuple(runs))
+
+
+def _channels(kept: Kept) -> tuple[str, ...]:
+    """Return the channels of a cause's variables, time left out."""
+    cause = kept.scored.candidate.cause
+    if isinstance(cause, Function):
+        roles = [cause.place.roles[v][0] for v in cause.variables if v in cause.place.roles]
+    else:
+        roles = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
+    return tuple(dict.fromkeys(c for c in roles if c != "time_s"))[:MOST]

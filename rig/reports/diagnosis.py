@@ -1,12 +1,12 @@
 """A diagnosis as one interactive page: the answer and what to check, the evidence, the method."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.model import Model
-from rig.diagnosis.traces import EquationTraces
+from rig.diagnosis.traces import Traces
 from rig.output.charts import embedded, scripts
 from rig.output.provenance import Provenance
 from rig.output.render import render
@@ -33,8 +33,8 @@ VERDICTS = {
 
 
 CONFIDENCE = (
-    "Confidence is the probability of the name, given these runs. How often it was right on known"
-    " cases: docs/results/diagnosis-versions.md."
+    "Confidence is the posterior probability of the name among all candidates. It is not calibrated"
+    " yet; answers that were sure and wrong are counted in docs/results/diagnosis-versions.md."
 )
 
 
@@ -57,12 +57,12 @@ class Card:
     command: str
 
 
-def page(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces], provenance: Provenance) -> str:
+def page(diagnosis: Diagnosis, traces: Traces, provenance: Provenance) -> str:
     """Return the page of HTML, which needs nothing outside itself.
 
     Args:
         diagnosis: The answer.
-        traces: Equation to the signals of its runs; an equation without has no signal charts.
+        traces: The signals of the held-out test runs; an equation without has no signal charts.
         provenance: When and from what this was made.
     """
     drawn = charts(diagnosis, traces)
@@ -82,8 +82,11 @@ def page(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces], provenance:
             "errors": error_table(diagnosis),
             "charts": drawn,
             "runs": sealed.confirm,
-            "tables": [_parameters(diagnosis.findings), *_moved(diagnosis, traces)],
-            "tried": [_tried(f) for f in diagnosis.findings if f.probabilities],
+            "tables": [
+                _probabilities(diagnosis.findings),
+                _parameters(diagnosis.findings),
+                *_moved(diagnosis, traces),
+            ],
             "others": other_sentences(diagnosis),
             "limits": [*diagnosis.notes, CONFIDENCE],
             "next_experiment": next_sentence(diagnosis),
@@ -111,6 +114,11 @@ def card(finding: Finding, diagnosis: Diagnosis) -> Card:
         facts.append(("Depends on", variables))
     equations = " and ".join([finding.balance, *finding.also_in])
     facts.append(("Equation", equations))
+    if finding.place not in ("", finding.balance):
+        facts.append(("Place", finding.place))
+    whole = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
+    if 0 < len(finding.runs_affected) < whole:
+        facts.append(("Acts in", f"{len(finding.runs_affected)} of {whole} runs"))
     if finding.confidence is not None:
         facts.append(("Confidence", f"{finding.confidence:.0%}"))
     if finding.alternatives:
@@ -180,22 +188,24 @@ def _with_interval(known: Value) -> list[str]:
     return [f"{scale * known.value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", unit]
 
 
-def _tried(finding: Finding) -> TextTable:
-    rows = [[family, f"{share:.3f}"] for family, share in finding.probabilities.items()]
-    return TextTable(
-        f"What was tried in place of {finding.family} in {finding.balance}",
-        ["cause", "probability"],
-        rows,
-        "From errors on training runs and conditions left out. The other findings are part of the"
-        " model.",
-    )
+def _probabilities(findings: Sequence[Finding]) -> TextTable | None:
+    rows = [
+        [f"{finding.balance}: {meaning(family) or family} [{family}]", f"{100 * share:.1f} %"]
+        for finding in findings
+        for family, share in finding.probabilities.items()
+    ]
+    if not rows:
+        return None
+    note = "Among all candidates, the other findings being part of the model."
+    return TextTable("Probability of each name", ["effect", "probability"], rows, note)
 
 
-def _moved(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces]) -> list[TextTable]:
+def _moved(diagnosis: Diagnosis, traces: Traces) -> list[TextTable]:
     """Return the declared parameters of each equation before and after the findings."""
     shown = []
     for name, parameters in diagnosis.moved.items():
-        units = _units(traces[name].before) if name in traces else {}
+        known = traces.equations.get(name)
+        units = _units(known.model) if known else {}
         rows = []
         for key, value in parameters.items():
             scale, unit = display(units.get(key, ""))

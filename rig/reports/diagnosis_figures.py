@@ -1,36 +1,37 @@
 """Charts of a diagnosis: residual over each finding's variable, signals, errors by run."""
 
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from estimation.channels import UNIT_BY_SUFFIX, unit_of
 from estimation.diagnosis.result import Diagnosis, Error, Finding
-from estimation.model import Term
 from estimation.recording import FloatArray
-from rig.diagnosis.traces import EquationTraces, RunTrace
+from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
 from rig.output.binning import binned
 from rig.output.charts import Chart, Line, numbers, thinned
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display
 
 BINS = 48
-MOST_PANELS = 2
-"""Most channels of one finding that its residual is drawn over."""
+SIDES = ("before", "after")
 
 
-def charts(diagnosis: Diagnosis, traces: Mapping[str, EquationTraces]) -> list[Chart]:
+def charts(diagnosis: Diagnosis, traces: Traces) -> list[Chart]:
     """Return the charts of a page, those of the findings first."""
     drawn = []
-    for number, finding in enumerate(diagnosis.findings, start=1):
-        if finding.balance in traces:
-            drawn += _over_channels(number, finding, traces[finding.balance])
+    for number, (finding, channels) in enumerate(
+        zip(diagnosis.findings, traces.over, strict=False), start=1
+    ):
+        shown = traces.equations.get(finding.balance)
+        for k, channel in enumerate(channels, start=1):
+            if shown and all(channel in run.channels for run in shown.runs):
+                drawn.append(_profile(f"residual-{number}-{k}", channel, finding, shown))
     for name, error in diagnosis.errors.items():
         drawn.append(_by_run(diagnosis, name, error))
-        if name in traces and traces[name].held_out:
-            drawn.append(_over_time(name, traces[name]))
+        if name in traces.equations:
+            drawn.append(_over_time(name, traces.equations[name]))
     return drawn
 
 
@@ -41,32 +42,18 @@ def _words(channel: str) -> tuple[str, str]:
     return " ".join(parts[:stem]), unit_of(channel)
 
 
-def _over_channels(number: int, finding: Finding, shown: EquationTraces) -> list[Chart]:
-    terms = [t for t in shown.added if t.effect.family.split(".")[0] == _kind(finding)]
-    own = [t for t in terms if t.effect.family == finding.family] or terms
-    channels = dict.fromkeys(c for t in own for c in t.channels.values() if c != "time_s")
-    return [
-        _profile(f"residual-{number}-{k}", channel, own, shown)
-        for k, channel in enumerate(list(channels)[:MOST_PANELS], start=1)
-    ]
-
-
-def _kind(finding: Finding) -> str:
-    return finding.family.split(".")[0]
-
-
-def _profile(name: str, channel: str, terms: Sequence[Term], shown: EquationTraces) -> Chart:
+def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -> Chart:
     """Draw the residual of the held-out test runs over one channel, before and after."""
     label, x_unit = _words(channel)
-    runs = shown.held_out or shown.runs
-    periodic = any("order" in [p.name for p in t.parameters] for t in terms)
-    scale, unit = display(shown.after.unit)
+    runs = shown.runs
+    periodic = "order" in finding.parameters
+    scale, unit = display(shown.model.unit)
     lines: list[Line] = []
     rows: dict[float, list[str]] = {}
     height = {}
-    for side in ("before", "after"):
-        values = [scale * (r.measured - getattr(r, side))[r.counted] for r in runs]
-        places = [_within_a_turn(r.channels[channel][r.counted], periodic) for r in runs]
+    for side in SIDES:
+        values = [scale * getattr(r, side) for r in runs]
+        places = [_within_a_turn(r.channels[channel], periodic) for r in runs]
         x, mean, low, high = binned(np.concatenate(places), np.concatenate(values), BINS)
         lines += _with_band(x, (mean, low, high), side, unit)
         for run, place, value in zip(runs, places, values, strict=True):
@@ -78,7 +65,7 @@ def _profile(name: str, channel: str, terms: Sequence[Term], shown: EquationTrac
             row = rows.setdefault(float(f"{place:.3g}"), [f"{place:.3g}"])
             row += [f"{one:.3g}", f"{below:.3g} to {above:.3g}"]
     of_turn = ", within a turn" if periodic and "angle" in channel else ""
-    title = f"{shown.after.balance}: residual over {label}{of_turn}"
+    title = f"{shown.model.balance}: residual over {label}{of_turn}"
     judgement = (
         f"The mean residual varies by {height['before']:.3g} {unit} over {label} with the declared"
         f" model and by {height['after']:.3g} {unit} with the findings."
@@ -200,9 +187,9 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
 
 def _over_time(name: str, shown: EquationTraces) -> Chart:
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
-    scale, unit = display(shown.after.unit)
-    label, _ = _words(shown.after.target)
-    runs = sorted(shown.held_out, key=_error_after)
+    scale, unit = display(shown.model.unit)
+    label, _ = _words(shown.model.target)
+    runs = sorted(shown.runs, key=_error_after)
     middle = runs.pop(len(runs) // 2)
     choices = {run.run: _signals(run, scale, unit) for run in (middle, *runs)}
     layout = {
@@ -215,30 +202,27 @@ def _over_time(name: str, shown: EquationTraces) -> Chart:
     caption = (
         "Measured and estimated signal of one held-out test run, above, and measured minus"
         " estimated, below; zero-phase filtered, the run's mean error removed. Gaps: samples at"
-        " standstill, at the ends of the run or flagged, which the fit does not count."
+        " standstill, at the ends of the run or flagged, which the error does not count."
     )
     title = f"{name}: measured and estimated"
     return Chart(f"time-{name}", title, "", caption, layout, choices=choices)
 
 
 def _error_after(run: RunTrace) -> float:
-    return float(np.std((run.measured - run.after)[run.counted]))
+    return float(np.std(run.after))
 
 
 def _signals(run: RunTrace, scale: float, unit: str) -> list[Line]:
-    kept = {
-        "measured": run.measured,
-        "before": np.where(run.counted, run.before, np.nan),
-        "after": np.where(run.counted, run.after, np.nan),
-    }
+    gaps = np.diff(run.time_s, prepend=run.time_s[0]) > 3 * np.median(np.diff(run.time_s))
+    measured = scale * run.measured
     names = {"measured": "measured", "before": "declared model", "after": "with the findings"}
+    left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in SIDES}
     time_s = thinned(run.time_s)
-    lines = []
-    for role, values in kept.items():
-        meta = {"role": role}
-        lines.append(_line(time_s, thinned(scale * values), names[role], meta, unit))
-    for role in ("before", "after"):
-        left = thinned(scale * (run.measured - kept[role]))
-        line = _line(time_s, left, f"residual, {names[role]}", {"role": role}, unit)
+    lines = [_line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)]
+    for side in SIDES:
+        values = thinned(measured - left[side])
+        lines.append(_line(time_s, values, names[side], {"role": side}, unit))
+    for side in SIDES:
+        line = _line(time_s, thinned(left[side]), f"residual, {names[side]}", {"role": side}, unit)
         lines.append({**line, "yaxis": "y2", "showlegend": False})
     return [{**line, "x": numbers(time_s, 6)} for line in lines]

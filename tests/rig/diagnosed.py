@@ -7,18 +7,20 @@ import numpy as np
 
 from estimation import model_file
 from estimation.campaign import Campaign
+from estimation.derived import settled_places, zero_phase_channels
 from estimation.diagnosis.result import Diagnosis, Error, Finding, Value
-from estimation.diagnosis.split import split
+from estimation.diagnosis.split import Sealed, split
 from estimation.effects import effect
 from estimation.fitting import fit
-from estimation.model import Estimate, Term
-from rig.diagnosis.traces import EquationTraces, traces
+from estimation.model import Estimate, Model, Term, estimate
+from estimation.recording import Recording
+from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
 from tests.estimation.synthetic import campaign
 
 RIPPLE_N_M = 3e-3
 
 
-def example() -> tuple[Diagnosis, dict[str, EquationTraces]]:
+def example() -> tuple[Diagnosis, Traces]:
     """Return a diagnosis that identified a ripple of seven waves a motor turn, and its signals."""
     whole = campaign(lambda angle, speed, load: RIPPLE_N_M * np.sin(7 * angle))
     runs = [handle.recording() for handle in whole.runs]
@@ -28,7 +30,7 @@ def example() -> tuple[Diagnosis, dict[str, EquationTraces]]:
     ripple = Term(effect("ripple.motor"), values={"order": Estimate(7.0)})
     before = fit(declared, training)
     after = fit(replace(declared, terms=(*declared.terms, ripple)), training)
-    shown = traces(runs, sealed, before, after)
+    shown = _traces(runs, sealed, before, after)
     values = after.terms[-1].values
     errors = _errors(shown)
     finding = Finding(
@@ -42,6 +44,7 @@ def example() -> tuple[Diagnosis, dict[str, EquationTraces]]:
         alternatives=("ripple.current",),
         depends_on=("motor_angle",),
         confidence=0.71,
+        probabilities={"ripple.motor": 0.71, "ripple.current": 0.25},
         parameters={
             name: Value(known.value, "1" if name == "order" else "N m", known.ci95)
             for name, known in values.items()
@@ -65,16 +68,37 @@ def example() -> tuple[Diagnosis, dict[str, EquationTraces]]:
         notes=("A note with a <tag> & more.",),
         seconds=3.0,
     )
-    return found, {"motor": shown}
+    return found, Traces({"motor": shown}, (("motor_angle_rad",),))
+
+
+def _traces(
+    recordings: list[Recording], sealed: Sealed, before: Model, after: Model
+) -> EquationTraces:
+    """Return the signals of the test runs with two fitted models."""
+    runs = []
+    for recording in recordings:
+        if recording.name not in sealed.confirm:
+            continue
+        channels = zero_phase_channels(recording, [*after.channels, after.target], before.low_pass)
+        places = settled_places(channels, before.low_pass, 5)
+        left = [(channels[before.target] - estimate(m, channels))[places] for m in (before, after)]
+        runs.append(
+            RunTrace(
+                recording.name,
+                channels.time_s[places],
+                channels[before.target][places],
+                left[0] - left[0].mean(),
+                left[1] - left[1].mean(),
+                {"motor_angle_rad": channels["motor_angle_rad"][places]},
+            )
+        )
+    return EquationTraces(before, tuple(runs))
 
 
 def _errors(shown: EquationTraces) -> Error:
     by_run: dict[str, dict[str, float]] = {}
     for side in ("before", "after"):
-        by_run[side] = {
-            run.run: float(np.std((run.measured - getattr(run, side))[run.counted]))
-            for run in shown.held_out
-        }
+        by_run[side] = {run.run: float(np.std(getattr(run, side))) for run in shown.runs}
     pooled = [float(np.sqrt(np.mean(np.square(list(one.values()))))) for one in by_run.values()]
     ratio = pooled[1] / pooled[0]
     return Error(*pooled, *pooled, (0.9 * ratio, 1.1 * ratio), by_run["before"], by_run["after"])

@@ -67,13 +67,7 @@ def test_the_page_says_all_that_was_found_and_what_is_not_known(demo, told):
     assert "identified: torque that is periodic in the motor angle (cogging) [ripple.motor]" in page
     assert "held-out test runs" in page
     assert all(run in page for run in found["runs"]["confirm"])
-    for part in (
-        "What to check",
-        "Next experiment",
-        "Parameters of the findings",
-        "What was tried in place of",
-        "Declared",
-    ):
+    for part in ("What to check", "Next experiment", "Parameters of the findings", "Declared"):
         assert part in page
     for note in found["notes"]:
         assert note in page

@@ -60,11 +60,11 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     page = (report / "diagnosis.html").read_text()
     assert "[spring.position]" in page
     for part in (
-        "motor: residual over ",
+        "motor: residual over spindle angle",
         "motor: error of each held-out test run",
         "motor: measured and estimated",
         "Parameters of the findings",
-        "What was tried in place of spring.position in motor",
+        "Probability of each name",
         "Declared parameters: motor",
         "What to check",
         "Next experiment",
