@@ -134,15 +134,26 @@ def simulate(
     return Campaign.of(simulate_reference_campaign(seed, protocol, hidden))
 
 
-def declared(name: Path | str) -> list[Model]:
-    """Return the declared models of a file, or of the name of a shipped one such as `motor`.
+def declared(name: Path | str | None = None, *, machine: Path | str | None = None) -> list[Model]:
+    """Return declared models: of a model file, of a machine, or of the reference rig if neither.
+
+    Args:
+        name: A model file, or the name of a shipped model such as `motor`.
+        machine: A machine file, or the name of a shipped machine; its equations are declared.
 
     Raises:
         ModelFileError: There is no such file or model, or it is wrong.
+        PlantFileError: There is no such machine, or its file is wrong.
     """
     from estimation import model_file
+    from estimation.plant_models import declared as equations_of
+    from rig.machines.shipped import read_machine
 
-    return model_file.read_all(Path(name))
+    if name is not None:
+        return model_file.read_all(Path(name))
+    if machine is None:
+        return list(model_file.reference_rig())
+    return list(equations_of(read_machine(Path(machine))))
 
 
 def effects() -> dict[str, Effect]:

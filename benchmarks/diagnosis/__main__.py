@@ -38,8 +38,7 @@ def main() -> int:
     """Measure what the command line asks for."""
     options = _parser().parse_args()
     options.varied |= not (options.own or options.otherlab or options.machines)
-    module = "benchmarks.diagnosis.prototype" if options.prototype else ""
-    rig = Rig(options.rig, options.version, module)
+    rig = Rig(options.rig, options.version)
     for generator in _generators(options):
         rows = measure(
             [c for c in generator.cases if c.name.startswith(tuple(options.only.split(",")))],
@@ -67,9 +66,6 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=Path(sys.executable).parent / "rig",
         help="executable in .venv/bin of the checkout that is measured",
-    )
-    parser.add_argument(
-        "--prototype", action="store_true", help="the joint decision core, before it is shipped"
     )
     parser.add_argument("--version", default="", help="its name on the page; its commit if none")
     parser.add_argument("--seed", type=int, help="the next judging block if none")

@@ -58,19 +58,10 @@ class Rig:
     Attributes:
         path: The executable; its own checkout is the version that is measured.
         name: What the version is called; its commit when empty.
-        module: Module that the checkout's Python runs in place of the executable; none when empty.
     """
 
     path: Path
     name: str = ""
-    module: str = ""
-
-    @property
-    def words(self) -> list[str]:
-        """The command."""
-        if self.module:
-            return [str(self.path.with_name("python")), "-m", self.module]
-        return [str(self.path)]
 
     @cached_property
     def version(self) -> str:
@@ -81,7 +72,7 @@ class Rig:
     def _help(self) -> str:
         """The words of `rig diagnose --help`, wide enough that no option is cut."""
         done = subprocess.run(  # noqa: S603 - the executable that the caller named
-            [*self.words, "diagnose", "--help"],
+            [str(self.path), "diagnose", "--help"],
             capture_output=True,
             text=True,
             check=True,
@@ -103,7 +94,7 @@ class Rig:
         to_file = "--json-out" if self.has("--json-out") else "--json"
         with tempfile.TemporaryDirectory(prefix="rig-measure-") as own:
             out, protocol = Path(own, "answer.json"), Path(own, "next.toml")
-            words = [*self.words, "diagnose", str(folder), *options, to_file, str(out)]
+            words = [str(self.path), "diagnose", str(folder), *options, to_file, str(out)]
             words += ["--protocol-out", str(protocol)] if self.has("--protocol-out") else []
             began, used = time.perf_counter(), _children_s()
             message = _run(words, {"RIG_STATE_DIR": own})  # no diagnosis has seen these runs before

@@ -45,7 +45,7 @@ COLUMNS = {
 
 HEAD = """# The diagnosis, version by version
 
-Appended by `make measure` ([how](../blind-study.md)): one line for each version of the code and
+Appended by `make measure` ([how](../measuring.md)): one line for each version of the code and
 each generator of cases, so that every version is listed with the earlier ones. `+changes` is a
 checkout with changes that were not committed.
 """

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.reliability import encoder_faults
 from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.errors import DriverError
 from drivers.registry import fakes
@@ -156,7 +157,7 @@ class ScriptedRig:
 def inject(count: int, seed: int = 0) -> Iterator[Outcome]:
     """Yield the outcome of each of `count` faults, every kind, in random order."""
     generator = random.Random(seed)
-    kinds = [*SENSOR_FAULTS, "host killed", "cable cut", *_LINK_FAULTS]
+    kinds = [*SENSOR_FAULTS, *encoder_faults.FAULTS, "host killed", "cable cut", *_LINK_FAULTS]
     order = [kinds[k % len(kinds)] for k in range(count)]
     generator.shuffle(order)
     config = load_config().changed(
@@ -168,6 +169,10 @@ def inject(count: int, seed: int = 0) -> Iterator[Outcome]:
         try:
             if kind in _LINK_FAULTS:
                 yield _link_fault(kind, generator.randrange(2**32))
+            elif kind in encoder_faults.FAULTS:
+                fault, codes = encoder_faults.FAULTS[kind]
+                trip = encoder_faults.ride(fault)[2]
+                yield Outcome(kind, trip is not Trip.NONE, trip in codes, 0)
             else:
                 yield _safety_fault(kind, generator.randrange(1, 200), config)
         except Exception as error:

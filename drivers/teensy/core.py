@@ -110,6 +110,10 @@ class FirmwareBoard:
         """Whether the motors are, or may any moment be, given current."""
         return bool(self._functions.rig_board_in_force(self._handle))
 
+    def assume_hot(self) -> None:
+        """Take the motors for as hot as they may be, where nothing is known of the time before."""
+        self._functions.rig_board_assume_hot(self._handle)
+
     def set_clock(self, tick_us: int) -> None:
         """Set the board's clock of the next tick, where ticks are not regular."""
         self._next_tick_us = tick_us % 2**32
@@ -229,6 +233,7 @@ def _load(path: Path, built_ns: int) -> ctypes.CDLL:
     for name, result, arguments in (
         ("rig_board_create", pointer, (text, text)),
         ("rig_board_booted", None, (pointer, word, number)),
+        ("rig_board_assume_hot", None, (pointer,)),
         ("rig_board_limit", number, (pointer, text)),
         ("rig_board_stop", None, (pointer, number)),
         ("rig_board_in_force", number, (pointer,)),

@@ -25,7 +25,7 @@ from estimation.effects import Proportional
 from estimation.errors import EstimationError
 from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
-from estimation.model import Model, Term
+from estimation.model import Model, Term, balance_channels
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
 from estimation.signals import Signals
@@ -35,6 +35,10 @@ SERIES_PER_CUTOFF = 5.0
 
 GRID_PER_CUTOFF = 1.7
 """Samples regressed on for each period of the cutoff: neighbours nearer than that are alike."""
+
+COULOMB = "friction.coulomb"
+LEAST = 20
+"""Samples that an equation needs of each run."""
 
 SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
@@ -324,30 +328,18 @@ def _signals(
     wanted = [*measured, *moved, *(n for m in models for n in (*m.channels, m.target))]
     low_pass, signals = models[0].low_pass, models[0].signals
     filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
-    rate_hz = recording.sample_rate_hz
-    step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
-    edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
-    spoilt = ndimage.maximum_filter1d((~filtered.valid).astype(np.uint8), 2 * edge + 1) > 0
-    spoilt[:edge] = True
-    spoilt[max(len(spoilt) - edge, 0) :] = True
+    valid, step, grid = _places(filtered, low_pass)
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
     reading = measured_channels((n for n in wanted if n != CAMPAIGN_TIME), signals)
     random = zero_phase_channels(_white_noise(recording, reading), wanted, low_pass, signals)
     noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
-    valid, rate_hz = ~spoilt[::step], rate_hz / step
-    coarse = max(1, round(rate_hz / (GRID_PER_CUTOFF * low_pass.cutoff_hz)))
-    grid = np.arange(0, len(valid), coarse)
-    grid = grid[valid[grid]]
+    rate_hz = recording.sample_rate_hz / step
     used = {}
     for equation in equations.values():
-        moving = np.ones(len(valid), bool)
-        if equation.speed and equation.model.counted != "all":
-            slowest = equation.model.signals.rest.get(equation.speed, 0.0)
-            moving = in_motion(channels[equation.speed], valid, rate_hz, slowest)
-        used[equation.name] = np.flatnonzero(moving[grid])
-        if len(used[equation.name]) < 20:
+        used[equation.name] = _used(equation.model, channels, valid, rate_hz, grid)
+        if len(used[equation.name]) < LEAST:
             raise LayoutError(
                 f"Run {recording.name!r} has {len(used[equation.name])} samples for the equation"
                 f" {equation.name}.",
@@ -355,6 +347,54 @@ def _signals(
                 "Record it again, or exclude it.",
             )
     return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
+
+
+def samples_in_motion(model: Model, recording: Recording) -> int:
+    """Return the number of samples of a run that an equation is regressed on.
+
+    Raises:
+        MissingChannelError: The run lacks a channel of the equation.
+    """
+    filtered = balance_channels(model, recording)
+    valid, step, grid = _places(filtered, model.low_pass)
+    channels = {name: values[::step] for name, values in filtered.columns.items()}
+    return len(_used(model, channels, valid, recording.sample_rate_hz / step, grid))
+
+
+def _places(
+    filtered: Recording, low_pass: LowPass
+) -> tuple[NDArray[np.bool_], int, NDArray[np.intp]]:
+    """Return which samples of the series are sound, its step, and the places regressed on."""
+    rate_hz = filtered.sample_rate_hz
+    step = max(1, int(rate_hz / (SERIES_PER_CUTOFF * low_pass.cutoff_hz)))
+    edge = int(np.ceil(2 * low_pass.reach_s * rate_hz))
+    spoilt = ndimage.maximum_filter1d((~filtered.valid).astype(np.uint8), 2 * edge + 1) > 0
+    spoilt[:edge] = True
+    spoilt[max(len(spoilt) - edge, 0) :] = True
+    valid = ~spoilt[::step]
+    coarse = max(1, round(rate_hz / step / (GRID_PER_CUTOFF * low_pass.cutoff_hz)))
+    grid = np.arange(0, len(valid), coarse)
+    return valid, step, grid[valid[grid]]
+
+
+def _used(
+    model: Model,
+    channels: Mapping[str, FloatArray],
+    valid: NDArray[np.bool_],
+    rate_hz: float,
+    grid: NDArray[np.intp],
+) -> NDArray[np.intp]:
+    """Return the places of the grid that an equation counts: those in motion, with friction."""
+    speed = _friction_speed(model)
+    if not speed or model.counted == "all":
+        return np.arange(len(grid))
+    moving = in_motion(channels[speed], valid, rate_hz, model.signals.rest.get(speed, 0.0))
+    return np.flatnonzero(moving[grid])
+
+
+def _friction_speed(model: Model) -> str:
+    """Return the channel of the speed that declared friction depends on; empty without."""
+    return next((t.channels["speed"] for t in model.terms if t.effect.id == COULOMB), "")
 
 
 def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:

@@ -17,7 +17,7 @@ from estimation.causes.equations import Layout, LayoutError, laid_out_like
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
-from estimation.causes.search import Scored
+from estimation.causes.search import Scored, shares_of
 from estimation.causes.sources import Source
 from estimation.causes.verdict import IN_SET, Answer, Kept
 from estimation.recording import FloatArray, Recording
@@ -125,12 +125,10 @@ def separation(asked: Question, recordings: Sequence[Recording]) -> float | None
 
 def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
     """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
-    sharpness = joint.numbers.sharpness
-    scores = np.array([s.score for s in kept.ranked])
-    weights = np.exp(sharpness * (scores - scores.max()))
     shares: dict[str, float] = {}
     best: dict[str, Scored] = {}
-    for scored, weight in zip(kept.ranked, weights / weights.sum(), strict=True):
+    weights = shares_of(kept.ranked, joint.numbers)
+    for scored, weight in zip(kept.ranked, weights, strict=True):
         label = _label(scored)
         shares[label] = shares.get(label, 0.0) + float(weight)
         best.setdefault(label, scored)

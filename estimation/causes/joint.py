@@ -30,10 +30,6 @@ TINY = 1e-300
 MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may change next to a cause."""
 
-NOISE_TAKEN = 0.8
-"""Share of the known noise that is taken off the cross-products of a fit: with all of it a column
-that holds nothing but noise has any amplitude."""
-
 
 @dataclass(frozen=True)
 class Laid:
@@ -264,13 +260,9 @@ class Joint:
         return out
 
     def _weighted(self) -> FloatArray:
-        """Return the weighted cross-products of each run, without most of the known noise."""
-        size, weights = self._declared_size, self.weights
-        total = sum((weights[p] * self._gram[p] for p in self.parts), start=np.zeros(()))
-        noise = sum((weights[p] * self._noise[p] for p in self.parts), start=np.zeros(()))
-        inner = np.array([*range(size), -1])
-        total[:, inner[:, None], inner] -= NOISE_TAKEN * noise
-        return np.asarray(total)
+        """Return the weighted cross-products of each run."""
+        weights = self.weights
+        return np.asarray(sum((weights[p] * self._gram[p] for p in self.parts), np.zeros(())))
 
     def _fitted(self, left_out: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
         """Return the inverse of the base's normal matrix without some runs, and its parameters."""
@@ -546,8 +538,8 @@ class Joint:
         numbers, weight = self.numbers, 1.0
         floor = numbers.form_floor * self.error[part]
         if part[1] == "between":
-            weight = numbers.between_weight
-            floor += numbers.between_floor * self.error[part[0], "within"]
+            weight = numbers.between
+            floor += numbers.between * self.error[part[0], "within"]
         return np.asarray(weight * np.log((before + floor) / (after + floor)))
 
     # ---- accepted causes

@@ -51,6 +51,8 @@ def places_of(layout: Layout) -> list[Place]:
     found = []
     angles = _angles(layout)
     for equation in layout.equations.values():
+        if not angles:
+            break  # nothing turns or slides in a sensor's calibration
         found.append(_own(layout, equation, angles))
         if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
             found.append(_actuator(equation, angles))

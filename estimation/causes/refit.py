@@ -17,7 +17,7 @@ from estimation.campaign import Campaign
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
 from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
-from estimation.model import Model, Term
+from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray, Recording
 from estimation.rest import Samples
 from estimation.within_bounds import solve_within
@@ -175,6 +175,22 @@ class Refit:
                 if not terms:
                     raise
                 terms.pop()
+
+    def refined(self, parts: Sequence[Part], term: Term) -> Term:
+        """Return a term with its shape moved to the least error, next to what was added before.
+
+        For a term that reads another channel than the search did.
+        """
+        declared = [p.term for p in parts if p.is_written and p.term is not None]
+        zero = {p.name: Estimate(0.0) for p in term.effect.amplitudes}
+        begun = replace(term, values={**term.values, **zero})
+        model = replace(self.model, terms=(*self.model.terms, *declared, begun), evidence=None)
+        campaign = Campaign.of([self.recordings[n] for n in self.train_names])
+        try:
+            last = fit(model, campaign, bootstrap=0, shapes="near").terms[-1]
+        except FitError:
+            return term
+        return replace(term, values={p.name: last.values[p.name] for p in term.effect.shape})
 
     def _fitted(self, parts: tuple[Part, ...]) -> Solved:
         grams, means, samples = [], [], 0

@@ -10,7 +10,7 @@ from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part, Refit, Solved
 from estimation.causes.search import Candidate
 from estimation.causes.sources import Source
-from estimation.causes.terms import term_of
+from estimation.causes.terms import plain, term_of
 from estimation.diagnosis.result import Error
 from estimation.diagnosis.split import Sealed
 from estimation.model import Model
@@ -98,6 +98,8 @@ class Refits:
         if isinstance(cause, Source):
             term = term_of(cause, equation, self.layout.measured)
             if term is not None:
+                if set(term.channels.values()) - {channel for _, channel in cause.channels}:
+                    term = self.of[name].refined(self.parts[name], term)
                 return Part(term, acts)
             if name != cause.place.home:
                 return None
@@ -118,7 +120,7 @@ def _everywhere(
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and a cause's columns there, at all of a run's places, at standstill too."""
     everything = {name: np.arange(len(run.grid)) for name in run.used}
-    columns = candidate.cause.columns(replace(run, used=everything)) or {}
+    columns = plain(candidate.cause).columns(replace(run, used=everything)) or {}
     return run.channels["time_s"][run.grid], columns[equation]
 
 

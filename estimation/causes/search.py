@@ -161,6 +161,8 @@ def candidates(train: Layout, joint: Joint) -> list[Candidate]:
             laid = laid_out(train, joint, cause)
             if laid is not None:
                 out.append(laid)
+    for run in train.runs:
+        run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     count = Counter(_form(c) for c in out)
     return [replace(c, choices=count[_form(c)] * len(count)) for c in out]
 
@@ -169,6 +171,23 @@ def _form(candidate: Candidate) -> tuple[str, str]:
     """Return the key of one prior probability: a form of an effect, or all smooth functions."""
     cause = candidate.cause
     return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id
+
+
+def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
+    """Return the probability of each candidate by its score alone, shape (n,)."""
+    scores = np.array([s.score for s in ranked])
+    weights = np.exp(numbers.sharpness * (scores - scores.max()))
+    return np.asarray(weights / weights.sum())
+
+
+def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
+    """Return the probability of each candidate, shape (n,).
+
+    Only what is better than no cause at all competes with the best.
+    """
+    scores = np.array([s.score for s in ranked])
+    kept = np.where((scores > 0.0) | (scores == scores.max()), shares_of(ranked, numbers), 0.0)
+    return np.asarray(kept / kept.sum())
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
@@ -252,15 +271,14 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
     of the runs by all choices of them.
     """
-    price = numbers.cause_cost + float(np.log(candidate.choices))
-    if candidate.is_function:
-        price += numbers.function_cost
+    choices = float(np.log(candidate.choices))
     if candidate.acts is not None:
         count, acting = len(candidate.acts), sum(candidate.acts)
-        price += float(np.log(count + 1.0)) + sum(
+        choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
         )
-    return price / numbers.sharpness
+    more = numbers.function_cost if candidate.is_function else 0.0
+    return numbers.cause_cost + more + numbers.choice_price * choices
 
 
 def _ranked(

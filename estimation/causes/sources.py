@@ -15,6 +15,7 @@ from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
+from estimation.effects.roles import entries
 from estimation.model import BALANCES
 from estimation.recording import FloatArray
 
@@ -204,6 +205,8 @@ def _acts(effect: Effect, place: Place) -> bool:
     if not set(effect.roles) <= set(place.roles):
         return False
     kind = place.home.partition(".")[0]
+    if kind == "calibration" and not entries(effect, place.home):
+        return False  # its equation is of one sensor or part
     if effect.family == "friction.capstan" and kind in BALANCES and kind not in effect.balances:
         return False  # a cable that is wrapped, not a shaft in its bearings
     match place.kind:

@@ -2,13 +2,20 @@
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 from estimation.causes.equations import Equation
+from estimation.causes.functions import Function
 from estimation.causes.places import Entry
 from estimation.causes.sources import Source
 from estimation.derived import CLOCKS, measured_channels, origin_of
 from estimation.effects.roles import entries
 from estimation.model import Estimate, Term
+
+
+def plain(cause: Source | Function) -> Source | Function:
+    """Return a cause with the form of its equation, as a model has it."""
+    return replace(cause, bend=None, odd=False) if isinstance(cause, Source) else cause
 
 
 def term_of(source: Source, equation: Equation, measured: Collection[str]) -> Term | None:
@@ -59,7 +66,7 @@ def _instead(source: Source, equation: Equation, measured: Collection[str]) -> M
     found: dict[str, str] = {}
     for entry in entries(source.effect, equation.name):
         for role, channel in entry.channels.items():
-            known = set(measured_channels([channel])) <= there
+            known = set(measured_channels([channel], equation.model.signals)) <= there
             if known and not _reads_target(channel, equation):
                 found.setdefault(role, channel)
     return found

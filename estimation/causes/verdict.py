@@ -16,8 +16,9 @@ from estimation.causes.functions import Function, names
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT, Numbers
+from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
-from estimation.causes.search import Candidate, Found, Scored, search
+from estimation.causes.search import Candidate, Found, Scored, posterior, search
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
@@ -76,11 +77,13 @@ class Kept:
         scored: The cause.
         likely: The probabilities of the families in its place.
         ranked: Every candidate in its place, given the other causes, best first.
+        part: What it adds to its home equation.
     """
 
     scored: Scored
     likely: Sequence[Probability]
     ranked: Sequence[Scored]
+    part: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,7 @@ def answer(
     kept, findings, notes = _judged(found, HeldOut(layout, sealed, numbers), refits)
     written = refits.models()
     findings = [
-        replace(f, parameters=_parameters(k.scored, f.balance, written))
+        replace(f, parameters=_parameters(k, f.balance, written))
         for k, f in zip(kept, findings, strict=True)
     ]
     diagnosis = Diagnosis(
@@ -166,17 +169,15 @@ def answer(
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
     """Return the posterior over families of one slot, the likeliest first."""
-    scores = np.array([s.score for s in ranked])
-    weights = np.exp(numbers.sharpness * (scores - scores.max()))
-    weights /= weights.sum()
     shares: dict[str, float] = {}
     best: dict[str, Scored] = {}
-    for scored, weight in zip(ranked, weights, strict=True):
+    for scored, weight in zip(ranked, posterior(ranked, numbers), strict=True):
         family = scored.candidate.cause.family
         shares[family] = shares.get(family, 0.0) + float(weight)
         best.setdefault(family, scored)
     return sorted(
-        (Probability(f, share, best[f]) for f, share in shares.items()), key=lambda p: -p.share
+        (Probability(f, share, best[f]) for f, share in shares.items() if share > 0.0),
+        key=lambda p: -p.share,
     )
 
 
@@ -188,7 +189,9 @@ def _judged(
     kept: list[Kept] = []
     findings: list[Finding] = []
     notes: list[str] = []
-    for scored, ranked in zip(found.causes, found.conditional, strict=True):
+    for ranked in found.conditional:
+        likely = family_probabilities(ranked, numbers)
+        scored = likely[0].best
         cause = scored.candidate.cause
         gain = held_out.gain([k.scored.candidate for k in kept], scored.candidate)
         if float(np.exp(min(numbers.sharpness * gain, 300.0))) < numbers.kept_evidence:
@@ -197,7 +200,7 @@ def _judged(
                 " confirmed on the test runs."
             )
             continue
-        one = Kept(scored, family_probabilities(ranked, numbers), ranked)
+        one = Kept(scored, likely, ranked)
         acts_in = held_out.acts_in(scored.candidate)
         open_runs = [name for name, acts in acts_in.items() if acts is None]
         if open_runs:
@@ -221,8 +224,8 @@ def _judged(
                 runs_affected=tuple(name for name, acts in acts_in.items() if acts),
             )
         )
-        kept.append(one)
         part = refits.parts[home][-1]
+        kept.append(replace(one, part=part))
         if not part.is_written:
             notes.append(_unwritten(scored.candidate))
     return kept, findings, notes
@@ -291,19 +294,18 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _parameters(scored: Scored, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
+def _parameters(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
     """Return amplitudes and shape of a named cause from the written model of its home equation.
 
     Of a cause that no file holds, the shape alone.
     """
-    cause = scored.candidate.cause
+    cause = kept.scored.candidate.cause
     if isinstance(cause, Function):
         return {}
     model = next(m for m in written if m.balance == home)
-    shape = tuple(map(float, cause.shape))
-    for term in model.terms:
-        same = term.effect.id == cause.effect.id
-        if same and tuple(term.numbers(term.effect.shape)) == shape:
+    own = kept.part.term if kept.part is not None else None
+    for term in model.terms if own is not None else ():
+        if own is not None and _same(term, own):
             return {
                 p.name: Value(known.value, term.unit(p, model.target), known.ci95)
                 for p in term.parameters
@@ -311,9 +313,15 @@ def _parameters(scored: Scored, home: str, written: Sequence[Model]) -> Mapping[
             }
     units = Term(cause.effect, channels=dict(cause.channels))
     return {
-        p.name: Value(x, units.unit(p, model.target), None)
-        for p, x in zip(cause.effect.shape, shape, strict=True)
+        p.name: Value(float(x), units.unit(p, model.target), None)
+        for p, x in zip(cause.effect.shape, cause.shape, strict=True)
     }
+
+
+def _same(one: Term, other: Term) -> bool:
+    """Whether two terms are of one effect at one shape."""
+    shape = one.effect.shape
+    return one.effect.id == other.effect.id and one.numbers(shape) == other.numbers(shape)
 
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.places import Place, places_of
 from estimation.causes.sources import Source, sources_at
-from estimation.changes.regression import Columns
+from estimation.changes.regression import Columns, declared_columns
 from estimation.fitting import OFFSET
 from estimation.recording import FloatArray
 
@@ -33,8 +33,7 @@ class Moved:
         if self.column < 0:
             return {self.equation: np.ones((len(run.used[self.equation]), 1))}
         equation = layout.equations[self.equation]
-        inside = equation.columns(run.channels)[run.grid][run.used[self.equation]]
-        return {self.equation: inside[:, [self.column]]}
+        return {self.equation: declared_columns(equation, run)[:, [self.column]]}
 
 
 @dataclass(frozen=True)
@@ -111,11 +110,9 @@ def candidates(layout: Layout) -> Iterator[Candidate]:
     for name, equation in layout.equations.items():
         column = 0
         for term in equation.terms:
-            for parameter in (*term.effect.amplitudes, *term.effect.shape):
-                # a derivative by a shape is in the base, but only amplitudes are asked about
-                if parameter in term.effect.amplitudes:
-                    unit = term.unit(parameter, equation.target)
-                    yield Moved(name, term.effect.id, parameter.name, unit, column)
+            for parameter in term.effect.amplitudes:
+                unit = term.unit(parameter, equation.target)
+                yield Moved(name, term.effect.id, parameter.name, unit, column)
                 column += 1
         if any(term.effect.id == OFFSET for term in equation.model.terms):
             yield Moved(name, OFFSET, "offset", equation.model.unit, -1)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimation.causes.equations import Layout, lay_out
-from estimation.changes.candidates import Came, SensorMoved, columns_of
+from estimation.changes.candidates import Came, SensorMoved
 from estimation.changes.regression import Regression, solved
-from estimation.changes.search import Gained, Step, search
+from estimation.changes.search import SURE, Gained, Step, impossible, laid_out, search
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -17,9 +17,6 @@ SCHEMA = "rig.diff/1"
 
 LEAST_RUNS = 4
 """Runs of each campaign: of fewer, 5 % of the choices of runs are less than one."""
-
-SURE = 0.9
-"""Share from which a single name is given; below it the verdict is a set."""
 
 IN_SET = 0.95
 """Share that a set of names covers."""
@@ -42,7 +39,8 @@ class Change:
         equation: Equation it is reported under.
         family: The effect.
         alternatives: Other names that explain it about as well.
-        confidence: Share of resampled sets of runs in which this name explains most.
+        confidence: Weight of this name among all that explain about as much, over resampled sets of
+            runs.
         p: Probability of a change this large where nothing changed, over all candidates.
         parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
         ci95: Parameter to the 95 % interval of that, over runs.
@@ -137,12 +135,13 @@ def compare(
     fitted = layout.select(train)
     is_b = np.array([float(run.name.startswith(B)) for run in fitted.runs])
     conditions = {r.name: _stratum(r) for r in named}
-    steps = search(fitted, is_b, [conditions[run.name] for run in fitted.runs], seed)
+    regression = Regression(fitted)
+    steps = search(regression, is_b, [conditions[run.name] for run in fitted.runs], seed)
     return Difference(
         changes=tuple(_change(step, fitted, is_b) for step in steps),
         runs={"a": tuple(r.name for r in a), "b": tuple(r.name for r in b)},
         predicted=_predicted(layout, steps) if on else {},
-        notes=tuple(_notes(conditions)),
+        notes=(*_notes(conditions), *_not_identified(regression)),
         seed=seed,
     )
 
@@ -163,6 +162,14 @@ def _notes(conditions: Mapping[str, str]) -> list[str]:
     return [
         "The two campaigns were not recorded under the same conditions: what the declared model"
         " lacks under a condition that only one of them has can appear as a change."
+    ]
+
+
+def _not_identified(regression: Regression) -> list[str]:
+    return [
+        f"Changes of the equation {equation} are not judged: its {parameter} comes out beyond its"
+        " bounds, so its parameters are not identifiable from these runs."
+        for equation, parameter in impossible(regression).items()
     ]
 
 
@@ -234,19 +241,11 @@ def _before(best: Gained, layout: Layout, is_b: FloatArray) -> float | None:
     if isinstance(candidate, SensorMoved):
         return 1.0
     regression = Regression(layout)
-    columns = columns_of(candidate, layout)
-    assert columns is not None  # noqa: S101  a declared column is finite
-    rows = [regression.candidate_rows(c, k) for k, c in enumerate(columns)]
-    parameters = solved(regression.grown(rows, is_b).gram())
-    offset = sum(regression.widths[e] for e in _before_of(layout, candidate.equation))
-    if candidate.column < 0:
-        return float(parameters[regression.offset_column(candidate.equation)])
-    return float(parameters[offset + candidate.column])
-
-
-def _before_of(layout: Layout, equation: str) -> list[str]:
-    names = list(layout.equations)
-    return names[: names.index(equation)]
+    laid = laid_out(candidate, regression)
+    assert laid is not None  # noqa: S101  a declared column is finite
+    parameters = solved(regression.grown(laid, is_b).gram())
+    column = regression.declared_column(candidate.equation, candidate.column)
+    return float(parameters[column])
 
 
 def _predicted(layout: Layout, steps: Sequence[Step]) -> dict[str, Predicted]:
@@ -257,13 +256,12 @@ def _predicted(layout: Layout, steps: Sequence[Step]) -> dict[str, Predicted]:
     alone = {p: solved(plain.gram(of[p])) for p in (A, B)}
     grown = dict.fromkeys((A, B), plain)
     for step in steps:
-        columns = columns_of(step.best.candidate, layout)
-        assert columns is not None  # noqa: S101  it was laid out in the search
-        rows = [plain.candidate_rows(c, k) for k, c in enumerate(columns)]
+        laid = laid_out(step.best.candidate, plain)
+        assert laid is not None  # noqa: S101  it was laid out in the search
         side = of[B] if step.best.in_b else of[A]
         for taken_as in (A, B):
             acts = side + of[ON] * float((taken_as == B) == step.best.in_b)
-            grown[taken_as] = grown[taken_as].grown(rows, acts)
+            grown[taken_as] = grown[taken_as].grown(laid, acts)
     both = {p: solved(grown[p].gram(of[A] + of[B])) for p in (A, B)}
     out = {}
     for equation, declared in layout.equations.items():

@@ -4,6 +4,9 @@ Each run has two parts in every equation: its samples with their mean removed, a
 are weighted by the residual variance of the declared model; the samples of one run count as
 `SAMPLES_A_RUN` independent ones. A change acts on some of the runs only, so with the cross-products
 of each run at hand its gain for any choice of runs is a sum.
+
+A column that is a noisy reading would get too small an amplitude. Noise rows, one realisation of
+the sensors' noise in the same columns, are subtracted from the cross-products as in the diagnosis.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from estimation.causes.equations import Layout
+from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.recording import FloatArray
 
 SAMPLES_A_RUN = 40.0
@@ -20,6 +23,9 @@ SAMPLES_A_RUN = 40.0
 
 LEAST_SHARE = 1e-8
 """Share of a column below which its residual on the others counts as none: the same column."""
+
+NOISE_TAKEN = 0.8
+"""Share of the known noise that is subtracted, as in the diagnosis."""
 
 TINY = 1e-300
 
@@ -40,6 +46,14 @@ class Products:
     own: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """A candidate's weighted rows in every run, (rows, k) each, and those of its noise."""
+
+    rows: Sequence[FloatArray]
+    noise: Sequence[FloatArray]
+
+
 class Regression:
     """The declared columns of every run, and changes that were accepted.
 
@@ -52,11 +66,17 @@ class Regression:
         self.layout = layout
         self._sizes = {e: [len(run.used[e]) for run in layout.runs] for e in layout.equations}
         declared = [
-            {e: q.columns(run.channels)[run.grid][run.used[e]] for e, q in layout.equations.items()}
+            {e: declared_columns(q, run) for e, q in layout.equations.items()}
             for run in layout.runs
         ]
         self.widths = {e: declared[0][e].shape[1] for e in layout.equations}
-        self._weights = dict.fromkeys(layout.equations, (1.0, 1.0))
+        # at first a mean counts as the samples do: a column that barely varies within runs has its
+        # amplitude from the means, and the weights below would otherwise never find that out
+        self._weights = dict.fromkeys(layout.equations, (1.0, SAMPLES_A_RUN))
+        noise = [
+            {e: _amplitudes_of(q, q.noise(run), run) for e, q in layout.equations.items()}
+            for run in layout.runs
+        ]
         targets = [
             {e: run.on_grid(q.target)[run.used[e], None] for e, q in layout.equations.items()}
             for run in layout.runs
@@ -66,6 +86,7 @@ class Regression:
                 np.hstack([self._declared(d), self.rows(t).sum(axis=1, keepdims=True)])
                 for d, t in zip(declared, targets, strict=True)
             ]
+            self.noise = [self._noise_rows(n, t) for n, t in zip(noise, self.tables, strict=True)]
             self._reweigh()
 
     @property
@@ -78,6 +99,15 @@ class Regression:
         blocks = self.rows(columns)
         ones = self.rows({e: np.ones((len(columns[e]), 1)) for e in columns})
         return np.hstack([blocks, ones])
+
+    def _noise_rows(self, noise: Columns, table: FloatArray) -> FloatArray:
+        """Return a run's noise in the columns of its table, none larger than the column itself."""
+        blocks = self.rows({e: values[:, :-1] for e, values in noise.items()})
+        target = self.rows({e: values[:, -1:] for e, values in noise.items()})
+        offsets = np.zeros((len(blocks), len(noise)))
+        out = np.hstack([blocks, offsets, target.sum(axis=1, keepdims=True)])
+        size, most = np.square(out).sum(axis=0), np.square(table).sum(axis=0)
+        return np.asarray(out * np.sqrt(most / np.maximum(np.maximum(size, most), TINY)))
 
     def rows(self, columns: Columns) -> FloatArray:
         """Return weighted rows of some equations, a block of columns an equation."""
@@ -113,7 +143,8 @@ class Regression:
 
     def _reweigh(self) -> None:
         """Set each part's weight to one over the residual variance of the declared model."""
-        gram = np.asarray(sum(t.T @ t for t in self.tables))
+        self.__dict__.pop("_grams", None)
+        gram = self.gram()
         vector = np.append(solved(gram), -1.0)
         weights = {}
         for equation in self.layout.equations:
@@ -150,9 +181,25 @@ class Regression:
             total += counts[run]
         return float(np.sqrt(squares / max(total, TINY)))
 
-    def offset_column(self, equation: str) -> int:
-        """Return the number of an equation's offset among the base's columns."""
-        return int(sum(self.widths.values())) + list(self.layout.equations).index(equation)
+    def declared_column(self, equation: str, column: int) -> int:
+        """Return the number of an equation's declared column among the base's; -1 is the offset."""
+        names = list(self.layout.equations)
+        if column < 0:
+            return int(sum(self.widths.values())) + names.index(equation)
+        return int(sum(self.widths[e] for e in names[: names.index(equation)])) + column
+
+    def size_of(self, equation: str, column: int) -> float:
+        """Return the root mean square of a declared column over that of the target, all runs."""
+        inside = [self._rows_of(equation, run) for run in range(len(self.tables))]
+        own = self.declared_column(equation, column)
+        squares = [
+            sum(
+                float(np.square(t[rows, k]).sum())
+                for t, rows in zip(self.tables, inside, strict=True)
+            )
+            for k in (own, -1)
+        ]
+        return float(np.sqrt(squares[0] / max(squares[1], TINY)))
 
     def gram(self, weights: FloatArray | None = None) -> FloatArray:
         """Return the cross-products of base and target, each run counted so many times."""
@@ -162,28 +209,69 @@ class Regression:
 
     @cached_property
     def _grams(self) -> FloatArray:
-        return np.array([t.T @ t for t in self.tables])
+        grams = np.array([t.T @ t for t in self.tables])
+        noise = NOISE_TAKEN * np.array([n.T @ n for n in self.noise])
+        noise[:, -1, -1] = 0.0
+        return np.asarray(grams - noise)
 
-    def products(self, rows: Sequence[FloatArray]) -> Products:
-        """Return the cross-products of a candidate's rows in every run."""
-        cross = np.array([t.T @ z for t, z in zip(self.tables, rows, strict=True)])
-        return Products(cross, np.array([z.T @ z for z in rows]))
+    def laid(self, columns: Sequence[Columns], declared: int | None = None) -> Laid:
+        """Return a candidate's rows in every run.
 
-    def grown(self, rows: Sequence[FloatArray], acts: FloatArray) -> "Regression":
+        Args:
+            columns: Its columns in every run.
+            declared: The column of the base that it is, with that column's noise; None for another.
+        """
+        rows = [self.candidate_rows(c, k) for k, c in enumerate(columns)]
+        if declared is None:
+            return Laid(rows, [np.zeros_like(z) for z in rows])
+        return Laid(rows, [n[:, [declared]] for n in self.noise])
+
+    def products(self, laid: Laid) -> Products:
+        """Return the cross-products of a candidate in every run."""
+        cross = np.array([t.T @ z for t, z in zip(self.tables, laid.rows, strict=True)])
+        own = np.array([z.T @ z for z in laid.rows])
+        cross -= NOISE_TAKEN * np.array(
+            [n.T @ z for n, z in zip(self.noise, laid.noise, strict=True)]
+        )
+        return Products(cross, own - NOISE_TAKEN * np.array([z.T @ z for z in laid.noise]))
+
+    def grown(self, laid: Laid, acts: FloatArray) -> "Regression":
         """Return the regression with a change in its base.
 
         Args:
-            rows: The change's rows in every run.
+            laid: The change's rows in every run.
             acts: 1 for runs in which it acts, else 0.
         """
         made = object.__new__(Regression)
         made.__dict__.update(self.__dict__)
         made.__dict__.pop("_grams", None)
-        made.tables = [
-            np.hstack([t[:, :-1], on * z, t[:, -1:]])
-            for t, z, on in zip(self.tables, rows, acts, strict=True)
-        ]
+        made.tables = _with_column(self.tables, laid.rows, acts)
+        made.noise = _with_column(self.noise, laid.noise, acts)
         return made
+
+
+def declared_columns(equation: Equation, run: RunSignals) -> FloatArray:
+    """Return an equation's columns at the samples it counts; shapes keep their fitted values."""
+    return _amplitudes_of(equation, equation.columns(run.channels), run)
+
+
+def _amplitudes_of(equation: Equation, columns: FloatArray, run: RunSignals) -> FloatArray:
+    kept = [
+        k
+        for k in range(columns.shape[1])
+        if k >= len(equation.of_shape) or not equation.of_shape[k]
+    ]
+    return np.asarray(columns[run.grid[run.used[equation.name]]][:, kept])
+
+
+def _with_column(
+    tables: Sequence[FloatArray], columns: Sequence[FloatArray], acts: FloatArray
+) -> list[FloatArray]:
+    """Return tables with columns before their last one, in the runs in which they act."""
+    return [
+        np.hstack([t[:, :-1], on * z, t[:, -1:]])
+        for t, z, on in zip(tables, columns, acts, strict=True)
+    ]
 
 
 def solved(gram: FloatArray) -> FloatArray:

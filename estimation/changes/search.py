@@ -12,9 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.causes.equations import Layout
-from estimation.changes.candidates import Came, Candidate, candidates, columns_of
-from estimation.changes.regression import Products, Regression, gains, squared_error
+from estimation.changes.candidates import Came, Candidate, Moved, candidates, columns_of
+from estimation.changes.regression import (
+    TINY,
+    Laid,
+    Products,
+    Regression,
+    gains,
+    solved,
+    squared_error,
+)
 from estimation.recording import FloatArray
 
 CHOICES = 299
@@ -22,6 +29,9 @@ CHOICES = 299
 
 LEVEL = 0.05
 """Probability of a wrong change where nothing changed."""
+
+SURE = 0.9
+"""Weight from which a single name is given; below it the verdict is a set."""
 
 REPLICATES = 200
 """Resampled sets of runs, for intervals and for how sure a name is."""
@@ -31,9 +41,13 @@ KEPT = 200
 
 MOST_CHANGES = 4
 
+LEAST_TERM = 0.05
+"""Part of its equation's target, root mean square, below which a term may have either sign."""
+
 FORM = 0.05
-"""Share of the squared error removed so far that the wrong form of a change found can amount to; a
-further change removes more."""
+"""Share of what a change explains that a wrong form of it can amount to. A further change removes
+more than that of the squared error removed so far, and an effect that came explains more than that
+beyond a parameter that moved."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +81,8 @@ class Step:
     Attributes:
         best: The change.
         p: Share of random choices of runs with as large a gain of any candidate.
-        shares: Name to the share of resampled sets of runs in which it is the best, largest first.
+        shares: Name to its weight over resampled sets of runs, largest first. A name that explains
+            less than the best by `FORM` of it has 1/e of its weight: forms are not exact.
         spread: Amplitudes in the resampled sets, shape (replicates, k).
         alternatives: Name to its best candidate.
     """
@@ -82,14 +97,37 @@ class Step:
 @dataclass(frozen=True, eq=False)
 class _Held:
     candidate: Candidate
-    rows: Sequence[FloatArray]
+    laid: Laid
 
 
-def search(layout: Layout, is_b: FloatArray, strata: Sequence[str], seed: int) -> list[Step]:
+def impossible(regression: Regression) -> dict[str, str]:
+    """Return equations with a declared amplitude beyond its bounds, and which one it is.
+
+    Such an equation's parameters are not identifiable from these runs: a change of one would be
+    attributed to another.
+    """
+    parameters = solved(regression.gram())
+    out = {}
+    for name, equation in regression.layout.equations.items():
+        column = 0
+        for term in equation.terms:
+            for parameter in term.effect.amplitudes:
+                value = parameters[regression.declared_column(name, column)]
+                # a term that is next to nothing may have either sign
+                counts = abs(value) * regression.size_of(name, column) > LEAST_TERM
+                if counts and not parameter.lower <= value <= parameter.upper:
+                    out[name] = f"{term.effect.id} {parameter.name}"
+                column += 1
+    return out
+
+
+def search(
+    regression: Regression, is_b: FloatArray, strata: Sequence[str], seed: int
+) -> list[Step]:
     """Find what changed, the largest change first.
 
     Args:
-        layout: The declared equations on the runs of both campaigns.
+        regression: The declared equations on the runs of both campaigns.
         is_b: 1 for each run of B, 0 for each of A, shape (runs,).
         strata: Conditions of each run, as one word.
         seed: Seed of the random choices.
@@ -99,8 +137,8 @@ def search(layout: Layout, is_b: FloatArray, strata: Sequence[str], seed: int) -
     """
     random = np.random.default_rng(seed)
     choices = _choices(is_b, strata, random)
-    regression = Regression(layout)
-    pool = _laid_out(layout, regression)
+    without = impossible(regression)
+    pool = [h for h in _laid_out(regression) if h.candidate.equation not in without]
     steps: list[Step] = []
     declared = squared_error(regression.gram())
     while len(steps) < MOST_CHANGES and pool:
@@ -109,15 +147,18 @@ def search(layout: Layout, is_b: FloatArray, strata: Sequence[str], seed: int) -
             break
         best, held = ranked[0]
         p = float((1 + np.sum(largest[1:] >= best.gain)) / len(choices))
-        grown = regression.grown(held.rows, is_b if best.in_b else 1 - is_b)
+        grown = regression.grown(held.laid, is_b if best.in_b else 1 - is_b)
         now, then = squared_error(regression.gram()), squared_error(grown.gram())
         if p > LEVEL or now - then < FORM * (declared - now):
             break
         pool = [one for _, one in ranked[:KEPT]]
         step = _resampled(regression, ranked, is_b, p, random)
+        # what the wrong form of the first change amounts to has no name that stands out
+        if steps and next(iter(step.shares.values()), 0.0) < SURE:
+            break
         steps.append(step)
         regression = grown
-        pool = [one for one in pool if one.candidate is not held.candidate]
+        pool = [one for one in pool if one.candidate.key != held.candidate.key]
     return steps
 
 
@@ -138,14 +179,24 @@ def _choices(is_b: FloatArray, strata: Sequence[str], random: np.random.Generato
     return np.array(out, dtype=float)
 
 
-def _laid_out(layout: Layout, regression: Regression) -> list[_Held]:
+def _laid_out(regression: Regression) -> list[_Held]:
     pool = []
-    for candidate in candidates(layout):
-        columns = columns_of(candidate, layout)
-        if columns is not None:
-            rows = [regression.candidate_rows(c, k) for k, c in enumerate(columns)]
-            pool.append(_Held(candidate, rows))
+    for candidate in candidates(regression.layout):
+        laid = laid_out(candidate, regression)
+        if laid is not None:
+            pool.append(_Held(candidate, laid))
     return pool
+
+
+def laid_out(candidate: Candidate, regression: Regression) -> Laid | None:
+    """Return a candidate's rows in every run; None where they are not finite."""
+    columns = columns_of(candidate, regression.layout)
+    if columns is None:
+        return None
+    declared = None
+    if isinstance(candidate, Moved):
+        declared = regression.declared_column(candidate.equation, candidate.column)
+    return regression.laid(columns, declared)
 
 
 def _ranked(
@@ -156,10 +207,11 @@ def _ranked(
     ranked: list[tuple[Gained, _Held]] = []
     largest = np.full(len(choices), -np.inf)
     for held in pool:
-        products = regression.products(held.rows)
+        products = regression.products(held.laid)
         for in_b in (True, False) if isinstance(held.candidate, Came) else (True,):
             acts = choices if in_b else 1 - choices
             found, amplitudes = gains(gram, products, acts)
+            found = _worth(held.candidate) * found
             usual = float(found[1:].mean())
             largest = np.maximum(largest, found - usual)
             if isinstance(held.candidate, Came) and not held.candidate.may_have(amplitudes[0]):
@@ -180,7 +232,7 @@ def _resampled(
     """Return how often each name is the best when runs are drawn again, and the amplitudes."""
     best = ranked[0][0]
     near = _best_of_each(ranked, best.gain)
-    laid = [(one, regression.products(held.rows)) for one, held in near]
+    laid = [(one, regression.products(held.laid)) for one, held in near]
     wins: dict[str, float] = {}
     spread = []
     groups = [np.flatnonzero(is_b == side) for side in (0, 1)]
@@ -192,9 +244,10 @@ def _resampled(
             continue
         gram = regression.gram(counts)
         found = [_one(gram, products, one, is_b, counts) for one, products in laid]
-        winner = max(range(len(found)), key=lambda k: found[k][0] - laid[k][0].usual)
-        name = laid[winner][0].family
-        wins[name] = wins.get(name, 0.0) + 1.0
+        gained = np.array([f[0] - one.usual for f, (one, _) in zip(found, laid, strict=True)])
+        weights = np.exp((gained - gained.max()) / max(FORM * gained.max(), TINY))
+        for (one, _), weight in zip(laid, weights / weights.sum(), strict=True):
+            wins[one.family] = wins.get(one.family, 0.0) + float(weight)
         spread.append(found[0][1])
     total = sum(wins.values()) or 1.0
     shares = dict(sorted(((n, w / total) for n, w in wins.items()), key=lambda pair: -pair[1]))
@@ -206,7 +259,12 @@ def _one(
 ) -> tuple[float, FloatArray]:
     acts = (is_b if one.in_b else 1 - is_b)[None]
     found, amplitudes = gains(gram, products, acts, counts)
-    return float(found[0]), amplitudes[0]
+    return _worth(one.candidate) * float(found[0]), amplitudes[0]
+
+
+def _worth(candidate: Candidate) -> float:
+    """Return how much a gain counts: an effect has to explain more than a parameter that moved."""
+    return 1.0 - FORM if isinstance(candidate, Came) else 1.0
 
 
 def _best_of_each(

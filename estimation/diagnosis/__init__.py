@@ -1,1 +1,1 @@
-"""Finding, naming and proving an effect that a declared model lacks, from what it leaves."""
+"""The result of a diagnosis, the split of its runs, and the audit of recordings."""

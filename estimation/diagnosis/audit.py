@@ -1,6 +1,6 @@
-"""The audit before a search: clocks, delays between channels, and what was never excited.
+"""The audit before a search: clocks, delays between channels, conditions that never vary.
 
-It decides nothing. It says what a search on these runs cannot decide, and why.
+It decides nothing. Its sentences are the limits of a search on these runs.
 """
 
 from collections.abc import Sequence
@@ -20,19 +20,19 @@ PAIRS = (
 
 BAND_HZ, SEGMENT_S = (0.5, 8.0), 4.0
 COHERENT = 0.9
-"""Frequencies tell a delay where at least this share of the power is common."""
+"""Frequencies determine a delay where at least this share of the power is common."""
 
 STEADY = 1e-3
 """A condition that varies by less than this share of its size is held."""
 
 
 def audit(recordings: Sequence[Recording]) -> list[str]:
-    """Return what stands out, one sentence each."""
+    """Return the limits of the recordings, one sentence each."""
     return [*skips(recordings), *_delays(recordings), *_excitation(recordings)]
 
 
 def delay_s(recording: Recording, first: str, second: str) -> float | None:
-    """Return by how much the second channel comes after the first, or None where it cannot be told.
+    """Return the delay of the second channel after the first; None where it is not determined.
 
     The slope of the cross-spectrum's phase over frequency, weighted by how sure each phase is
     (Carter, "Coherence and time delay estimation", Proceedings of the IEEE 75, 1987).
@@ -68,8 +68,8 @@ def _delays(recordings: Sequence[Recording]) -> list[str]:
         spread = float(np.median(np.abs(np.array(found) - middle)))
         said.append(
             f"Timing: {second} comes {1e3 * middle:+.1f} ms after {first} (median of"
-            f" {len(found)} runs, half within {1e3 * spread:.1f} ms); what yields between them is"
-            " part of it."
+            f" {len(found)} runs, half within {1e3 * spread:.1f} ms); this includes the compliance"
+            " between the two sensors."
         )
     return said
 
@@ -85,5 +85,5 @@ def _excitation(recordings: Sequence[Recording]) -> list[str]:
         if max(spans) <= STEADY * size:
             levels = {round(float(np.mean(r[name])) / max(size, 1e-300), 3) for r in recordings}
             held = "never varies" if len(levels) == 1 else "is held within each run"
-            said.append(f"{name} {held}: what depends on it is not decided within a run.")
+            said.append(f"{name} {held}: an effect that depends on it is not decided within a run.")
     return said

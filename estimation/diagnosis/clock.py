@@ -1,7 +1,7 @@
-"""The audit of the clocks: a run whose clock jumps is no evidence, and one that skips is told of.
+"""The audit of the clocks: a run whose clock jumps is left out, and one that skips is reported.
 
-Filters take samples as evenly spaced. Across a gap that nobody flagged they join what was apart,
-and the joint looks like a fast motion without a torque.
+Filters take samples as evenly spaced. Across a gap that nobody flagged they join samples that were
+apart, which looks like a fast motion without a torque.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ def gaps(recording: Recording) -> list[Gap]:
 
 
 def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Return the runs whose clock does not jump, and what was left out and why, in words."""
+    """Return the runs whose clock does not jump, and a sentence on each other run."""
     kept, lost = [], []
     for recording in recordings:
         jumps = [gap for gap in gaps(recording) if gap.jump]
@@ -59,13 +59,13 @@ def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]
         more = "" if len(jumps) == 1 else f", and at {len(jumps) - 1} more places"
         lost.append(
             f"Run {recording.name} is left out: its clock jumps by {first.length_s:.3g} s at"
-            f" {first.at_s:.3f} s{more}, and what happened meanwhile is not known."
+            f" {first.at_s:.3f} s{more}, and the motion meanwhile is not known."
         )
     return kept, lost
 
 
 def skips(recordings: Sequence[Recording]) -> list[str]:
-    """Return what the gaps of runs that are used leave undecided, one sentence a run."""
+    """Return the limits that the gaps of used runs set, one sentence a run."""
     said = []
     for recording in recordings:
         found = gaps(recording)
@@ -73,7 +73,7 @@ def skips(recordings: Sequence[Recording]) -> list[str]:
             longest = max(found, key=lambda gap: gap.length_s)
             said.append(
                 f"The clock of run {recording.name} skips {len(found)} times, the longest by"
-                f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s: what"
-                " depends on time or history is not decided across it."
+                f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s:"
+                " an effect of time or history is not decided across it."
             )
     return said

@@ -1,8 +1,8 @@
-"""Two recorded paths only: one discovers, cross-validated by its whole periods, the other confirms.
+"""Two recorded paths only: one trains, cross-validated by its whole periods, the other tests.
 
-Where a motion was recorded along two paths and no more, there are no runs to leave out. A path that
-repeats itself is cut into its periods, and those stand for runs; the other path, cut in the same
-way, is opened once.
+Where a motion was recorded along two paths and no more, no run can be held out. A path that repeats
+itself is cut into its periods, which take the place of runs; the other path, cut in the same way,
+is opened once.
 """
 
 from collections.abc import Collection, Sequence
@@ -27,12 +27,12 @@ MARK = ", period "
 def split_paths(
     recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()
 ) -> tuple[list[Recording], Sealed]:
-    """Cut two paths into whole periods and choose which path discovers.
+    """Cut two paths into whole periods and choose which path trains.
 
     Args:
         recordings: The two paths.
         seed: Seed of the choice.
-        seen: Names of paths that an earlier diagnosis held; where one is new, that one confirms.
+        seen: Names of paths that an earlier diagnosis held; where one is new, that one tests.
 
     Returns:
         The periods of both paths, and their split.
@@ -57,10 +57,10 @@ def path_of(name: str) -> str:
 
 
 def claim(sealed: Sealed) -> str:
-    """Return what two paths can prove, in words."""
+    """Return the limit of the evidence of two paths, in words."""
     return (
-        f"Two recorded paths only: {path_of(sealed.discover[0])} discovered, cross-validated by its"
-        f" {len(sealed.discover)} periods, and {path_of(sealed.confirm[0])} confirmed."
+        f"Two recorded paths only: {path_of(sealed.discover[0])} trained, cross-validated by its"
+        f" {len(sealed.discover)} periods, and {path_of(sealed.confirm[0])} tested."
         " Periods of one path are less apart than runs: the claim holds for these two paths."
     )
 

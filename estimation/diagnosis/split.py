@@ -1,8 +1,8 @@
-"""Splitting runs once into those that discover and those that confirm.
+"""Splitting runs once into training runs and held-out test runs.
 
-The confirm runs are chosen before anything is fitted, by a seed, stratified over the conditions:
-runs are sorted by what was held constant and every stratum of neighbours gives one run away, but
-not the last one of the least or greatest load, speed or other condition.
+The test runs are chosen before anything is fitted, by a seed, stratified over the conditions: runs
+are sorted by what was held constant and one run of every stratum of neighbours becomes a test run,
+but not the last one of the least or greatest load, speed or other condition.
 """
 
 import hashlib
@@ -16,10 +16,10 @@ from estimation.errors import EstimationError
 from estimation.recording import Recording
 
 SHARE = 3
-"""One run in this many confirms."""
+"""One run in this many is a test run."""
 
 LEAST_TO_NAME = 5
-"""Fewer discovery runs name nothing: a signed-rank test over four runs cannot reach 5 %."""
+"""With fewer training runs no effect is named: a sign test over four runs cannot reach 5 %."""
 
 
 class SplitError(EstimationError):
@@ -31,10 +31,10 @@ class Sealed:
     """The split, written down before the first fit.
 
     Attributes:
-        discover: Names of the runs that search and fit.
-        confirm: Names of the runs that are opened once, at the end.
+        discover: Names of the training runs.
+        confirm: Names of the test runs, opened once, at the end.
         seed: Seed of the choice.
-        data_hash: SHA-256 of every run's name and samples; the ledger's key.
+        data_hash: SHA-256 of every run's name and samples; the access log's key.
         seal: SHA-256 of the data's hash and both lists.
     """
 
@@ -46,18 +46,18 @@ class Sealed:
 
     @property
     def may_name(self) -> bool:
-        """Whether there are enough discovery runs to name an effect."""
+        """Whether there are enough training runs to name an effect."""
         return len(self.discover) >= LEAST_TO_NAME
 
 
 def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()) -> Sealed:
-    """Choose the confirm runs, stratified over the conditions.
+    """Choose the test runs, stratified over the conditions.
 
-    The runs that discover keep the least and the greatest value of every condition: what a model is
-    worth beyond what it was fitted on is another question.
+    The training runs keep the least and the greatest value of every condition: a model is not
+    judged beyond its conditions.
 
-    Where there are enough new runs beside those of earlier diagnoses, only new ones confirm: a run
-    proves something once.
+    Where there are enough new runs besides those of earlier diagnoses, only new ones become test
+    runs: a run confirms once.
 
     Args:
         recordings: Runs that count as evidence, three at least.
@@ -71,7 +71,7 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     if len(recordings) < SHARE:
         raise SplitError(
             f"{len(recordings)} runs are too few to diagnose.",
-            "Some runs must find an effect, and others, never touched, confirm it.",
+            "Some runs must find an effect, and others, held out, confirm it.",
             f"Record {SHARE} runs at least; to name an effect, eight.",
         )
     new = [recording for recording in recordings if recording.name not in seen]
@@ -90,7 +90,7 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
 
 
 def _spans_all(recordings: Sequence[Recording], held: Collection[str]) -> bool:
-    """Say whether the runs that are not held have the range of every condition that all have."""
+    """Whether the runs that are not held have the range of every condition that all have."""
     return _ranges([r for r in recordings if r.name not in held]) == _ranges(recordings)
 
 

@@ -7,12 +7,12 @@ The result is that of `predict(recording, causal=True)` for gap-free samples.
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.bank import states
 from estimation.derived import (
-    ACCELERATION,
     AGO,
     FALL,
     RISE,
@@ -20,16 +20,19 @@ from estimation.derived import (
     TRAVEL_WINDOW_S,
     TURNED,
     TURNING,
-    VELOCITY,
     measured_channels,
+    origin_of,
 )
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
+from estimation.estimators.c_model import model_text
 from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK, TRACKER
+from estimation.estimators.model import ModelEstimator
 from estimation.estimators.network import NetworkEstimator
+from estimation.filters import PAPER
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
-from estimation.signals import reference
+from estimation.signals import Signals, reference
 from estimation.window import ALIKE
 
 TURNING_TRAVEL, TURNING_TURNED = (
@@ -41,7 +44,29 @@ class ExportError(EstimationError):
     """An estimator cannot be written as C."""
 
 
-def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_hz: float) -> str:
+Exported = BankEstimator | NetworkEstimator | ModelEstimator
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The channels of a row and what they are computed from.
+
+    Attributes:
+        measured: Measured channels, in order.
+        windows: Channels that need the lowest value of a window.
+        pasts: Channels whose last values are kept.
+        sample_rate_hz: Rate of the calls.
+        signals: The machine's derived channels.
+    """
+
+    measured: Sequence[str]
+    windows: Sequence[str]
+    pasts: Sequence[str]
+    sample_rate_hz: float
+    signals: Signals
+
+
+def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
     """Return the header's text.
 
     Args:
@@ -57,16 +82,23 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         raise ExportError(
             f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
         )
+    motion, low_pass, signals = DIFFERENCES, PAPER, reference()
+    channels: Sequence[str]
     if isinstance(estimator, BankEstimator):
         channels, model = estimator.bank.channels, _bank(estimator)
-        motion = _tracker(sample_rate_hz)
-    else:
+        motion, low_pass = _tracker(sample_rate_hz), estimator.low_pass
+    elif isinstance(estimator, NetworkEstimator):
         channels, model = estimator.network.inputs, _network(estimator)
-        motion = DIFFERENCES
-    measured = measured_channels(channels)
-    sections = estimator.low_pass.sections(sample_rate_hz)
+        low_pass = estimator.low_pass
+    else:
+        channels = [c for c in estimator.model.channels if c != "time_s"]
+        model = model_text(estimator.model, channels.index)
+        low_pass, signals = estimator.model.low_pass, estimator.model.signals
+    measured = measured_channels(channels, signals)
+    sections = low_pass.sections(sample_rate_hz)
     windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
     pasts = _pasts(channels)
+    row = _Row(measured, windows, pasts, sample_rate_hz, signals)
     text = HEADER
     for mark, value in {
         "MOTION": motion,
@@ -82,9 +114,7 @@ def header(estimator: BankEstimator | NetworkEstimator, name: str, sample_rate_h
         "ALIKE": f"{ALIKE!r}",
         "PASTS": str(max(len(pasts), 1)),
         "KEEP": _keep(pasts, measured),
-        "FILL": "\n".join(
-            _channel(k, c, measured, windows, pasts, sample_rate_hz) for k, c in enumerate(channels)
-        ),
+        "FILL": "\n".join(_channel(k, c, row) for k, c in enumerate(channels)),
         "MODEL": model,
     }.items():
         text = text.replace(f"@{mark}@", value)
@@ -123,24 +153,17 @@ def _keep(pasts: Sequence[str], measured: Sequence[str]) -> str:
 
 def _value(channel: str, measured: Sequence[str]) -> str:
     """Return the expression of a measured channel, a speed or an acceleration."""
-    for suffix, array in ((VELOCITY, "speed"), (ACCELERATION, "acceleration")):
-        angle = channel.replace(suffix, "_angle_rad")
-        if channel.endswith(suffix) and angle in measured:
-            return f"{array}[{measured.index(angle)}]"
+    source, times = origin_of(channel)
+    if times and source in measured:
+        return f"{('speed', 'acceleration')[times - 1]}[{measured.index(source)}]"
     if channel in measured:
         return f"value[{measured.index(channel)}]"
     raise ExportError(f"The channel {channel} cannot be computed in C.")
 
 
-def _channel(
-    k: int,
-    channel: str,
-    measured: Sequence[str],
-    windows: Sequence[str],
-    pasts: Sequence[str],
-    sample_rate_hz: float,
-) -> str:
+def _channel(k: int, channel: str, row: _Row) -> str:
     """Return the statement that computes one channel of a row."""
+    measured, windows, pasts = row.measured, row.windows, row.pasts
 
     def place(name: str) -> int:
         return measured.index(name)
@@ -151,7 +174,7 @@ def _channel(
     def turned() -> str:
         return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
-    combination = reference().combination(channel)
+    combination = row.signals.combination(channel)
     if combination is not None and combination.direction is None:
         value = " + ".join(
             f"{share.times!r} * value[{place(share.channel)}] / {share.over!r}"
@@ -164,12 +187,12 @@ def _channel(
         slot = windows.index(channel)
         value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
     elif channel == TURNING_TURNED and TURNING_TRAVEL in windows:
-        value = f"{turned()} / {sample_rate_hz!r}"
+        value = f"{turned()} / {row.sample_rate_hz!r}"
     elif RISE in channel and TURNING_TRAVEL in windows:
         source = channel.replace(RISE, "_")
         value = f"value[{place(source)}] - {ago(source, turned())}"
     elif (past := AGO.match(channel)) is not None:
-        ticks = round(1e-3 * int(past["ms"]) * sample_rate_hz)
+        ticks = round(1e-3 * int(past["ms"]) * row.sample_rate_hz)
         value = ago(past["name"] + past["unit"], str(ticks))
     else:
         value = _value(channel, measured)

@@ -97,7 +97,7 @@ static inline name_estimate name_step(name_state *s, const double *measured) {
     }
 @KEEP@
 @FILL@
-    (void)acceleration;
+    (void)value, (void)speed, (void)acceleration;
     if (++s->tick == 0) s->tick = NAME_WINDOW; /* wrapped: never a first sample again */
     return name_model(row);
 }

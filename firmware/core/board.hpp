@@ -46,8 +46,11 @@ class Board {
         boot_ = boot;
         session_.booted(boot);
         status_ = simulated ? kReferenced : 0;
-        if (!simulated) profile_.assume_hot();
+        if (!simulated) assume_hot();
     }
+
+    // Nothing is known of what the motors did before.
+    void assume_hot() { profile_.assume_hot(); }
 
     // The widest settings this board takes; no frame changes them.
     void limit_to(const Settings& own) { own_ = own; }

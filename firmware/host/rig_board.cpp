@@ -18,6 +18,7 @@ class HostBoard {
   public:
     virtual ~HostBoard() = default;
     virtual void booted(std::uint32_t boot, bool simulated) = 0;
+    virtual void assume_hot() = 0;
     virtual bool limit_to(const std::uint8_t* settings) = 0;
     virtual void stop(bool stopped) = 0;
     virtual bool in_force() const = 0;
@@ -65,6 +66,7 @@ class ProfileBoard final : public HostBoard {
     explicit ProfileBoard(const char* serial) : board_(serial) {}
 
     void booted(std::uint32_t boot, bool simulated) override { board_.booted(boot, simulated); }
+    void assume_hot() override { board_.assume_hot(); }
     bool limit_to(const std::uint8_t* bytes) override {
         const auto settings = settings_of<Profile>(bytes);
         if (settings.valid()) board_.limit_to(settings);
@@ -142,6 +144,9 @@ void rig_board_destroy(void* board) { delete board_of(board); }
 void rig_board_booted(void* board, std::uint32_t boot, std::int32_t simulated) {
     board_of(board)->booted(boot, simulated != 0);
 }
+
+// Nothing is known of what the motors did before: they count as hot as they may be.
+void rig_board_assume_hot(void* board) { board_of(board)->assume_hot(); }
 
 // The widest gains and limits the board takes, as in an arm command behind its session; 0 where they are not valid.
 std::int32_t rig_board_limit(void* board, const std::uint8_t* settings) {

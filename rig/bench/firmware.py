@@ -103,7 +103,7 @@ def compare(config: Config) -> Versions:
         )
     if not board.build_hash:
         remarks += (
-            "The board is the fake in Python, or reports no build. To compile: rig firmware build",
+            "The board is the plain simulated one, or has no build. To compile: rig firmware build",
         )
     said = f"{board.serial}, {board.firmware_version}, protocol {board.protocol_hash:08x}"
     return Versions(program, told, f"{said}, build {board.build_hash:08x}", True, remarks)

@@ -115,9 +115,13 @@ class CanopenLogger:
         device: The drive; identified and started here, closed with this.
         bus: The bus it is on, for its clock.
         late_s: How late a tick may be and still be run, as its drive's `late_s`.
+        is_cold: Whether the motor is known to be cold, as a simulated one; a real one may be warm
+            from the session before.
     """
 
-    def __init__(self, device: Epos4, bus: CanBus, late_s: float = 0.0) -> None:
+    def __init__(
+        self, device: Epos4, bus: CanBus, late_s: float = 0.0, is_cold: bool = True
+    ) -> None:
         self._device = device
         self._bus = bus
         self._closed = False
@@ -127,6 +131,8 @@ class CanopenLogger:
         self.bench.release()  # an earlier program may have left it in force
         self._board = FirmwareBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
         self.bench.board = self._board
+        if not is_cold:
+            self._board.assume_hot()
         self._began_s = bus.now_s
         self._late = round(late_s * 1e6) // TICK_US
         self._ticks = 0

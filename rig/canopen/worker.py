@@ -72,7 +72,7 @@ def _opened(config: Config) -> Iterator[CanopenLogger]:
         bus.close()
         raise
     try:
-        yield CanopenLogger(device, bus, late_s)
+        yield CanopenLogger(device, bus, late_s, is_cold=config.is_simulated)
     finally:
         device.close()
 

@@ -163,7 +163,7 @@ def _first_look(
     firmware: bool,
     seed: int,
 ) -> str:
-    board = "the compiled firmware core" if firmware else "the Python fake of the board"
+    board = "the compiled firmware core" if firmware else "a plain board without guards"
     story = (
         "The simulated rig, with one effect that no model declares, was recorded through"
         f" {board} and its driver. The declared model {fitted.name!r} was fitted on"

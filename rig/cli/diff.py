@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
+from rig.cli.machine_option import MachineOption
 from rig.cli.shipped import complete_model, model_names
 from rig.output.console import JsonFlag, emit_json, results
 
@@ -25,6 +26,7 @@ def diff(
             autocompletion=complete_model,
         ),
     ] = None,
+    machine: MachineOption = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     on: Annotated[
         Path | None, typer.Option(help="Recordings of a third campaign, to predict.")
@@ -47,9 +49,9 @@ def diff(
     from rig.output.table import to_rich
     from rig.reports.changes import change_table, lines, prediction_table
 
-    first = subject(a, model, balance, format_)
-    second = subject(b, model, balance, format_)
-    third = None if on is None else subject(on, model, balance, format_).campaign
+    first = subject(a, model, balance, format_, machine)
+    second = subject(b, model, balance, format_, machine)
+    third = None if on is None else subject(on, model, balance, format_, machine).campaign
     for path, campaign in ((a, first.campaign), (b, second.campaign)):
         say_left_out(path, campaign)
     with progress() as bar:

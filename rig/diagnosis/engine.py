@@ -1,4 +1,4 @@
-"""Where a diagnosis runs its work: here, in processes of this machine, or on a Dask cluster.
+"""Where experiments are played: here, in processes of this machine, or on a Dask cluster.
 
 The diagnosis itself knows only `concurrent.futures.Executor`.
 """
@@ -12,7 +12,7 @@ from rig.errors import MissingExtraError, UsageError
 
 CONNECT_S = 20.0
 RETRIES = 3
-"""Times a task is begun anew when the worker that had it is lost."""
+"""Times a task is restarted when its worker is lost."""
 
 
 @contextmanager

@@ -1,8 +1,8 @@
-"""The ledger of looks: which runs a diagnosis has seen, so that a second look says so.
+"""The access log: which runs a diagnosis has used, so that a second use is marked.
 
-A confirm run proves something once. A run that any earlier diagnosis held, to discover or to
-confirm, has been seen: a finding confirmed on it later is exploratory. Runs are known by the hash
-of their samples, so a copy, another name or another folder does not make them new.
+A test run confirms once. A run that any earlier diagnosis held, to train or to test, has been used:
+a finding confirmed on it later is exploratory. Runs are identified by the hash of their samples, so
+a copy, another name or another folder does not make them new.
 """
 
 import json
@@ -24,7 +24,7 @@ class LedgerError(DataError):
 
 
 def default_ledger() -> Path:
-    """Return the ledger's file: in `RIG_STATE_DIR`, else in the user's state folder."""
+    """Return the access log: in `RIG_STATE_DIR`, else in the user's state folder."""
     if own := os.environ.get("RIG_STATE_DIR"):
         return Path(own) / "looks.jsonl"
     state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
@@ -33,16 +33,16 @@ def default_ledger() -> Path:
 
 @dataclass(frozen=True)
 class Ledger:
-    """The looks so far, one line of JSON each.
+    """The uses so far, one line of JSON each.
 
     Attributes:
-        path: The file; made at the first look.
+        path: The file; made at the first use.
     """
 
     path: Path
 
     def seen(self, recordings: Sequence[Recording], sealed: Sealed) -> tuple[str, ...]:
-        """Return the confirm runs that an earlier look held.
+        """Return the test runs that an earlier diagnosis used.
 
         Raises:
             LedgerError: The ledger cannot be read.
@@ -51,7 +51,7 @@ class Ledger:
         return tuple(name for name in sealed.confirm if name in known)
 
     def known(self, recordings: Sequence[Recording]) -> frozenset[str]:
-        """Return the names of the runs that any earlier look held, whatever they were called then.
+        """Return the names of the runs that any earlier diagnosis used, under whatever name.
 
         Raises:
             LedgerError: The ledger cannot be read.
@@ -60,7 +60,7 @@ class Ledger:
         return frozenset(r.name for r in recordings if samples_hash(r) in looked_at)
 
     def check(self) -> None:
-        """Refuse a ledger that could not be written, before the work of a diagnosis.
+        """Refuse a log that could not be written, before the work of a diagnosis.
 
         Raises:
             LedgerError: It cannot be written.
@@ -71,7 +71,7 @@ class Ledger:
             raise self._unwritable(error) from error
 
     def write(self, recordings: Sequence[Recording], sealed: Sealed) -> None:
-        """Write down a look, before its result is shown.
+        """Enter a use, before its result is shown.
 
         Raises:
             LedgerError: The ledger cannot be read or written.
@@ -94,7 +94,7 @@ class Ledger:
     def _unwritable(self, error: Exception) -> LedgerError:
         return LedgerError(
             f"The ledger of diagnoses {self.path} cannot be written.",
-            f"{error} Without it a second look at the same runs would pass as a first.",
+            f"{error} Without it a second use of the same runs would pass as the first.",
             "Name another place with --ledger or RIG_STATE_DIR.",
         )
 
@@ -108,5 +108,5 @@ class Ledger:
             raise LedgerError(
                 f"The ledger of diagnoses {self.path} cannot be read.",
                 str(error),
-                "Move it away; every look it held will then count as a first one.",
+                "Move it away; every use in it will then count as the first one.",
             ) from error

@@ -28,7 +28,7 @@ FIRST = "diagnosis"
 
 UNIQUE = "every name is unique"
 NOTHING = "nothing is missing above the floor"
-NO_RIVALS = "no experiment on the menu could tell more"
+NO_RIVALS = "no experiment of the menu separates the alternatives"
 SPENT = "the budget is spent"
 
 
@@ -108,9 +108,9 @@ def run_loop(
         first: First experiment; the shipped protocol `diagnosis` when None.
         seed: Seed of the diagnoses; each round's sensor noise has its own.
         executor: Runs work in parallel.
-        quick: Leave out the twins.
-        on_stage: Told what begins.
-        on_progress: Told of the samples as they are recorded.
+        quick: Propose no next experiment.
+        on_stage: Called with what begins, in words.
+        on_progress: Called with the samples as they are recorded.
         clock: Monotonic time, s.
 
     Raises:

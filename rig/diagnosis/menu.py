@@ -40,7 +40,7 @@ def room_of(recordings: Sequence[Recording], limits: ReferenceLimits) -> Room:
 
 
 def within(recordings: Sequence[Recording], limits: ReferenceLimits) -> bool:
-    """Say whether simulated runs stay away from every limit."""
+    """Whether simulated runs stay away from every limit."""
     return all(
         float(np.abs(run[name]).max()) <= MARGIN * limit
         for run in recordings

@@ -93,7 +93,8 @@ def run_diagnosis(
     else:
         recordings, sealed = whole, split(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
-    arm = balances_of(recordings[0])
+    of_arm = any(model.balance.startswith("joint.") for model in models)
+    arm = balances_of(recordings[0]) if of_arm else None
     if arm is not None:
         on_stage("fitting the links that all joints share")
         recordings = laid_out(arm, recordings, sealed.discover)

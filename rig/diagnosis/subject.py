@@ -30,7 +30,7 @@ class Subject:
 
     Attributes:
         campaign: The recordings.
-        models: Declared models, one a balance.
+        models: Declared models, one an equation.
     """
 
     campaign: Campaign
@@ -44,21 +44,21 @@ def subject(
     format_name: str | None = None,
     machine: Path | None = None,
 ) -> Subject:
-    """Return the recordings at a path and what is declared of them.
+    """Return the recordings at a path and their declared models.
 
     Without a model, raw logs of a calibration are declared by that calibration, an arm's by its
-    joints, and others by the shipped models of the rig that their channels tell.
+    joints, and others by the shipped models of the rig that has their channels.
 
     Args:
         path: File, folder or archive of recordings.
         model: A model file or the name of a shipped one.
-        balance: Only this balance.
+        balance: Only this equation.
         format_name: Importer to use; guessed when None.
         machine: A machine file or the name of a shipped machine: its equations are declared, and
             foreign tables are read as it states.
 
     Raises:
-        UsageError: The path does not exist, or there is no model of that balance.
+        UsageError: The path does not exist, or no model of that equation is declared.
         PlantFileError: The machine file cannot be read.
         ModelFileError: The model cannot be read.
         DataError: The recordings cannot be read.
@@ -99,12 +99,12 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     """Return the declared models to diagnose.
 
     Args:
-        path: A model file or the name of a shipped one; the balances of the reference rig when
+        path: A model file or the name of a shipped one; the equations of the reference rig when
             None.
-        balance: Only this balance.
+        balance: Only this equation.
 
     Raises:
-        UsageError: No model of that balance.
+        UsageError: No model of that equation.
         ModelFileError: The file cannot be read.
     """
     models = model_file.reference_rig() if path is None else model_file.read_all(path)
@@ -120,7 +120,7 @@ def _of(models: Sequence[Model], balance: str | None) -> list[Model]:
     if not chosen:
         known = ", ".join(dict.fromkeys(model.balance for model in models))
         raise UsageError(
-            f"There is no declared model of the balance {balance!r}.",
+            f"There is no declared model of the equation {balance!r}.",
             f"Declared: {known}.",
             "Name a model file with --model.",
         )

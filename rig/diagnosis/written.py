@@ -59,7 +59,8 @@ def held_out_errors(
             continue
         places, _ = counted
         recording = by_name[name]
-        target = zero_phase_channels(recording, [model.target], model.low_pass)[model.target]
+        filtered = zero_phase_channels(recording, [model.target], model.low_pass, model.signals)
+        target = filtered[model.target]
         both = np.array([target - predict(model, recording, causal) for causal in (False, True)])
         known = both[:, places][:, np.isfinite(both[:, places]).all(axis=0)]
         squares += np.sum((known - known.mean(axis=1, keepdims=True)) ** 2, axis=1)

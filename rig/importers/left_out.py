@@ -26,6 +26,8 @@ def left_out(path: Path, campaign: Campaign) -> list[str]:
     if not path.is_dir():
         return lines
     taken = {run.source for run in campaign.runs}
+    if None in taken:  # a table, whose machine file states which files are read
+        return lines
     formats = {_format_of(source) for source in taken if source is not None}
     reasons: dict[str, list[str]] = {}
     for file in _files(path):

@@ -71,7 +71,7 @@ def _named(finding: Finding) -> str:
 
 
 def meaning(family: str) -> str:
-    """Return what a family of the catalogue is, in plain words; empty for no such family."""
+    """Return the meaning of a family in plain words; empty for no such family."""
     known = catalogue().get(family)
     lines = known and sys.modules[type(known).__module__].__doc__
     first = (lines or "").partition("\n")[0]
@@ -79,7 +79,7 @@ def meaning(family: str) -> str:
 
 
 def check_of(finding: Finding) -> str:
-    """Return what to check at the rig for a finding, one sentence at least."""
+    """Return the checks at the rig for a finding, one sentence at least."""
     if finding.verdict in ("identified", "one_of"):
         checks = [_check(family) for family in (finding.family, *finding.alternatives)]
         if any(checks):
@@ -162,7 +162,7 @@ def _others(finding: Finding) -> str:
 
 
 def checked(family: str) -> str:
-    """Return what a technician checks for a family; empty where its file does not have it."""
+    """Return the check by a technician for a family; empty where its file has none."""
     known = catalogue().get(family)
     text = inspect.getdoc(type(known)) if known else ""
     for part in (text or "").split("\n\n"):

@@ -72,5 +72,5 @@ def plant_and_sensors(
 
 
 def uses_firmware(simulation: SimulationSection) -> bool:
-    """Whether the compiled firmware core is in the loop, rather than the Python fake."""
+    """Whether the compiled firmware core is in the loop, rather than the plain board."""
     return simulation.firmware and firmware_library() is not None

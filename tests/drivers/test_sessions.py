@@ -282,7 +282,8 @@ def test_no_sequence_arms_without_a_live_session_or_moves_beyond_the_boards_limi
 
 
 @pytest.mark.long
-@settings(max_examples=20_000)
+@pytest.mark.timeout(3600)
+@settings(max_examples=5_000)
 @given(st.lists(steps, min_size=20, max_size=60))
 def test_no_sequence_of_many_does_either(library: object, script: list[tuple]) -> None:
     adversary = Adversary()

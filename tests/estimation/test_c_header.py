@@ -3,18 +3,27 @@
 import shutil
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from estimation import model_file
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.effects import effect
 from estimation.estimators.bank import BankEstimator, BankRecipe
 from estimation.estimators.c_header import ExportError, header
+from estimation.estimators.c_model import NotInCError
+from estimation.estimators.model import ModelEstimator
 from estimation.estimators.network import NetworkEstimator
+from estimation.fitting import fit
+from estimation.model import Estimate, Model, Term, predict
 from estimation.networks.network import Network
+from estimation.plant_models import declared
 from estimation.recording import Recording
 from tests.estimation.synthetic import campaign
+from tests.estimation.test_plant import SLIDE, slide
 
 TARGET = "proximal_torque_n_m"
 COMPILER = shutil.which("cc") or shutil.which("gcc")
@@ -67,6 +76,38 @@ def test_the_compiled_state_estimator_gives_the_same(bank, runs, tmp_path):
     assert np.abs(found[:, 0] - wanted.value).max() <= 1e-5 * np.abs(wanted.value).max()
     np.testing.assert_allclose(found[:, 1], wanted.half_width, rtol=1e-4)
     assert np.mean(found[:, 2] == wanted.inside) > 0.999  # a sample may lie on a bound
+
+
+def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
+    (carriage,) = declared(SLIDE)
+    runs = [slide(k) for k in range(3)]
+    fitted = fit(carriage, Campaign.of(runs), bootstrap=0)
+    asymmetric = Term(
+        effect("friction.viscous_asymmetry"),
+        1,
+        {"speed": "carriage_velocity_m_s"},
+        {p.name: Estimate(30.0) for p in effect("friction.viscous_asymmetry").amplitudes},
+    )
+    model = replace(fitted, terms=(*fitted.terms, asymmetric))
+    found = compiled(ModelEstimator(model), runs[0], tmp_path)
+    wanted = predict(model, runs[0], causal=True)
+    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+    np.testing.assert_allclose(found[:, 1], 2 * model.evidence.rmse_with_means, rtol=1e-6)
+
+
+def test_a_model_with_a_gear_is_written_with_its_ratio(runs, tmp_path):
+    model = fit(model_file.read(Path("gearbox")), Campaign.of(runs), bootstrap=0)
+    found = compiled(ModelEstimator(model), runs[0], tmp_path)
+    wanted = predict(model, runs[0], causal=True)
+    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+
+
+def test_an_effect_with_memory_is_refused_by_name():
+    remembering = effect("friction.dwell")
+    values = {p.name: Estimate(1.0) for p in (*remembering.amplitudes, *remembering.shape)}
+    model = Model("m", "motor", "proximal_torque_n_m", (Term(remembering, values=values),))
+    with pytest.raises(NotInCError, match=r"friction\.dwell remembers"):
+        header(ModelEstimator(model), "grip", 1000.0)
 
 
 def test_an_unknown_interval_and_a_pose_come_through(bank, runs, tmp_path):

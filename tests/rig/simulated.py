@@ -21,7 +21,7 @@ def short_protocol(runs: int = 3, duration_s: float = 1.0) -> Protocol:
 
 
 def simulated(**simulation: object) -> Config:
-    """The simulated rig's configuration, by default on the Python fake."""
+    """The simulated rig's configuration, by default on the plain board."""
     return load_config().changed(simulation={"firmware": False, **simulation})
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.epos4.drive import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import State
-from drivers.errors import DriverError
+from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.transport.simulated import SimulatedTransport
 from drivers.transport.simulated_can import SimulatedCanBus
@@ -17,7 +18,7 @@ from rig.bench.companions import topic
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.logger import CanopenLogger
-from rig.canopen.simulated import open_simulated_canopen
+from rig.canopen.simulated import open_simulated_bus, open_simulated_canopen
 from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
@@ -66,7 +67,6 @@ def test_the_spindle_follows_its_target_and_the_drive_ends_without_power() -> No
 def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it() -> None:
     drive = Epos4Fake()
     drive.state = State.OPERATION_ENABLED
-    from drivers.epos4.drive import Epos4
 
     bus = SimulatedCanBus([drive])
     CanopenLogger(Epos4(bus), bus).close()
@@ -180,3 +180,16 @@ def test_rig_clear_clears_the_trip_of_a_board_by_its_code(
     assert "received nothing from this computer" in told
     assert "cleared" in told
     assert TeensyLogger(SimulatedTransport(link.board)).trip().code == 0
+
+
+def test_a_real_drives_motor_counts_as_warm_at_the_start_of_every_session() -> None:
+    settings = config(devices={})
+    machine = machine_of(settings)
+    limits = machine.board_limits(settings, settings.calibration_set())
+    bus = open_simulated_bus(settings)
+    with TeensyLogger(CanopenLogger(Epos4(bus), bus, is_cold=False), machine.profile) as logger:
+        with pytest.raises(CommandRefusedError, match="half of the heat"):
+            logger.arm(machine.gains(settings), limits)
+        for _ in range(200):
+            logger.read(0.02)
+        logger.arm(machine.gains(settings), limits)

@@ -74,6 +74,7 @@ def test_the_walk_goes_from_a_table_to_a_verdict(tmp_path, monkeypatch, capsys, 
     assert "drive_force_n = inertia x carriage_acceleration_m_s2" in checked
     assert f"{MASS:.0f}" in fitted
     assert "\ncarriage: " in f"\n{diagnosed}"
+    assert "friction.viscous_asymmetry" in diagnosed
     assert Path("emps.html").exists()
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.reliability import __main__ as page
 from benchmarks.reliability import fuzz, listening
+from benchmarks.reliability.encoder_faults import FAULTS
 from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
@@ -62,7 +63,7 @@ def test_a_block_is_made_from_its_number_alone() -> None:
 
 
 def test_faults_of_every_kind_are_detected_and_end_safe_in_time(library: Path) -> None:
-    kinds = len(SENSOR_FAULTS) + 2 + len(Fault) * len(fakes())
+    kinds = len(SENSOR_FAULTS) + len(FAULTS) + 2 + len(Fault) * len(fakes())
     outcomes = list(inject(kinds, seed=5))
     assert len({outcome.kind for outcome in outcomes}) == kinds
     for outcome in outcomes:

@@ -1,6 +1,7 @@
 """The study of other people's machines as tables and as a Markdown page."""
 
 from rig.output.table import TextTable, to_markdown
+from rig.studies.machines.cases import CASES
 from rig.studies.machines.study import MachineStudy
 
 TITLE = "Machines that other people built"
@@ -64,7 +65,7 @@ def tables(study: MachineStudy) -> list[TextTable]:
 
 def markdown(study: MachineStudy) -> str:
     """Return the study as a Markdown page."""
-    cards = sorted({row.card for row in study.rows})
+    cards = sorted({case.card for case in CASES})
     parts = [f"# {TITLE}", lead(study)]
     parts += [to_markdown(table).rstrip() for table in tables(study)]
     if study.skipped:

@@ -132,6 +132,9 @@ def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
     """Return the effects that the diagnosis identifies on a grasper's runs."""
     runs = calibration_runs(dof, axes, seed, repeats)
     model = declared(dof)
+    # a diagnosis reads only channels that an equation declares: friction declares the motion
+    rubs = Term(effect("friction.coulomb"), -1, {"speed": f"{dof}_velocity_rad_s"})
+    model = replace(model, terms=(*model.terms, rubs))
     found = answer(runs, [model], split(runs, seed))
     (written,) = found.models
     return Lacking(

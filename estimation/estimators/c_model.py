@@ -1,0 +1,117 @@
+"""A fitted model as C: its effects without memory, written down by evaluating them on symbols."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from estimation.effects import Effect
+from estimation.effects.effect import Pointwise
+from estimation.errors import EstimationError
+from estimation.model import Model
+
+SAME_NAME = ("tanh", "exp", "expm1", "sin", "cos", "sqrt", "log1p")
+UNARY: Mapping[np.ufunc, str] = {
+    np.negative: "(-{0})",
+    np.absolute: "fabs({0})",
+    np.square: "({0} * {0})",
+    **{
+        getattr(np, n): f"{n}({{0}})"
+        for n in ("tanh", "exp", "expm1", "sin", "cos", "sqrt", "log1p")
+    },
+    np.sign: "(({0} > 0) - ({0} < 0))",
+}
+BINARY: Mapping[np.ufunc, str] = {
+    np.add: "({0} + {1})",
+    np.subtract: "({0} - {1})",
+    np.multiply: "({0} * {1})",
+    np.divide: "({0} / {1})",
+    np.power: "pow({0}, {1})",
+    np.maximum: "fmax({0}, {1})",
+    np.minimum: "fmin({0}, {1})",
+    np.greater: "({0} > {1})",
+    np.less: "({0} < {1})",
+}
+"""NumPy function to its C."""
+
+
+class NotInCError(EstimationError):
+    """An effect cannot be written as C."""
+
+
+class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
+    """A C expression that takes part in NumPy's arithmetic."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **_: Any) -> "Symbol":
+        form = {**UNARY, **BINARY}.get(function) if method == "__call__" else None
+        if form is None:
+            raise NotInCError(f"The function {function.__name__} is not written as C.")
+        return Symbol(form.format(*(text_of(value) for value in inputs)))
+
+    def __getitem__(self, _: object) -> "Symbol":
+        return self  # a column is the expression itself
+
+    def __len__(self) -> int:
+        return 1
+
+
+def text_of(value: Any) -> str:
+    """Return an expression or a number as C."""
+    return value.text if isinstance(value, Symbol) else repr(float(value))
+
+
+def model_text(model: Model, place: Callable[[str], int]) -> str:
+    """Return the C function that estimates a model's target from a row of channels.
+
+    Args:
+        model: A fitted model.
+        place: Channel to its place in the row.
+
+    Raises:
+        NotInCError: An effect has memory, or uses a function that is not written as C.
+        NotFittedError: A parameter has no value.
+    """
+    lines = []
+    for term in model.terms:
+        inputs = {
+            role: Symbol(f"(double)row[{place(channel)}]" if channel != "time_s" else "NAN")
+            for role, channel in term.channels.items()
+        }
+        columns = _columns(term.effect, inputs, term.numbers(term.effect.shape))
+        for weight, column in zip(term.weights, columns, strict=True):
+            lines.append(f"    total += {float(weight)!r} * {column}; /* {term.effect.id} */")
+            if "NAN" in column:
+                raise NotInCError(
+                    f"{term.effect.id} depends on the time.", "C has no clock of the campaign."
+                )
+    error = 2 * model.evidence.rmse_with_means if model.evidence else None
+    width = "NAN" if error is None else f"{error:.9g}f"
+    return "\n".join(
+        [
+            "static inline name_estimate name_model(const float *row) {",
+            "    double total = 0;",
+            "    (void)row;",
+            *lines,
+            f"    name_estimate found = {{ (float)total, {width}, 1 }};",
+            "    return found;",
+            "}",
+        ]
+    )
+
+
+def _columns(effect: Effect, inputs: Mapping[str, Symbol], shape: Sequence[float]) -> list[str]:
+    """Return an effect's columns as C."""
+    if effect.start():
+        raise NotInCError(
+            f"{effect.id} remembers the samples before.",
+            "Only effects without memory are written as C.",
+            "Take it out of the model, or export a state estimator.",
+        )
+    symbols: Any = inputs
+    if isinstance(effect, Pointwise):
+        return [text_of(value) for value in effect.row(symbols, shape)]
+    found: Any = effect.columns(symbols, shape)
+    return [found.text] if isinstance(found, Symbol) else [text_of(value) for value in found[0]]
