@@ -98,7 +98,9 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
     if "acceleration" in roles and place.kind == "loss":
         found.append("acceleration")
     if "travel" in roles:
-        found += ["history", "dwell"]
+        found.append("history")
+    if "speed" in roles:
+        found.append("dwell")
     found.append("time")
     return found
 

@@ -51,8 +51,6 @@ def places_of(layout: Layout) -> list[Place]:
     found = []
     angles = _angles(layout)
     for equation in layout.equations.values():
-        if not angles:
-            break  # nothing turns or slides in a sensor's calibration
         found.append(_own(layout, equation, angles))
         if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
             found.append(_actuator(equation, angles))
@@ -147,13 +145,29 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
     roles = _motion(angle) | _shared(angles, _position(angles, angle))
     effort = _effort(equation)
     roles |= {"load": (effort,)}
+    if not angle:  # a curve over a force has the history of that force
+        roles |= {"travel": (effort,)}
     if equation.of_angle:
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
+        roles |= {"other_angle": _unrelated(layout, equation, angles)}
         return Place(
             equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
         )
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
     return Place(equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles)
+
+
+def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tuple[str, ...]:
+    """Return the angles that no equation relates to those of an equation: of other joints."""
+    read = [
+        set(measured_channels([e.target, *e.model.channels], e.model.signals))
+        for e in layout.equations.values()
+    ]
+    own = set(
+        measured_channels([equation.target, *equation.model.channels], equation.model.signals)
+    )
+    related = set().union(*(r for r in read if r & own & set(angles)))
+    return tuple(a for a in angles if a not in related)
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place:

@@ -30,6 +30,7 @@ DECLARED_ONLY = (
 DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
 ACTUATOR = ("motor.", "ripple.current")
 DEFLECTION = (
+    "coupling.kinematic",
     "transmission.",
     "hysteresis.bouc_wen.twist",
     "hysteresis.presliding",
@@ -200,7 +201,7 @@ def repeats_one_reference(layout: Layout) -> bool:
 def _acts(effect: Effect, place: Place) -> bool:
     if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
         return False
-    if effect.at_rest or effect.id.startswith("coupling."):
+    if effect.at_rest or effect.id == "coupling.torque":
         return False
     if not set(effect.roles) <= set(place.roles):
         return False

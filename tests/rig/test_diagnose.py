@@ -60,7 +60,7 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     page = (report / "diagnosis.html").read_text()
     assert "[spring.position]" in page
     for part in (
-        "motor: residual over spindle angle",
+        "motor: residual over ",
         "motor: error of each held-out test run",
         "motor: measured and estimated",
         "Parameters of the findings",

@@ -146,7 +146,7 @@ def logs(monkeypatch, tmp_path):
 
     def use(*recordings):
         monkeypatch.setattr(
-            "rig.importers.registry.open_campaign",
+            "rig.machines.recordings.open_campaign",
             lambda path, format_name=None: Campaign.of(recordings),
         )
         return str(tmp_path)

@@ -34,7 +34,8 @@ def test_a_wrong_pulley_ratio_is_found_from_a_folder_of_recordings(tmp_path):
     assert set(told["rmse_before"]) == {"grasp", "pitch", "yaw"}
     (finding,) = told["findings"]
     assert (finding["balance"], finding["family"]) == ("pitch", "coupling.kinematic")
-    assert finding["verdict"] == "identified"
+    # a share of the other joint's reading is the same equation
+    assert set(finding["alternatives"]) <= {"sensor.crosstalk"}
     ratio = finding["parameters"]["ratio"]
     assert ratio["value"] == pytest.approx(Wrist(1.1).pitch_per_yaw, rel=0.05)
 
