@@ -48,10 +48,6 @@ class Function:
         """Number of knots of each variable that is not a direction."""
         return KNOTS_ALONE if len({*self.variables} - {"velocity_sign"}) == 1 else KNOTS
 
-    def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return the change of its columns by the noise of its readings: none that counts."""
-        return {}
-
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:
         """Return the tensor product of the variables' bases in every equation it enters."""
         made = {}

@@ -6,7 +6,7 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -39,14 +39,11 @@ class Laid:
         columns: Part to the columns, one mapping a run.
         taken: How much of each declared column was taken off, equation to (declared, k).
         size: What the columns were divided by, shape (k,).
-        noise: Part to the products, run by run, of what noise does to the columns: with itself,
-            (runs, k, k), and with that of the declared columns and target, (runs, k, all + 1).
     """
 
     columns: Sequence[Columns]
     taken: Mapping[str, FloatArray]
     size: FloatArray
-    noise: Mapping[Part, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -58,14 +55,12 @@ class Block:
         own: Part to candidates' columns times themselves, shape (runs, candidates, k, k).
         target: Part to candidates' columns times the target, shape (runs, candidates, k).
         taken: How much of each declared column was taken off them, (candidates, declared, k).
-        noise: As of `Laid`, with candidates after runs.
     """
 
     base: Mapping[Part, FloatArray]
     own: Mapping[Part, FloatArray]
     target: Mapping[Part, FloatArray]
     taken: FloatArray
-    noise: Mapping[Part, tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -191,9 +186,7 @@ class Joint:
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
         return error
 
-    def _avoided(
-        self, part: Part, run: int, declared: FloatArray, more: FloatArray | float = 0.0
-    ) -> FloatArray:
+    def _avoided(self, part: Part, run: int, declared: FloatArray) -> FloatArray:
         """Return the error that is missing because a noisy reading got a smaller amplitude.
 
         A cause that stands in for a noisy reading removes that reading's noise. The
@@ -203,7 +196,6 @@ class Joint:
             part: Of the regression.
             run: Number of the run.
             declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
-            more: Error that the noise of a cause's own columns makes, shape (...).
         """
         if part[1] == "between":
             return np.zeros(declared.shape[:-1])
@@ -212,7 +204,7 @@ class Joint:
         def shown(own: FloatArray) -> FloatArray:
             return np.asarray(((own @ noise[:-1, :-1]) * own).sum(-1) - 2.0 * own @ noise[:-1, -1])
 
-        return np.maximum(shown(self._declared) - shown(declared) - more, 0.0)
+        return np.maximum(shown(self._declared) - shown(declared), 0.0)
 
     def _whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
@@ -358,30 +350,8 @@ class Joint:
                 target[p][r, there] = product[-1]
                 turned = columns.transpose(1, 2, 0)
                 own[p][r, there] = turned @ turned.transpose(0, 2, 1)
-        noise = {}
-        for p in {p for one in laid for p in one.noise}:
-            none = np.zeros((runs, k, k)), np.zeros((runs, k, self._noise[p].shape[1]))
-            pairs = [one.noise.get(p, none) for one in laid]
-            noise[p] = np.stack([a for a, _ in pairs], 1), np.stack([b for _, b in pairs], 1)
         taken = np.array([self._taken_off(one) for one in laid])
-        return Block(base, own, target, taken, noise)
-
-    def with_noise(self, laid: Laid, noise: Sequence[Mapping[str, FloatArray]]) -> Laid:
-        """Return a candidate with what noise does to its columns.
-
-        Args:
-            laid: The candidate.
-            noise: Equation to the change of the columns, one mapping a run.
-        """
-        products = {}
-        for name in noise[0]:
-            own, cross = [], []
-            for run, change in zip(self.runs, noise, strict=True):
-                scaled = change[name] / laid.size
-                own.append(scaled.T @ scaled)
-                cross.append(scaled.T @ self._noise_columns(run, self.layout.equations[name]))
-            products[name, "within"] = np.array(own), np.array(cross)
-        return replace(laid, noise=products)
+        return Block(base, own, target, taken)
 
     def evaluate(
         self,
@@ -446,13 +416,7 @@ class Joint:
             own = np.einsum("ck,ckl,cl->c", amplitudes, block.own[p][run], amplitudes)
             error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
         declared = self._whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
-        more = np.zeros(len(base))
-        if p in block.noise:
-            own, cross = (products[run] for products in block.noise[p])
-            vector = np.hstack([declared, -np.ones((len(declared), 1))])
-            more = np.einsum("ck,ckl,cl->c", amplitudes, own, amplitudes)
-            more = more + 2.0 * np.einsum("ck,ckd,cd->c", amplitudes, cross, vector)
-        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared, more))
+        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared))
 
     def replaces(self, laid: Laid, base: FloatArray, amplitudes: FloatArray) -> bool:
         """Whether a cause stands in for the largest linear term of an equation.

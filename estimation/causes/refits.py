@@ -56,7 +56,7 @@ class Refits:
         for name in dict.fromkeys(e.equation for e in candidate.cause.place.enters):
             part = self._part(candidate, name, runs)
             if part is not None:
-                self.parts[name].append(part)
+                self.parts[name] = [*self.parts[name], part]
 
     def before(self, name: str) -> Solved:
         """Return the declared equation."""

@@ -258,10 +258,10 @@ def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> Floa
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
     cause = candidate.cause
-    if isinstance(cause, Function) or len(cause.parts) > 1:
+    if isinstance(cause, Function) or not cause.is_bounded:
         return False
-    bound = cause.effect.amplitudes[cause.parts[0]]
-    return bool(amplitudes[0] < 0.0 <= bound.lower)
+    count = len(cause.parts)  # a bend comes after them
+    return float(np.sum(amplitudes[:count] / candidate.laid.size[:count])) < 0.0
 
 
 def _price(candidate: Candidate, numbers: Numbers) -> float:
@@ -417,13 +417,6 @@ def laid_out(
     laid = joint.laid(columns, unit)
     if float(laid.size.min()) < NOTHING:
         return None
-    noise = [cause.noise(run) for run in layout.runs]
-    if acts is not None:
-        noise = [
-            {name: on * x for name, x in one.items()} for on, one in zip(acts, noise, strict=True)
-        ]
-    if all(noise):
-        laid = joint.with_noise(laid, noise)
     if acts is not None:  # what starts between runs also shifts their means, by its own offset
         laid = replace(
             laid,

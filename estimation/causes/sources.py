@@ -7,11 +7,11 @@ effect that is not distinguishable from a simpler one over that range is left ou
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
@@ -57,8 +57,14 @@ FILTERS = (
 )
 """Effects that pass a reading through a linear filter, as smoothing its noise does."""
 
+LOOPS = ("hysteresis.", "transmission.backlash")
+"""Effects with a loop: at a constant load they follow the noise of its reading."""
+
 TURNING = ("motor_angle", "output_angle", "encoder")
 CLOCKS = ("clock", "elapsed", "campaign_clock")
+
+NARROW = 0.02
+"""Speed over which friction changes its sign where none is declared, share of the usual most."""
 
 LEAST_PERIODS = 1.5
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
@@ -89,7 +95,6 @@ class Source:
         parts: Which of its columns take part, so that simpler forms compete too.
         odd: Whether half the difference to the same filter backwards in time stands in for it: its
             correlation with the stationary noise of what it reads is zero.
-        follows: Whether its memory may follow the noise of what it reads.
         bend: Its deviation from its equation, after the column itself; none if None.
     """
 
@@ -99,7 +104,6 @@ class Source:
     shape: tuple[float, ...]
     parts: tuple[int, ...]
     odd: bool = False
-    follows: bool = False
     bend: Bend | None = None
 
     @property
@@ -109,10 +113,20 @@ class Source:
 
     @property
     def side(self) -> int:
-        """Sign of an actuator's loss: its amplitudes are bounded as losses."""
-        if self.place.kind != "actuator":
-            return 1
-        return next(iter(self.effect.balances.values()), 1)
+        """Sign of a loss that its amplitudes are bounded for: an actuator's, and lost motion."""
+        kind = self.place.home.partition(".")[0]
+        if self.place.kind == "actuator":
+            return next(iter(self.effect.balances.values()), 1)
+        if self.place.kind == "deflection" and self.effect.id.startswith(LOOPS):
+            return self.effect.balances.get(kind, 1)
+        return 1
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether its amplitudes have a sign: all but a loop over the load of what it bends."""
+        of_load = any(r == "travel" and not c.endswith(ANGLES) for r, c in self.channels)
+        lower = [self.effect.amplitudes[k].lower for k in self.parts]
+        return min(lower) >= 0.0 and not of_load
 
     def signal(self, run: RunSignals, equation: str) -> FloatArray | None:
         """Return the source's columns in one equation over the whole run, (n, parts).
@@ -132,17 +146,6 @@ class Source:
             hats = [np.interp(inside, self.bend.knots, row) for row in np.eye(len(self.bend.knots))]
             found = np.column_stack([found, found * np.array(hats).T])
         return found
-
-    def noise(self, run: RunSignals) -> Mapping[str, FloatArray]:
-        """Return the change of its columns by noise, where its memory may follow that."""
-        if not self.follows:
-            return {}
-        readings = {c: run.channels[c] + run.noise[c] for _, c in self.channels if c in run.noise}
-        shaken = replace(run, channels={**run.channels, **readings})
-        usual, other = self.columns(run), self.columns(shaken)
-        if usual is None or other is None:
-            return {}
-        return {name: other[name] - values for name, values in usual.items()}
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
@@ -167,19 +170,24 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
-            own = bool(effect.start()) and _reads_own_noise(layout, place, channels)
-            odd = own and effect.id.startswith(FILTERS)
+            odd = _follows_noise(layout, place, effect, channels)
             for shape in _grid(layout, place, effect, dict(channels)):
                 for parts in _parts(effect):
-                    yield Source(place, effect, tuple(channels), shape, parts, odd, own and not odd)
+                    yield Source(place, effect, tuple(channels), shape, parts, odd)
 
 
-def _reads_own_noise(layout: Layout, place: Place, channels: Sequence[tuple[str, str]]) -> bool:
-    """Whether a reading has noise that is also in some equation's residual.
+def _follows_noise(
+    layout: Layout, place: Place, effect: Effect, channels: Sequence[tuple[str, str]]
+) -> bool:
+    """Whether an effect follows noise of a reading that is also in some equation's residual.
 
-    A filter of such a reading explains that sensor's noise.
+    An angle has so little noise that only a linear filter shows it.
     """
     readings = [c for _, c in channels if c in layout.measured]
+    if effect.id.startswith(LOOPS):
+        readings = [c for c in readings if not c.endswith(ANGLES)]
+    elif not effect.id.startswith(FILTERS):
+        return False
     return any(
         (c, entry.equation) not in layout.independent for c in readings for entry in place.enters
     )
@@ -260,7 +268,8 @@ def _axis(
 ) -> list[float]:
     """Return the values of one shape parameter to try, over the range that the data cover."""
     if parameter.name == "width" and "speed" in effect.roles:
-        return [direction_width(layout, place)]
+        usual = NARROW * _range(layout, channels["speed"])[1]
+        return [direction_width(layout, place) or usual or 1.0]
     if parameter.name == "middle":
         return [0.0]  # play is crossed where the load changes its side
     if parameter.name == "order":

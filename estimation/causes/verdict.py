@@ -3,6 +3,7 @@
 The test runs take no part in the search. They are opened once, when every hypothesis is fixed.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -209,18 +210,27 @@ def _judged(
                 " there; not counted in the errors."
             )
         home = cause.place.home
-        refits.open |= {*open_runs}
-        before, by_run_before = refits.rmse(home)
+        entered = dict.fromkeys(e.equation for e in cause.place.enters)
+        known, refits.open = dict(refits.parts), refits.open | {*open_runs}
+        before = {name: refits.rmse(name) for name in entered}
         refits.add(scored.candidate, acts_in)
-        after, by_run_after = refits.rmse(home)
+        after = {name: refits.rmse(name) for name in entered}
+        least = math.sqrt(1.0 - numbers.form_floor)
+        if all(after[name][0] > least * before[name][0] for name in entered):
+            refits.parts = known
+            notes.append(
+                f"{cause.family} ({cause.place.name}) was found in the training runs and does not"
+                " lower the error on the test runs."
+            )
+            continue
         finding = _named(one, sealed.may_name)
         findings.append(
             replace(
                 finding,
-                rmse_before=before,
-                rmse_after=after,
-                runs_improved=sum(by_run_after[n] < x for n, x in by_run_before.items()),
-                runs_total=len(by_run_before),
+                rmse_before=before[home][0],
+                rmse_after=after[home][0],
+                runs_improved=sum(after[home][1][n] < x for n, x in before[home][1].items()),
+                runs_total=len(before[home][1]),
                 runs_affected=tuple(name for name, acts in acts_in.items() if acts),
             )
         )

@@ -98,7 +98,6 @@ def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, capsys):
     assert main(["fit", str(folders[0]), "--model", "linear", "--out", str(line)]) == 0
     assert main(["adapt", str(line), str(folders[1]), "--runs", "01"]) == 2
     assert "cannot be adapted" in capsys.readouterr().err
-    assert main(["export", str(line), "--out", str(tmp_path / "line.h")]) == 2
     words = ["fit", str(folders[0]), "--model", "states", "--surrogate", "jaw_angle_rad"]
     assert main(words) == 2
 
