@@ -184,7 +184,7 @@ def _follows_noise(
     An angle has so little noise that only a linear filter shows it.
     """
     readings = [c for _, c in channels if c in layout.measured]
-    if effect.id.startswith(LOOPS):
+    if effect.id.startswith("hysteresis.") and place.kind == "deflection":
         readings = [c for c in readings if not c.endswith(ANGLES)]
     elif not effect.id.startswith(FILTERS):
         return False

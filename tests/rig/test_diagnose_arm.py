@@ -46,7 +46,7 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     assert set(found["rmse_before"]) == {"joint.2"}
     first = next(f for f in found["findings"] if f["balance"] == "joint.2")
     assert first["family"].startswith("hysteresis.")
-    assert "joint_2" in first["depends_on"]
+    assert "history" in first["depends_on"]
     page = (report / "diagnosis.html").read_text()
     assert first["family"] in page
     assert "joint.2: residual over joint 2" in page
