@@ -53,4 +53,4 @@ def test_the_library_is_the_installed_one(installed: Path, tmp_path: Path) -> No
 
 def test_the_demo_runs_from_the_wheel(installed: Path, tmp_path: Path) -> None:
     run(installed, tmp_path, "rig", "demo", "--seed", "1", "--out", "demo")
-    assert (tmp_path / "demo" / "diagnosis.html").exists()
+    assert [*(tmp_path / "demo").rglob("diagnosis.html")]
