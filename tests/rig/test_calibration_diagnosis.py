@@ -21,9 +21,6 @@ NOT_DECLARED = pytest.mark.xfail(
 SMOOTH_WAVE = pytest.mark.xfail(
     strict=False, reason="a smooth function of the angle explains more than one harmonic of it"
 )
-SLOW_NOISE = pytest.mark.xfail(
-    strict=False, reason="noise that is slower than the filter is not told from a narrow hysteresis"
-)
 
 
 @pytest.fixture
@@ -75,7 +72,7 @@ def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, 
     ("kind", "words"),
     [
         ("gearbox", []),
-        pytest.param("encoder", ["--which", "jaw"], marks=SLOW_NOISE),
+        ("encoder", ["--which", "jaw"]),
         ("current", []),
         ("torque", ["--repeats", "4"]),
         ("ft", ["--repeats", "3"]),
