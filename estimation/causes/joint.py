@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from estimation.causes.equations import SHAPE_STEP, Equation, Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Layout, RunSignals
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
 from estimation.causes.numbers import DEFAULT, Numbers
@@ -223,32 +223,21 @@ class Joint:
             rows.append(laid.taken.get(equation.name, none))
         return np.vstack([*rows, np.zeros((len(self.layout.equations), len(laid.size)))])
 
-    def _noise_columns(self, run: RunSignals, equation: Equation) -> FloatArray:
-        """Return the noise of all declared columns and the target in one equation, (n, all + 1)."""
-        at = 0
-        for other in self.layout.equations.values():
-            if other.name == equation.name:
-                break
-            at += len(other.of_channel)
-        noise = equation.noise(run)[run.grid[run.used[equation.name]]]
-        out = np.zeros((len(noise), self._declared_size + 1))
-        out[:, at : at + noise.shape[1] - 1] = noise[:, :-1]
-        out[:, -1] = noise[:, -1]
-        return out
-
     def _noise_products(self) -> Mapping[Part, FloatArray]:
         """Return the noise in the cross-products within runs; the target's own is left in."""
-        size = self._declared_size + 1
+        at, size = 0, self._declared_size + 1
         out = {p: np.zeros((len(self.runs), size, size)) for p in self.parts}
         for equation in self.layout.equations.values():
             part = (equation.name, "within")
             for r, run in enumerate(self.runs):
-                noise = self._noise_columns(run, equation)
+                noise = equation.noise(run)[run.grid[run.used[equation.name]]]
+                noisy = np.flatnonzero(noise[:, :-1].any(axis=0))
+                noise = noise[:, [*noisy, -1]]
                 product = noise.T @ noise
                 product[-1, -1] = 0.0
-                own = [*np.flatnonzero(noise[:, :-1].any(axis=0)), size - 1]
-                inner = np.ix_(own, own)
-                out[part][r][inner] = _at_most(product[inner], self._gram[part][r][inner])
+                inner = np.ix_(*[[*(at + noisy), size - 1]] * 2)
+                out[part][r][inner] = _at_most(product, self._gram[part][r][inner])
+            at += len(equation.of_channel)
         return out
 
     def _weighted(self) -> FloatArray:

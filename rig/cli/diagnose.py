@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.machine_option import MachineOption
-from rig.cli.shipped import complete_model, complete_recordings, model_names
+from rig.cli.machine_option import MachineOption, ModelOption
+from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, plain, remarks, results
 
 
@@ -18,15 +18,7 @@ def diagnose(
             help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
         ),
     ],
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model",
-            "-m",
-            help=f"Declared model: a file, or one of {', '.join(model_names())}.",
-            autocompletion=complete_model,
-        ),
-    ] = None,
+    model: ModelOption = None,
     machine: MachineOption = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     json_: JsonFlag = False,

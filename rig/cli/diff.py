@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.machine_option import MachineOption
-from rig.cli.shipped import complete_model, model_names
+from rig.cli.machine_option import MachineOption, ModelOption
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
@@ -17,15 +16,7 @@ if TYPE_CHECKING:
 def diff(
     a: Annotated[Path, typer.Argument(help="Recordings of the first campaign.")],
     b: Annotated[Path, typer.Argument(help="Recordings of the second campaign.")],
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model",
-            "-m",
-            help=f"Declared model: a file, or one of {', '.join(model_names())}.",
-            autocompletion=complete_model,
-        ),
-    ] = None,
+    model: ModelOption = None,
     machine: MachineOption = None,
     balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
     on: Annotated[
