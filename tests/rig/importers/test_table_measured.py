@@ -39,7 +39,7 @@ def unpacked(measured_data, tmp_path_factory):
         ("emps", 8, "carriage_position_m", (0.0, 0.2464)),
         ("smart_grasper", 5, "motor_current_a", (30 * 0.4 / 255, 225 * 0.4 / 255)),
         ("sts3215", 240, "target_angle_rad", (-1.674, 1.674)),
-        ("ur10e", 97, "joint_6_angle_rad", (-1.563, 1.573)),
+        ("ur10e", 79, "joint_6_angle_rad", (-1.548, 1.573)),
     ],
 )
 def test_a_shipped_mapping_reads_the_authors_files(unpacked, machine, runs, channel, range_):
