@@ -165,8 +165,9 @@ def decode_state(data: bytes) -> State:
     values = [found.get(name, math.nan) for name in names]
     if not all(map(math.isfinite, values)):
         raise FrameError("An answer of a moteus lacks a register, or holds no number.")
-    whole = [int(value) for value in values[5:]]
-    return State(int(values[0]), *values[1:5], *whole)
+    mode, position, velocity, torque, current, *last = values
+    voltage, temperature, fault = map(int, last)
+    return State(int(mode), position, velocity, torque, current, voltage, temperature, fault)
 
 
 def encode_state(state: State) -> bytes:

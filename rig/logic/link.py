@@ -20,6 +20,7 @@ from drivers.device import Channel, Drive
 from drivers.errors import LinkLostError
 from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
+from rig.logic.pace import Pace
 
 READ_S = 0.02
 """Time of the ticks between two polls of the host; shorter than any watchdog of the board."""
@@ -119,20 +120,24 @@ class LogicLink:
         late_s: How late a tick may be and still be run, as its drive's `late_s`.
         is_cold: Whether the motor is known to be cold, as a simulated one; a real one may be warm
             from the session before.
+        pace: Simulated seconds a real second; None for as fast as possible.
     """
 
     def __init__(
         self,
         device: Drive,
         url: str,
+        *,
         rate_hz: float = 1000.0,
         late_s: float = 0.0,
         is_cold: bool = True,
+        pace: float | None = None,
     ) -> None:
         self.url = url
         self._device = device
         self._period_us = round(1e6 / rate_hz)
         self._ticks_a_read = max(1, round(READ_S * rate_hz))
+        self._pace = Pace(pace)
         self._closed = False
         identity = device.identify()
         device.start()
@@ -150,8 +155,10 @@ class LogicLink:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What the drive measures."""
-        return self._device.channels
+        """What the drive measures besides position and current."""
+        axis = self._device.axis
+        known = (axis.position, axis.current)
+        return tuple(c for c in self._device.channels if c.name not in known)
 
     @property
     def now_s(self) -> float:
@@ -218,6 +225,7 @@ class LogicLink:
         self._board.set_clock(self._newest_us)
         self._ticks += 1
         self._board.advance(1)
+        self._pace.keep(self._device.now_s)
 
     def _missed_while_busy(self) -> None:
         """Number the ticks that are too late to be run; they are lost."""

@@ -213,7 +213,7 @@ def _record_run(
             run = _of_run(reading, motion)
             beside = {c.stream().topic: c.take() for c in session.companions}
             if len(run):
-                _write_reading(log, session.machine.counts, run, run_start_us, epoch_ns)
+                _write_reading(log, session.raw, run, run_start_us, epoch_ns)
                 line = session.clock.line
                 for topic, block in beside.items():
                     _write_beside(log, topic, block, line, run_start_us, epoch_ns)
@@ -270,7 +270,7 @@ def _new_log(
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
     ]
     _set_aside(path)
-    raw = session.machine.counts
+    raw = session.raw
     streams = [sample_stream(tuple(calibrations.channels), raw.rate_hz), raw]
     streams += [companion.stream() for companion in session.companions]
     return LogWriter(path, info, streams, attachments=attachments)

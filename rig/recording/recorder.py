@@ -30,7 +30,7 @@ class LiveRecorder:
         self._kind = kind
         self._log: LogWriter | None = None
         self._path: Path | None = None
-        self._raw = session.machine.counts
+        self._raw = session.raw
         self._start_us = 0
         self._start_ns = 0
         self._samples = 0
