@@ -25,13 +25,16 @@ from drivers.transport.transport import Transport
 from rig.bench.board_start import require_same_start
 from rig.bench.companions import Companion, open_companions
 from rig.bench.device_logger import logger_on, raw_stream, with_channels
+from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
 from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
+from rig.bench.sensor_logger import SensorWay
 from rig.bench.trips import HostWatch, trip_error, tripped
 from rig.configuration.config import Config
 from rig.errors import ExitCode, RigError, SafetyTripError, UsageError
 from rig.log.schema import Stream
+from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
 from rig.machines.reading import Reading, reading_of, with_setpoints
 from rig.machines.safety import check_samples
@@ -81,6 +84,13 @@ class Session:
         self.raw: Stream
         """Stream of the samples as they came, in a log."""
         self.machine = machine_of(config)
+        self.flight: FlightRecorder | None = None
+        """What was sent to the board, where there is one."""
+        self.newest_tick_us = 0
+        self.newest: Reading | None = None
+        """The newest reading, also the one in which a limit was crossed."""
+        if not isinstance(transport, LogicLink | SensorWay):
+            transport = self.flight = FlightRecorder(transport, self._tick_us)
         self._logger = logger_on(transport, self.machine.profile)
         self._transport = transport
         self._ways_out = ExitStack()
@@ -90,7 +100,6 @@ class Session:
         self._watch: HostWatch | None = None
         self._gathers = is_real_time(config)
         self._read_s = self._clock_due_s = -np.inf
-        self.newest_tick_us = 0
         self.companions: list[Companion] = []
         self.clock = ClockFit()
         """The logger's clock against this computer's; its line states the residual of the fit."""
@@ -298,6 +307,11 @@ class Session:
         for _ in self.play(*self.machine.settling(self.here).setpoints):
             pass
 
+    def _tick_us(self) -> int:
+        """Return the board's clock now; exact where time is virtual."""
+        virtual = self.config.is_simulated and not self._gathers
+        return round(self._transport.now_s * 1e6) if virtual else self.newest_tick_us
+
     def _gather(self) -> None:
         """Let samples gather where time is real and the board runs by itself."""
         now_s = self._transport.now_s
@@ -330,6 +344,7 @@ class Session:
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
         self.here = self.machine.here(reading.columns)
+        self.newest = reading
         try:
             self._require_no_trip(reading)
             check_samples(self.config.limits, reading)
