@@ -149,29 +149,6 @@ def train(
     )
 
 
-def normal_equations(
-    network: Network, rows: FloatArray, targets: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return J'J, shape (p, p), and J'e, shape (p,), of a network on rows.
-
-    J is the derivative of the mapped outputs by the weights, e the mapped outputs less the mapped
-    targets. The weights are ordered as `network.hidden`, then `network.output`, row by row.
-
-    Args:
-        network: The network.
-        rows: Shape (n, d).
-        targets: Shape (n, o).
-    """
-    import torch
-
-    unit = to_unit(rows, network.input_range)
-    x = torch.from_numpy(np.column_stack([unit, np.ones(len(unit))]))
-    y = torch.from_numpy(to_unit(targets, network.output_range))
-    hidden, output = (torch.from_numpy(np.array(w)) for w in (network.hidden, network.output))
-    curvature, slope = _normal(_blocks(x, y), hidden, output)
-    return curvature.numpy(), slope.numpy()
-
-
 def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
     if values.ndim != 2 or values.shape[1] != len(names) or len(values) < 2:
         raise NetworkError(f"Rows of shape {values.shape} do not hold {len(names)} columns.")

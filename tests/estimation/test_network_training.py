@@ -1,13 +1,11 @@
 """Training a network: it needs torch, and is skipped visibly without it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from estimation.errors import MissingExtraError
 from estimation.networks import training
-from estimation.networks.network import NetworkError, to_unit
+from estimation.networks.network import NetworkError
 from estimation.networks.training import Settings, train
 from tests.estimation.test_networks import IN, OUT, make
 
@@ -18,26 +16,6 @@ pytest.importorskip("torch", reason="torch is not installed (extra learn)")
 
 def rows(count: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform([-1.0, 0.0], [2.0, 0.5], (count, 2))
-
-
-def test_the_normal_equations_are_those_of_the_numerical_derivative():
-    network = make(outputs=2)
-    x = rows(9)
-    y = np.random.default_rng(1).normal(size=(9, 2))
-    weights = np.concatenate([network.hidden.ravel(), network.output.ravel()])
-
-    def mapped(w: np.ndarray) -> np.ndarray:
-        hidden = w[: network.hidden.size].reshape(network.hidden.shape)
-        output = w[network.hidden.size :].reshape(network.output.shape)
-        moved = replace(network, hidden=hidden, output=output)
-        return to_unit(moved(x), network.output_range).ravel()
-
-    steps = 1e-6 * np.eye(len(weights))
-    jacobian = np.column_stack([(mapped(weights + s) - mapped(weights - s)) / 2e-6 for s in steps])
-    error = mapped(weights) - to_unit(y, network.output_range).ravel()
-    curvature, slope = training.normal_equations(network, x, y)
-    np.testing.assert_allclose(curvature, jacobian.T @ jacobian, atol=1e-7)
-    np.testing.assert_allclose(slope, jacobian.T @ error, atol=1e-6)
 
 
 def test_training_recovers_a_known_function_and_its_noise():
