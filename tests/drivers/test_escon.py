@@ -1,4 +1,4 @@
-"""Scaling of an ESCON 24/2 in the firmware: duty 0.1 + 0.8 |I| / 2 A; 2 (2 reading / 4095 - 1) A."""
+"""Scaling of an ESCON 24/2 by the firmware: duty 0.1 + 0.4 |I|, I = 4 reading / 4095 - 2 A."""
 
 import ctypes
 import math
