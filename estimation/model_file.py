@@ -75,7 +75,7 @@ def read_all(path: Path) -> list[Model]:
         path: The file, or the name of a model from `names`.
 
     Raises:
-        NoModelError: There is no such file and no such name; it is a ModelFileError, too.
+        NoModelError: No such file and no such name; it is a ModelFileError, too.
         ModelFileError: It is not TOML, or a key is unknown, missing or wrong.
     """
     known = shipped()

@@ -41,7 +41,7 @@ class Fault:
 def error_of(
     fault: Fault, amplitude: float, true: Mapping[str, FloatArray], first: int, start_s: float
 ) -> FloatArray:
-    """Return what a fault adds to its reading in one run, shape (n,).
+    """Return the values that a fault adds to its reading in one run, shape (n,).
 
     Args:
         fault: The fault.

@@ -1,6 +1,6 @@
 """A plain simulated board: it takes and gives the bytes a real one would, and guards nothing.
 
-For simulation where there is no compiler. It speaks the whole protocol, sessions and the watchdog
+For simulation without a compiler. It speaks the whole protocol, sessions and the watchdog
 on the host's silence included, and follows setpoints; limits it takes and does not hold. The board
 with guards is the compiled core (`drivers.teensy.core`).
 
