@@ -1,6 +1,5 @@
-"""The inputs of the logger as channels: a straight line from the counts of one field to a unit."""
+"""The inputs of the logger as channels: counts of one field of a sample."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,59 +14,35 @@ ADC_BITS = 12
 
 @dataclass(frozen=True, slots=True)
 class TeensyChannel:
-    """One quantity made from one field of a sample: `slope * (count - zero_count)`.
+    """The counts of one field of a sample.
 
     Attributes:
         field: Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`.
-        slope: Unit a count.
-        zero_count: Count at 0.
-        channel: Name, unit, rate and range of the result.
+        channel: Name, rate and range.
     """
 
     field: str
-    slope: float
-    zero_count: float
     channel: Channel
 
     def values(self, samples: NDArray[np.void]) -> NDArray[np.float64]:
-        """Return the quantity in samples of shape (n,), float64 of shape (n,)."""
+        """Return the counts in samples of shape (n,), float64 of shape (n,)."""
         counts: NDArray[np.float64] = samples[self.field].astype(np.float64)
-        return self.slope * (counts - self.zero_count)
+        return counts
 
 
-def linear(
-    name: str,
-    field: str,
-    unit: str = "count",
-    slope: float = 1.0,
-    zero_count: float = 0.0,
-    description: str = "",
-    profile: Profile = REFERENCE,
+def raw_channel(
+    name: str, field: str, profile: Profile = REFERENCE, description: str = ""
 ) -> TeensyChannel:
-    """Return a channel by slope and zero; raw counts by default.
-
-    Raises:
-        ValueError: No such field, or a slope that is 0 or not finite.
-    """
-    if field not in (profile.sample.names or ()):
-        raise ValueError(f"a sample has no field {field!r}")
-    if not (math.isfinite(slope) and slope and math.isfinite(zero_count)):
-        raise ValueError(f"slope {slope} and zero {zero_count} of {name} make no line")
-    ends = [slope * (count - zero_count) for count in _count_range(field, profile)]
-    channel = Channel(
-        name, unit, profile.rate_hz, min(ends), max(ends), description or f"field {field}"
-    )
-    return TeensyChannel(field, slope, zero_count, channel)
-
-
-def _count_range(field: str, profile: Profile) -> tuple[int, int]:
-    if field.startswith(("fsr", "force_")):
-        return 0, 2**ADC_BITS - 1
-    bounds = np.iinfo(profile.sample[field])
-    return int(bounds.min), int(bounds.max)
+    """Return a field of a board's samples as a channel."""
+    low, high = 0, 2**ADC_BITS - 1
+    if not field.startswith(("fsr", "force_")):
+        bounds = np.iinfo(profile.sample[field])
+        low, high = int(bounds.min), int(bounds.max)
+    about = description or f"field {field}"
+    return TeensyChannel(field, Channel(name, "count", profile.rate_hz, low, high, about))
 
 
 def raw_channels(profile: Profile = REFERENCE) -> tuple[TeensyChannel, ...]:
-    """Return every input of a board as it is, in counts."""
+    """Return every input of a board."""
     inputs = [*profile.input_names, *(["fsr"] if profile is REFERENCE else [])]
-    return tuple(linear(f"{field}_count", field, profile=profile) for field in inputs)
+    return tuple(raw_channel(f"{field}_count", field, profile) for field in inputs)

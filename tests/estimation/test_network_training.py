@@ -39,14 +39,11 @@ def test_pure_noise_determines_almost_no_weight():
     assert np.std(found.network(rows(300, 9))) < 0.25
 
 
-def test_the_error_falls_with_every_block_of_rows_and_the_seed_fixes_the_result(monkeypatch):
+def test_blocks_of_rows_do_not_matter_and_the_seed_fixes_the_result(monkeypatch):
     x = rows(900)
     y = np.sin(3 * x[:, :1]) * x[:, 1:]
-    errors: list[float] = []
     settings = Settings(nodes=6, iterations=40, seed=4)
-    whole = train(x, y, (IN, OUT[:1]), settings, lambda step, rmse: errors.append(rmse))
-    assert len(errors) == whole.iterations
-    assert errors[-1] < 0.1 * errors[0]
+    whole = train(x, y, (IN, OUT[:1]), settings)
     again = train(x, y, (IN, OUT[:1]), settings)
     np.testing.assert_array_equal(again.network.hidden, whole.network.hidden)
     monkeypatch.setattr(training, "BLOCK", 100)
