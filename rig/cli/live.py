@@ -104,9 +104,10 @@ def live(
         if len(models) == 1:
             blocks = watched(blocks, models[0])
         if foxglove:
-            from rig.live.foxglove import published
+            from rig.live.foxglove import LAYOUT, published
 
             blocks = published(blocks, foxglove_port)
+            remarks().print(f"Foxglove: ws://localhost:{foxglove_port}, layout {LAYOUT}")
         options = ShowOptions(
             title=f"rig live: {settings.name}",
             channels=shown_channels(estimators, machine.shown),
