@@ -43,6 +43,7 @@ def subject(
     balance: str | None = None,
     format_name: str | None = None,
     machine: Path | None = None,
+    skip_bad: bool = False,
 ) -> Subject:
     """Return the recordings at a path and their declared models.
 
@@ -56,6 +57,7 @@ def subject(
         format_name: Importer to use; guessed when None.
         machine: A machine file or the name of a shipped machine: its equations are declared, and
             foreign tables are read as it states.
+        skip_bad: Exclude runs that cannot be read, with the reason.
 
     Raises:
         UsageError: The path does not exist, or no model of that equation is declared.
@@ -68,17 +70,19 @@ def subject(
             models = _of(declared_of(read_machine(machine)), balance)
         else:
             models = declared_models(model, balance)
-        return Subject(with_motion(open_recordings(path, machine, format_name), models), models)
+        return Subject(
+            with_motion(open_recordings(path, machine, format_name, skip_bad), models), models
+        )
     if model is not None:
         models = declared_models(model, balance)
-        return Subject(open_campaign(path, format_name), models)
+        return Subject(open_campaign(path, format_name, skip_bad), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
     of_grasper = {m.balance for m in (*_shipped(WRIST), *model_file.read_all(GRASPER))}
     if balance is not None and not balance.startswith("joint.") and balance not in of_grasper:
         models = declared_models(None, balance)
-        return Subject(open_campaign(path, format_name), models)
-    campaign = open_campaign(path, format_name)
+        return Subject(open_campaign(path, format_name, skip_bad), models)
+    campaign = open_campaign(path, format_name, skip_bad)
     first = next(iter(campaign.evidence), None)
     arm = None if first is None else balances_of(first)
     if arm is not None:

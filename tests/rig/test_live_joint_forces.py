@@ -48,7 +48,7 @@ def test_live_shows_three_forces_with_intervals_and_the_age_of_their_fit(capsys)
         assert channel["half_width95"] > 0
         assert abs(channel["estimate"] - channel["sensor"]) < 2 * channel["half_width95"]
     (status,) = [d for d in frames[-2]["devices"] if d["name"] == "estimate"]
-    assert "days ago" in status["detail"]
+    assert " ago" in status["detail"]
 
 
 def status(days=0.0, **estimates):
