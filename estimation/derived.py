@@ -33,8 +33,8 @@ from estimation.filters import (
 )
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPINDLE_SPEED, Samples, closing, in_motion
-from estimation.signals import Combination, Signals, reference
+from estimation.rest import SPINDLE_SPEED, closing, in_motion
+from estimation.signals import Combination, Samples, Signals, reference
 from estimation.window import ALIKE, lowest, since_lowest
 
 CAMPAIGN_TIME = "campaign_time_s"

@@ -27,15 +27,14 @@ from pathlib import Path
 from typing import cast, get_args
 
 from estimation.effects import effect
-from estimation.errors import EstimationError, nearest
+from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
-from estimation.model import BALANCES, Estimate, Evidence, Model, ModelError, Term
+from estimation.model import Estimate, Evidence, Model, ModelError, Term
 from estimation.model_table import ModelFileError, NoModelError
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared
-from estimation.rest import Samples
-from estimation.signals import Signals, combination_lines, read_combinations, reference
+from estimation.signals import Samples, Signals, combination_lines, read_combinations, reference
 from estimation.toml_table import Table
 from estimation.toml_table import value_text as _value
 
@@ -142,10 +141,9 @@ def _model(top: Table) -> Model:
     processing = top.table("processing")
     evidence = top.table("fit")
     target = top.take("target", str)
-    signals = _signals(top)
     model = Model(
         name=top.take("name", str),
-        balance=_balance(top, signals),
+        balance=top.take("balance", str),
         target=target,
         description=top.take("description", str, ""),
         terms=tuple(_term(entry, target) for entry in top.tables("effects")),
@@ -154,9 +152,11 @@ def _model(top: Table) -> Model:
             processing.take("order", int, LowPass().order),
         ),
         run_offsets=processing.take("run_offsets", bool, True),
-        counted=_counted(processing),
+        counted=cast(
+            Samples | None, processing.choice("samples", ("", *get_args(Samples))) or None
+        ),
         evidence=_evidence(evidence) if evidence.content else None,
-        signals=signals,
+        signals=_signals(top),
     )
     for table in (top, processing, evidence):
         table.finish()
@@ -173,20 +173,6 @@ def _signals(top: Table) -> Signals:
     found = Signals(read_combinations(table.tables("derived", [])), slowest)
     table.finish()
     return found
-
-
-def _balance(top: Table, signals: Signals) -> str:
-    """Return the name of a model's equation; of the reference rig it is one of those known."""
-    name: str = top.take("balance", str)
-    kind = name.partition(".")[0]
-    if signals == reference() and kind not in (*BALANCES, "joint", "calibration"):
-        raise ModelFileError(
-            f"{top.where}: unknown equation {name!r}.",
-            f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME; a machine file has its"
-            " own.",
-            nearest(name, BALANCES),
-        )
-    return name
 
 
 def write(model: Model, path: Path) -> None:
@@ -305,20 +291,6 @@ def _pair(table: Table) -> tuple[float, float]:
     if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
         raise ModelFileError(f"{table.where}: ci95 = {values!r} is not two numbers.")
     return float(values[0]), float(values[1])
-
-
-def _counted(processing: Table) -> Samples | None:
-    """Return which samples count, or None where the effects decide."""
-    if "samples" not in processing.content:
-        return None
-    name = processing.take("samples", str)
-    for known in get_args(Samples):
-        if name == known:
-            return cast(Samples, known)
-    raise ModelFileError(
-        f"{processing.where}: samples = {name!r} is none of {', '.join(get_args(Samples))}.",
-        fix=nearest(name, get_args(Samples)),
-    )
 
 
 def _evidence(table: Table) -> Evidence:

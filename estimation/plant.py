@@ -11,10 +11,10 @@ from typing import Literal
 
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.errors import EstimationError, nearest
-from estimation.signals import Combination
+from estimation.signals import Combination, Samples
 from estimation.toml_table import Place
 
-Reads = Literal["position", "speed", "effort", "temperature", "reference", "other"]
+Reads = Literal["other", "position", "speed", "effort", "temperature", "reference"]
 
 POSITION = {"rad": "_angle_rad", "m": "_position_m"}
 SPEED = {"rad": "_velocity_rad_s", "m": "_velocity_m_s"}
@@ -158,12 +158,14 @@ class Written:
         target: Channel on the left-hand side.
         parts: Effects on the right-hand side.
         description: In words.
+        samples: Which samples count; None for what suits the effects.
     """
 
     name: str
     target: str
     parts: tuple[Part, ...]
     description: str = ""
+    samples: Samples | None = None
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,12 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from estimation.toml_table import Table, value_text
+
+Samples = Literal["all", "motion", "closing"]
+"""Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from estimation.derived import settled_places
 from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
 from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray, Recording
-from estimation.rest import Samples
+from estimation.signals import Samples
 from estimation.within_bounds import solve_within
 
 Unwritten = Callable[[str, FloatArray], FloatArray]

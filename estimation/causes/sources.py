@@ -16,7 +16,6 @@ from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
 from estimation.effects.roles import entries
-from estimation.model import BALANCES
 from estimation.recording import FloatArray
 
 DECLARED_ONLY = (
@@ -62,6 +61,8 @@ LOOPS = ("hysteresis.", "transmission.backlash")
 
 TURNING = ("motor_angle", "output_angle", "encoder")
 CLOCKS = ("clock", "elapsed", "campaign_clock")
+KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
+"""Equations that effects name under `balances`."""
 
 NARROW = 0.02
 """Speed over which friction changes its sign where none is declared, share of the usual most."""
@@ -216,7 +217,7 @@ def _acts(effect: Effect, place: Place) -> bool:
     kind = place.home.partition(".")[0]
     if kind == "calibration" and not entries(effect, place.home):
         return False  # its equation is of one sensor or part
-    if effect.family == "friction.capstan" and kind in BALANCES and kind not in effect.balances:
+    if effect.family == "friction.capstan" and kind in KNOWN and kind not in effect.balances:
         return False  # a cable that is wrapped, not a shaft in its bearings
     match place.kind:
         case "actuator":

@@ -107,7 +107,6 @@ DECLARED = to_toml(read(Path("motor")))
         ('"motor_velocity_rad_s"', '"motor_velocity"', "carries no unit"),
         ("sign = -1", "sign = 2", "it is 1 or -1"),
         ("sign = -1", 'sign = "minus"', "is not int"),
-        ('balance = "motor"', 'balance = "moter"', "Did you mean 'motor'"),
         ("run_offsets = true", "run_offsets = 1", "is not bool"),
         ("order = 3", "order = true", "is not int"),
         ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),

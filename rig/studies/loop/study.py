@@ -18,7 +18,7 @@ from estimation.effects.roles import MOTOR_LOAD
 from estimation.fitting import prepared
 from estimation.model import Model, Term, estimate
 from estimation.recording import FloatArray, Recording
-from estimation.rest import Samples
+from estimation.signals import Samples
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
