@@ -26,6 +26,7 @@ from estimation.errors import EstimationError
 from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term, balance_channels
+from estimation.predicted import with_prediction
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
 from estimation.signals import Signals
@@ -311,7 +312,7 @@ def _equation(model: Model) -> Equation:
             channels[channel] = channels.get(channel, 0.0) + float(term.weights[0])
         if term.effect.id == "friction.coulomb":
             speed, width = term.channels["speed"], term.values["width"].value
-    return Equation(model.balance, model, channels, speed, width)
+    return Equation(model.balance, with_prediction(model), channels, speed, width)
 
 
 def _signals(
