@@ -264,7 +264,9 @@ def zero_phase_channels(
     period_s = 1.0 / recording.sample_rate_hz
     ticks = recording.ticks
     whole = {
-        name: np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
+        name: _on_time(
+            np.asarray(fill_gaps(ticks, values[:, None])[:, 0]), name, recording, signals
+        )
         for name, values in filtered.columns.items()
     }
     derived = _derive(
@@ -278,6 +280,16 @@ def zero_phase_channels(
     if CAMPAIGN_TIME in names:
         columns[CAMPAIGN_TIME] = recording[CAMPAIGN_TIME]
     return replace(filtered, columns=columns)
+
+
+def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signals) -> FloatArray:
+    """Return a filtered channel as its sensor would have read it without delay."""
+    known = signals.readings.get(name)
+    late = 0.0 if known is None else known.age_s(recording.sample_rate_hz)
+    if late == 0.0:
+        return values
+    at = np.arange(len(values))
+    return np.interp(at + late * recording.sample_rate_hz, at, values)
 
 
 def looks_back(names: Iterable[str]) -> bool:

@@ -11,8 +11,8 @@ sign = -1
 channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
-A model of another machine than the reference rig states that machine's derived channels and its
-speeds of standstill under `[[signals.derived]]` and `[signals.rest]`.
+A model of another machine than the reference rig states that machine's derived channels, its speeds
+of standstill and its sensors under `[[signals.derived]]`, `[signals.rest]` and `[signals.sensors]`.
 
 A file of several equations contains each under `[[models]]`, with `[models.processing]`,
 `[[models.effects]]`, `[models.signals]` and `[models.fit]`, and has the schema `rig.models/1`.
@@ -21,6 +21,7 @@ A file of several equations contains each under `[[models]]`, with `[models.proc
 import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
@@ -34,7 +35,14 @@ from estimation.model import Estimate, Evidence, Model, ModelError, Term
 from estimation.model_table import ModelFileError, NoModelError
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared
-from estimation.signals import Samples, Signals, combination_lines, read_combinations, reference
+from estimation.signals import (
+    Reading,
+    Samples,
+    Signals,
+    combination_lines,
+    read_combinations,
+    reference,
+)
 from estimation.toml_table import Table
 from estimation.toml_table import value_text as _value
 
@@ -164,13 +172,18 @@ def _model(top: Table) -> Model:
 
 
 def _signals(top: Table) -> Signals:
-    """Return a model's own derived channels and speeds of standstill, or the reference rig's."""
+    """Return a model's own signals, or the reference rig's."""
     if "signals" not in top.content:
         return reference()
     table = top.table("signals")
     rest = table.table("rest")
     slowest = {speed: rest.number(speed) for speed in rest.content}
-    found = Signals(read_combinations(table.tables("derived", [])), slowest)
+    sensors, readings = table.table("sensors"), {}
+    for channel in sensors.content:
+        one = sensors.table(channel)
+        readings[channel] = Reading(*(one.optional(key.name) for key in fields(Reading)))
+        one.finish()
+    found = Signals(read_combinations(table.tables("derived", [])), slowest, readings)
     table.finish()
     return found
 
@@ -220,6 +233,10 @@ def _lines(model: Model, within: str = "") -> list[str]:
     if model.signals != reference():
         lines += ["", f"[{within}signals.rest]"]
         lines += [f"{speed} = {_value(slow)}" for speed, slow in model.signals.rest.items()]
+        lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
+        for channel, stated in model.signals.readings.items():
+            known = {key: value for key, value in asdict(stated).items() if value is not None}
+            lines.append(f"{channel} = {_value(known)}")
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
     for term in model.terms:
         lines += [

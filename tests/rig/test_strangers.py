@@ -46,6 +46,14 @@ def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidde
     assert "cell_torque" in (tmp_path / "input.h").read_text()
 
 
+def test_a_noise_that_the_recordings_contradict_is_named(run, tmp_path, capsys):
+    drive_table(tmp_path / "trials.csv", runs=3)
+    text = DRIVE.replace("RATIO", "35.0").replace("noise = 0.01", "noise = 0.1")
+    (tmp_path / "drive.toml").write_text(text)
+    assert main(["machine", "check", "drive.toml", "trials.csv"]) == 1
+    assert "states a noise of 0.1 N m for cell_torque_n_m" in capsys.readouterr().out
+
+
 def test_an_axis_driven_by_pwm_is_diagnosed_in_units_of_its_drive(run, tmp_path):
     (tmp_path / "axis.toml").write_text(AXIS)
     axis_table(tmp_path / "axis.csv", asymmetry=0.03)
