@@ -289,7 +289,7 @@ def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signa
     if late == 0.0:
         return values
     at = np.arange(len(values))
-    return np.interp(at + late * recording.sample_rate_hz, at, values)
+    return np.asarray(np.interp(at + late * recording.sample_rate_hz, at, values))
 
 
 def looks_back(names: Iterable[str]) -> bool:

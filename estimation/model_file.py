@@ -235,8 +235,8 @@ def _lines(model: Model, within: str = "") -> list[str]:
         lines += [f"{speed} = {_value(slow)}" for speed, slow in model.signals.rest.items()]
         lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
         for channel, stated in model.signals.readings.items():
-            known = {key: value for key, value in asdict(stated).items() if value is not None}
-            lines.append(f"{channel} = {_value(known)}")
+            about = {key: value for key, value in asdict(stated).items() if value is not None}
+            lines.append(f"{channel} = {_value(about)}")
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
     for term in model.terms:
         lines += [

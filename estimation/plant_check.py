@@ -197,8 +197,8 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
         if stated and shown and not 1.0 / ALIKE < float(np.median(shown)) / stated < ALIKE:
             yield (
                 f"{file} states a noise of {stated:.3g} {unit_of(sensor.name)} for {sensor.name},"
-                f" but the recordings show {float(np.median(shown)):.3g}. Correct it, or leave it"
-                " out: the noise is then taken from the recordings."
+                f" but the recordings show {float(np.median(shown)):.3g}. Correct it, or delete"
+                " it: the noise is then taken from the recordings."
             )
     for joint in plant.transmissions:
         driving, driven = plant.position(joint.input), plant.position(joint.output)

@@ -61,7 +61,7 @@ LOOPS = ("hysteresis.", "transmission.backlash")
 TURNING = ("motor_angle", "output_angle", "encoder")
 CLOCKS = ("clock", "elapsed", "campaign_clock")
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
-"""Equations that effects name under `balances`."""
+"""Equations of the reference rig that effects name."""
 
 NARROW = 0.02
 """Speed over which friction changes its sign where none is declared, share of the usual most."""
