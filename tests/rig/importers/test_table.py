@@ -8,6 +8,7 @@ import pytest
 from pyarrow import parquet
 from scipy.io import savemat
 
+from estimation.filters import LowPass, filter_recording
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 
