@@ -13,7 +13,8 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
-from rig.arm.simulated import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
+from rig.arm.hidden import bouc_wen
+from rig.arm.simulated import GRIP_N_M, contact, contact_motion, passed_on, pin
 from rig.studies.pique.wrench import BODY, TWISTED, ati, in_tip_frame
 
 pytestmark = pytest.mark.long
@@ -41,7 +42,7 @@ def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
 
 def test_dahl_friction_turns_over_its_displacement_and_stays_within_one():
     there_and_back = np.concatenate([np.linspace(0, 1, 1001), np.linspace(1, 0.9, 101)])[:, None]
-    friction = dahl(there_and_back, np.array([0.05]))[:, 0]
+    friction = bouc_wen(there_and_back, np.array([0.05]))[:, 0]
     assert np.isclose(friction[1000], 1.0, atol=1e-3)
     assert np.isclose(friction[1050], 1 - 2 * (1 - np.exp(-1)), atol=0.02)
     assert np.abs(friction).max() <= 1

@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
-from rig.arm.simulated import dahl, draw_arm
+from rig.arm.hidden import bouc_wen
+from rig.arm.simulated import draw_arm
 from rig.cli.study import study_app
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
@@ -178,7 +179,7 @@ def test_motion_of_a_run_does_not_trail_a_smooth_path():
 def test_the_network_on_the_residual_learns_memory_and_not_noise(psm):
     rng = np.random.default_rng(8)
     motion = with_gripper(random_path(rng, 120.0), 0.1, 0.8)
-    memory = dahl(motion.position[:, :1], np.array([0.1]))[:, 0]
+    memory = bouc_wen(motion.position[:, :1], np.array([0.1]))[:, 0]
     noise = rng.normal(size=len(motion))
     cut = 5 * len(motion) // 6
     for joint in (0, 5):
