@@ -1,6 +1,6 @@
 """Studies over families of hidden torque: which arm has which, and methods compared by family."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -17,13 +17,16 @@ NOTE = (
 )
 
 
-def arm_of(number: int) -> tuple[int, str]:
+def arm_of(number: int, families: Sequence[str] = FAMILIES) -> tuple[int, str]:
     """Return the seed and the family of hidden torque of a study's arm, by its number from 0."""
-    return number // len(FAMILIES), FAMILIES[number % len(FAMILIES)]
+    return number // len(families), families[number % len(families)]
 
 
 def ratios(
-    title: str, columns: Sequence[str], found: Mapping[str, FloatArray], note: str = ""
+    title: str,
+    columns: Sequence[str],
+    found: Mapping[str, FloatArray],
+    outside: Collection[str] = frozenset(NOT_IN_CATALOGUE),
 ) -> TextTable:
     """Return a table of two methods' errors by family.
 
@@ -31,16 +34,16 @@ def ratios(
         title: Title of the table.
         columns: What the errors are of.
         found: Family to ours over the paper's method, shape (arms, columns).
-        note: What to add to the table's note.
+        outside: Families that the catalogue does not have.
     """
     rows = []
     for family, each in found.items():
-        kind = "written" if family == OWN else "no" if family in NOT_IN_CATALOGUE else "yes"
+        kind = "written" if family == OWN else "no" if family in outside else "yes"
         middle = np.median(each, axis=0)
         better = f"{int(np.sum(each < 1))} of {each.size}"
         rows.append([family, kind, *(f"{value:.2f}" for value in middle), better])
     header = ["hidden torque", "family in the catalogue", *columns, "ours better"]
-    return TextTable(title, header, rows, f"{NOTE} {note}".strip())
+    return TextTable(title, header, rows, NOTE)
 
 
 def verdict(found: Mapping[str, FloatArray]) -> str:

@@ -172,7 +172,7 @@ def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmE
         tables.append(np.concatenate(parts, axis=2))
         torques.append(run.torque[kept])
     blocks = blocks_of(base_block(), effects, widths)
-    return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, GRIPPER)
+    return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, JOINTS)
 
 
 def find_effects(arm: Arm, first: Sequence[PsmRun], second: Sequence[PsmRun]) -> list[ArmEffect]:
