@@ -75,7 +75,7 @@ def read_all(path: Path) -> list[Model]:
         path: The file, or the name of a model from `names`.
 
     Raises:
-        NoModelError: There is no such file and no such name; it is a ModelFileError, too.
+        NoModelError: No such file and no such name; it is a ModelFileError, too.
         ModelFileError: It is not TOML, or a key is unknown, missing or wrong.
     """
     known = shipped()
@@ -276,7 +276,7 @@ def _term(entry: Table, target: str) -> Term:
         values[name] = Estimate(
             known.number("value"),
             known.number("spread") if "spread" in known.content else None,
-            _pair(known) if "ci95" in known.content else None,
+            _two(known, "ci95") if "ci95" in known.content else None,
         )
         units[name] = known.take("unit", str)
         known.finish()
@@ -300,10 +300,10 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
             )
 
 
-def _pair(table: Table) -> tuple[float, float]:
-    values = table.take("ci95", list)
+def _two(table: Table, key: str) -> tuple[float, float]:
+    values = table.take(key, list)
     if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
-        raise ModelFileError(f"{table.where}: ci95 = {values!r} is not two numbers.")
+        raise ModelFileError(f"{table.where}: {key} = {values!r} is not two numbers.")
     return float(values[0]), float(values[1])
 
 
@@ -329,18 +329,9 @@ def _evidence(table: Table) -> Evidence:
         rmse_with_means=table.number("rmse_with_means"),
         seed=table.take("seed", int),
         run_spread=table.number("run_spread") if "run_spread" in table.content else None,
-        target_range=_range(table),
+        target_range=_two(table, "target_range") if "target_range" in table.content else None,
         made_at=_date(table),
     )
-
-
-def _range(table: Table) -> tuple[float, float] | None:
-    if "target_range" not in table.content:
-        return None
-    ends = table.take("target_range", list)
-    if len(ends) != 2 or not all(isinstance(end, int | float) for end in ends):
-        raise ModelFileError(f"{table.where}: target_range is not two numbers.")
-    return float(ends[0]), float(ends[1])
 
 
 def _date(table: Table) -> str:

@@ -75,7 +75,7 @@ def read(path: Path) -> Plant:
     """Read a machine file.
 
     Raises:
-        NoPlantError: There is no such file; it is a PlantFileError, too.
+        NoPlantError: No such file; it is a PlantFileError, too.
         PlantFileError: It is not TOML, a key is unknown, missing or wrong, or parts do not fit.
     """
     try:

@@ -111,7 +111,7 @@ class Amt21:
         self._transport.close()
 
     def _plausible(self) -> int | None:
-        """Return a position that the shaft can have, None when there is no good one.
+        """Return a position that the shaft can have, None without a good one.
 
         A position out of reach is asked for again: it was damaged, unless the second one agrees.
         """

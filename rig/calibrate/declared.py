@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.fsr import FsrCurve
+from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory
 from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
 from calibration.procedure import Measurement, Result

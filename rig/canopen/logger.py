@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.epos4.drive import Epos4
 from drivers.errors import LinkLostError
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING
 from drivers.teensy.reference import TICK_US
 from drivers.transport.can_bus import CanBus
@@ -129,7 +129,7 @@ class CanopenLogger:
         device.start()
         self.bench = Epos4Bench(device)
         self.bench.release()  # an earlier program may have left it in force
-        self._board = FirmwareBoard(self.bench, serial=f"{SERIAL_PREFIX}{identity.serial}")
+        self._board = FirmwareBoard(self.bench, BoardStart(f"{SERIAL_PREFIX}{identity.serial}"))
         self.bench.board = self._board
         if not is_cold:
             self._board.assume_hot()

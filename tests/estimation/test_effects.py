@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
 from estimation.derived import measured_channels
-from estimation.diagnosis.result import FAMILIES, UNKNOWN
 from estimation.effects import UnknownEffectError, catalogue, effect
 from estimation.effects.roles import AXES, entries
 from estimation.filters import LowPass
@@ -170,13 +169,7 @@ def test_a_search_may_enter_it_in_each_balance_it_names_with_units(kind):
 @EVERY
 def test_the_forms_of_a_family_have_its_name(kind):
     if kind.balances:
-        assert kind.family in FAMILIES
         assert re.fullmatch(re.escape(kind.family) + r"(\.[a-z_]+)?", kind.id)
-
-
-def test_every_family_of_a_diagnosis_has_an_effect():
-    found = {k.family for k in catalogue().values() if k.balances}
-    assert found == set(FAMILIES) - {UNKNOWN}
 
 
 WIDE = LowPass(cutoff_hz=400.0)
