@@ -97,7 +97,7 @@ class Amt21(PolledDevice):
         return values[: len(self._channels)], 0
 
     def _plausible(self) -> int | None:
-        """Return a position that the shaft can have, None when there is no good one.
+        """Return a position that the shaft can have, None without a good one.
 
         A position out of reach is asked for again: it was damaged, unless the second one agrees.
         """

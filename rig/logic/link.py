@@ -18,7 +18,7 @@ import numpy as np
 
 from drivers.device import Channel, Drive
 from drivers.errors import LinkLostError
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
 from rig.logic.pace import Pace
 
@@ -144,7 +144,7 @@ class LogicLink:
         self.bench = DriveBench(device)
         self.bench.release()  # an earlier program may have left it in force
         serial = identity.serial or identity.model.split()[-1]
-        self._board = FirmwareBoard(self.bench, serial=f"{device.name.upper()}-{serial}")
+        self._board = FirmwareBoard(self.bench, BoardStart(f"{device.name.upper()}-{serial}"))
         self.bench.board = self._board
         if not is_cold:
             self._board.assume_hot()

@@ -49,7 +49,7 @@ class ReferenceMachine:
         return self
 
     def first_look(self, config: Config) -> str:
-        """Return the quick protocol, without load where there is no load motor."""
+        """Return the quick protocol, without load if the rig lacks a load motor."""
         return "quick" if config.reference_limits.load_command_a else "unloaded"
 
     def gains(self, config: Config) -> Sequence[float]:

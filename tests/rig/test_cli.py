@@ -74,7 +74,7 @@ def test_the_help_names_what_is_shipped_and_the_default(capsys):
     )
     assert "If none: diagnosis" in shown
     main(["fit", "-h"])
-    assert "cable, gearbox, grasper, grip" in " ".join(capsys.readouterr().out.split())
+    assert "cable, gearbox, grip" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_the_help_names_what_is_shipped_and_the_default(capsys):
         ("rig record --protocol d", {"diagnosis"}),
         ("rig record --config gra", {"grasper", "grasper_pty"}),
         ("rig record --config b", {"bench.toml"}),
-        ("rig fit --model gr", {"grasper", "grip"}),
+        ("rig fit --model gr", {"grip"}),
         ("rig diagnose logs/mo", {"logs/monday"}),
         ("rig diagnose logs/monday --model gea", {"gearbox"}),
         ("rig campaigns mond", {"monday"}),
