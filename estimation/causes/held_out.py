@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimation.causes.candidates import Candidate, Claim, laid_out
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import Numbers
-from estimation.causes.search import Candidate, laid_out
 from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
@@ -81,7 +81,7 @@ class HeldOut:
         acts = None
         if candidate.acts is not None:
             acts = tuple(on is True for on in self.acts_in(candidate).values())
-        laid = laid_out(self.layout, self.joint, candidate.cause, acts)
+        laid = laid_out(self.joint, Claim(candidate.cause, acts))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 
 
