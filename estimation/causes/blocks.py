@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.folds import Folds
-from estimation.causes.joint import Joint, Part
+from estimation.causes.joint import Joint, Next, Part
 from estimation.causes.laid import Laid
 from estimation.recording import FloatArray
 
@@ -24,12 +24,14 @@ class Block:
     """Cross-products of causes with a regression's base, run by run.
 
     Attributes:
+        laid: The causes.
         base: Part to the base's columns times the causes', shape (runs, causes, base, k).
         own: Part to the causes' columns times themselves, shape (runs, causes, k, k).
         target: Part to the causes' columns times the target, shape (runs, causes, k).
         taken: How much of each declared column was taken off them, (causes, declared, k).
     """
 
+    laid: Laid
     base: Mapping[Part, FloatArray]
     own: Mapping[Part, FloatArray]
     target: Mapping[Part, FloatArray]
@@ -87,7 +89,7 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
             added = table[:, :, new].transpose(0, 2, 1)[:, None] @ columns
             base[p][:, :, [places[i] for i in new]] = added
         target[p], own[p] = known.target[p], known.own[p]
-    return Block(base, own, target, joint.taken_off(laid) if known is None else known.taken)
+    return Block(laid, base, own, target, joint.taken_off(laid) if known is None else known.taken)
 
 
 def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) -> Outcome:
@@ -161,5 +163,5 @@ def _squared(
         across = (base[:, :, None] @ block.base[p][runs])[:, :, 0]
         own = (amplitudes[:, :, None] @ block.own[p][runs])[:, :, 0]
         error += ((2.0 * (across - block.target[p][runs]) + own) * amplitudes).sum(axis=2)
-    declared = joint.whole(base) - (block.taken @ amplitudes[..., None])[..., 0]
-    return np.asarray(np.maximum(error, 0.0) + joint.avoided(p, runs, declared))
+    next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
+    return np.asarray(np.maximum(error, 0.0) + joint.avoided(p, runs, base, next_to))

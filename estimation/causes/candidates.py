@@ -8,12 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.causes.blocks import Block, block_of
+from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import Function, functions_at
+from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import Laid, Scale
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
+
+QUIET = 0.002
+"""Noise of a channel over its range below which no column follows it."""
 
 AT_ONCE = 40_000
 """Causes times squared columns in one group: keeps its memory small."""
@@ -66,6 +71,13 @@ class Candidate(Claim):
         return np.asarray(self.laid.size[0])
 
 
+OfRuns = Sequence[Mapping[str, FloatArray]]
+"""Columns of every run: equation to (samples, k)."""
+
+Raw = tuple[Claim, OfRuns, OfRuns | None]
+"""A claim, its columns in every run, and those of the shaken runs where it follows noise."""
+
+
 @dataclass(frozen=True)
 class Group:
     """Candidates of one place with as many columns each.
@@ -91,7 +103,7 @@ def candidates(joint: Joint) -> list[Group]:
         for place in places_of(train)
     )
     pool = groups_of(joint, map(Claim, causes))
-    for run in train.runs:
+    for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     count = Counter(_form(c) for group in pool for c in group.candidates)
     return [
@@ -113,15 +125,17 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
     """
     out: list[Group] = []
     for _, at_one in itertools.groupby(wanted, lambda one: one.cause.place.name):
-        waiting: dict[object, list[tuple[Claim, list[Mapping[str, FloatArray]]]]] = {}
+        waiting: dict[object, list[Raw]] = {}
         for one in at_one:
-            columns = _columns(joint, one)
+            columns = _columns(one, joint.runs)
             if columns is None:
                 continue
+            noisy = _is_noisy(joint.layout, one)
+            shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (width, _unit(one.cause), one.acts is None)
+            key = (width, _unit(one.cause), one.acts is None, shaken is None)
             held = waiting.setdefault(key, [])
-            held.append((one, columns))
+            held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
                 out += _laid(joint, waiting.pop(key))
         for held in waiting.values():
@@ -135,10 +149,10 @@ def laid_out(joint: Joint, claim: Claim) -> Candidate | None:
     return groups[0].candidates[0] if groups else None
 
 
-def _columns(joint: Joint, one: Claim) -> list[Mapping[str, FloatArray]] | None:
+def _columns(one: Claim, runs: Sequence[RunSignals]) -> list[Mapping[str, FloatArray]] | None:
     """Return a cause's columns of every run; None where one is not finite."""
     columns = []
-    for k, run in enumerate(joint.runs):
+    for k, run in enumerate(runs):
         own = one.cause.columns(run)
         if own is None:
             return None
@@ -148,19 +162,11 @@ def _columns(joint: Joint, one: Claim) -> list[Mapping[str, FloatArray]] | None:
     return columns
 
 
-def _laid(
-    joint: Joint, held: Sequence[tuple[Claim, Sequence[Mapping[str, FloatArray]]]]
-) -> Iterator[Group]:
-    first, columns = held[0]
-    runs, k = len(joint.runs), next(iter(columns[0].values())).shape[1]
-    stacked = {}
-    for name in columns[0]:
-        most = int(joint.samples[name, "within"].max())
-        stacked[name] = np.zeros((runs, len(held), most, k))
-        for c, (_, own) in enumerate(held):
-            for r in range(runs):
-                stacked[name][r, c, : len(own[r][name])] = own[r][name]
-    laid = joint.projection.laid(stacked, _unit(first.cause))
+def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
+    first = held[0][0]
+    columns = _stacked(joint, [raw[1] for raw in held])
+    shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
+    laid = joint.projection.laid(columns, shaken, _unit(first.cause))
     if first.acts is not None:
         # what starts between runs also shifts their means, by its own offset
         laid = laid.without_means()
@@ -183,6 +189,48 @@ def _laid(
             for c, one in enumerate(chosen)
         ]
         yield Group(whole, laid, precision)
+
+
+def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, FloatArray]:
+    """Return equation to the columns of causes, shape (runs, causes, samples, k)."""
+    out = {}
+    for name in columns[0][0] if columns else ():
+        most, k = int(joint.samples[name, "within"].max()), columns[0][0][name].shape[1]
+        out[name] = np.zeros((len(joint.runs), len(columns), most, k))
+        for c, runs in enumerate(columns):
+            for r, own in enumerate(runs):
+                out[name][r, c, : len(own[name])] = own[name]
+    return out
+
+
+def _is_noisy(layout: Layout, claim: Claim) -> bool:
+    """Whether what a cause reads, or its derivative in some equation, has noise that counts."""
+    if not layout.shaken:
+        return False
+    if any(entry.order for entry in claim.cause.place.enters):
+        return True
+    names = {
+        signal(layout.runs[0], channel, entry.equation)
+        for channel in claim.cause.reads
+        for entry in claim.cause.place.enters
+    }
+    return any(_noise_share(layout, name) > QUIET for name in names)
+
+
+def _noise_share(layout: Layout, channel: str) -> float:
+    """Return the noise of a channel over its range in all runs."""
+    known = layout.runs[0].memo
+    key = ("noise share", channel)
+    if key not in known:
+        values = [run.on_grid(channel) for run in layout.runs]
+        noise = [
+            float(np.mean((shaken.on_grid(channel) - own) ** 2))
+            for shaken, own in zip(layout.shaken, values, strict=True)
+        ]
+        span = max(x.max() for x in values) - min(x.min() for x in values)
+        known[key] = np.array(np.sqrt(np.mean(noise)) / (span or 1.0))
+    found = known[key]
+    return 0.0 if found is None else float(found)
 
 
 def _unit(cause: Source | Function) -> Scale:

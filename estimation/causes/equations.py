@@ -75,6 +75,12 @@ class RunSignals:
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
 
+    def shaken(self) -> "RunSignals":
+        """Return the run with a second realisation of its readings' noise, without instruments."""
+        return replace(
+            self, channels={n: x + self.noise.get(n, 0.0) for n, x in self.channels.items()}
+        )
+
     @cached_property
     def memo(self) -> dict[object, FloatArray | None]:
         """Columns already worked out."""
@@ -197,6 +203,8 @@ class Layout:
         equations: Name to equation.
         runs: The runs, in the order they were recorded.
         measured: Channels that every run has.
+        shaken: The runs once more with each reading's noise added to it a second time, in the same
+            order, instruments included: how a column follows noise. Filled with the instruments.
         independent: Pairs of an effort and an equation that has it from other sensors than its own.
         undecided: Declared equation that is not laid out to the reason.
     """
@@ -204,13 +212,18 @@ class Layout:
     equations: Mapping[str, Equation]
     runs: Sequence[RunSignals]
     measured: tuple[str, ...]
+    shaken: list[RunSignals] = field(default_factory=list)
     independent: set[tuple[str, str]] = field(default_factory=set)
     undecided: Mapping[str, str] = field(default_factory=dict)
 
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
         kept = set(names)
-        return replace(self, runs=[run for run in self.runs if run.name in kept])
+        return replace(
+            self,
+            runs=[run for run in self.runs if run.name in kept],
+            shaken=[run for run in self.shaken if run.name in kept],
+        )
 
 
 def lay_out(

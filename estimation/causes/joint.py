@@ -43,6 +43,20 @@ class LeftOut(NamedTuple):
     base: FloatArray
 
 
+class Next(NamedTuple):
+    """Causes next to a base, with parameters.
+
+    Attributes:
+        laid: The causes.
+        amplitudes: Theirs in each run, shape (n, causes, k).
+        taken: What their columns take off the declared parameters, shape (n, causes, declared).
+    """
+
+    laid: Laid
+    amplitudes: FloatArray
+    taken: FloatArray
+
+
 class Joint:
     """The stacked regression of some runs. Causes that were accepted are part of its base.
 
@@ -70,13 +84,21 @@ class Joint:
         self._added, self.taken = np.zeros(0), np.zeros((self._declared_size, 0))
         self.tables, self.at, self.samples = self._laid_out(stacks)
         self.gram = self._products()
-        self._noise = self._noise_products()
+        noise = {
+            name: stacks.centred(
+                name,
+                stacks.stacked(name, [e.noise(r)[r.grid[r.used[name]]] for r in self.runs]),
+            )[0]
+            for name, e in layout.equations.items()
+        }
+        self._noise = self._noise_products(noise)
         self.error: Mapping[Part, float] = self._declared_error()
         self.declared = self.left_out(((),)).base[0]
         weights = self.weights
         self.projection = Projection(
             stacks,
             {e.name: [_instrumented(e, r) for r in self.runs] for e in layout.equations.values()},
+            noise,
             {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
         )
         self.power = sum(
@@ -201,52 +223,79 @@ class Joint:
                 else np.concatenate([parts[0], columns[:, 0], parts[1]], axis=2)
             )
         made.gram = made._products()
+        made._noise = {name: self._grown_noise(name, laid) for name in self._noise}
         made._prepare()
         return made
 
+    def _grown_noise(self, name: str, laid: Laid) -> FloatArray:
+        """Return an equation's noise products with those of one more cause before the target's."""
+        old, k = self._noise[name], laid.size.shape[1]
+        new = range(self.size, self.size + k)
+        kept = [*range(self.size), self.size + k]
+        out = np.zeros((len(old), self.size + k + 1, self.size + k + 1))
+        out[:, np.array(kept)[:, None], kept] = old
+        if name in laid.noise:
+            there = [*self._equations_at[name], -1]
+            out[:, np.array(there)[:, None], new] = laid.noise[name][:, 0]
+            out[:, np.array(new)[:, None], there] = laid.noise[name][:, 0].transpose(0, 2, 1)
+            out[:, np.array(new)[:, None], new] = laid.own_noise[name][:, 0]
+        return out
+
     # ---- noise of what is read
 
-    def _noise_products(self) -> Mapping[Part, FloatArray]:
+    def _noise_products(self, noise: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
         """Return the noise in the cross-products within runs; the target's own is left in."""
         size = self._declared_size + 1
         out = {}
-        for name, equation in self.layout.equations.items():
+        for name, table in noise.items():
             places = np.array([*self._equations_at[name], size - 1])
-            out[name, "within"] = np.zeros((len(self.runs), size, size))
-            for r, run in enumerate(self.runs):
-                noise = equation.noise(run)[run.grid[run.used[name]]]
-                kept = [*np.flatnonzero(noise[:, :-1].any(axis=0)), -1]
-                product = noise[:, kept].T @ noise[:, kept]
+            kept = [*np.flatnonzero(table[..., :-1].any(axis=(0, 1))), -1]
+            inner = np.ix_(places[kept], places[kept])
+            out[name] = np.zeros((len(self.runs), size, size))
+            for r, own in enumerate(table[..., kept]):
+                product = own.T @ own
                 product[-1, -1] = 0.0
-                inner = np.ix_(places[kept], places[kept])
-                out[name, "within"][r][inner] = _at_most(
-                    product, self.gram[name, "within"][r][inner]
-                )
+                out[name][r][inner] = _at_most(product, self.gram[name, "within"][r][inner])
         return out
 
-    def avoided(self, part: Part, runs: NDArray[np.intp], own: FloatArray) -> FloatArray:
-        """Return the error that is missing because a noisy reading got a smaller amplitude.
+    def avoided(
+        self,
+        part: Part,
+        runs: NDArray[np.intp],
+        base: FloatArray,
+        next_to: "Next | None" = None,
+    ) -> FloatArray:
+        """Return the error that is missing because less of the readings' noise is in a residual.
 
-        A cause that stands in for a noisy reading removes that reading's noise. The
+        A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
         error that it removes so is put back.
 
         Args:
             part: Of the regression.
             runs: Numbers of the runs, shape (n,).
-            own: Amplitudes of the declared columns, whole ones, shape (n, causes, declared).
+            base: Parameters of the base, shape (n, causes, base).
+            next_to: Causes next to the base.
 
         Returns:
             Squared error, shape (n, causes).
         """
-        if part[1] == "between":
-            return np.zeros(own.shape[:-1])
-        noise = self._noise[part][runs]
-
-        def shown(own: FloatArray) -> FloatArray:
-            squared = ((own @ noise[:, :-1, :-1]) * own).sum(-1)
-            return np.asarray(squared - 2.0 * (own @ noise[:, :-1, -1:])[..., 0])
-
-        return np.maximum(shown(np.broadcast_to(self.declared, own.shape)) - shown(own), 0.0)
+        name, kind = part
+        if kind == "between":
+            return np.zeros(base.shape[:-1])
+        noise, whole = self._noise[name][runs], self.whole(base)
+        if next_to is not None:
+            whole = whole - next_to.taken
+        target = np.full((*whole.shape[:-1], 1), -1.0)
+        now = np.concatenate([whole, base[..., self._declared_size :], target], axis=-1)
+        usual = np.concatenate([self.declared, np.zeros(len(self._added)), [-1.0]])
+        left = ((now @ noise) * now).sum(axis=-1)
+        if next_to is not None and name in next_to.laid.noise:
+            laid, amplitudes = next_to.laid, next_to.amplitudes
+            there = now[..., [*self._equations_at[name], -1]]
+            follows = (there[:, :, None] @ laid.noise[name][runs])[:, :, 0]
+            itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
+            left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
+        return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
 
     def whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
@@ -286,7 +335,7 @@ class Joint:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for p in self.parts:
                 own = np.einsum("ri,rij,rj->r", vector, self.gram[p][fits.runs], vector)
-                avoided = self.avoided(p, fits.runs, self.whole(base)[:, None])[:, 0]
+                avoided = self.avoided(p, fits.runs, base[:, None])[:, 0]
                 found[p][fits.runs] = np.maximum(own, 0.0) + avoided
             out.append(found)
         return out

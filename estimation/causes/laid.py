@@ -26,12 +26,17 @@ class Laid:
         means: Equation to the runs' means, shape (runs, causes, k).
         taken: Equation to how much of each declared column was taken off, (causes, declared, k).
         size: What the columns were divided by, shape (causes, k).
+        noise: Equation to the products of the noise that the columns follow with that of the
+            declared columns and, last, of the target: shape (runs, causes, declared + 1, k).
+        own_noise: Equation to the products of that noise with itself, (runs, causes, k, k).
     """
 
     inner: Mapping[str, FloatArray]
     means: Mapping[str, FloatArray]
     taken: Mapping[str, FloatArray]
     size: FloatArray
+    noise: Mapping[str, FloatArray]
+    own_noise: Mapping[str, FloatArray]
 
     def __len__(self) -> int:
         return len(self.size)
@@ -43,6 +48,8 @@ class Laid:
             {name: x[:, chosen] for name, x in self.means.items()},
             {name: x[chosen] for name, x in self.taken.items()},
             self.size[chosen],
+            {name: x[:, chosen] for name, x in self.noise.items()},
+            {name: x[:, chosen] for name, x in self.own_noise.items()},
         )
 
     def without_means(self) -> "Laid":
@@ -93,6 +100,7 @@ class Projection:
     Args:
         samples: How samples are stacked.
         declared: Equation to the declared columns of instrumented signals, of every run.
+        noise: Equation to the noise of the declared columns and of the target, of every run.
         weights: Equation to the weights of one squared residual within runs and between them.
     """
 
@@ -100,9 +108,10 @@ class Projection:
         self,
         samples: Stacks,
         declared: Mapping[str, Sequence[FloatArray]],
+        noise: Mapping[str, FloatArray],
         weights: Mapping[str, tuple[float, float]],
     ) -> None:
-        self.samples, self.weights = samples, weights
+        self.samples, self.noise, self.weights = samples, noise, weights
         self._inner, self._means, self._inverse = {}, {}, {}
         for name, columns in declared.items():
             stacked = samples.stacked(name, columns)
@@ -114,16 +123,22 @@ class Projection:
             self._inner[name], self._means[name] = inner, means
             self._inverse[name] = inverse(gram)
 
-    def laid(self, columns: Mapping[str, FloatArray], unit: Scale) -> Laid:
+    def laid(
+        self, columns: Mapping[str, FloatArray], shaken: Mapping[str, FloatArray], unit: Scale
+    ) -> Laid:
         """Return causes without what the declared columns explain.
 
         Args:
             columns: Equation to the causes' columns, shape (runs, causes, samples, k), changed in
                 place.
+            shaken: The same with each reading's noise added a second time, changed in place.
             unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
         """
         inners, middles, taken = {}, {}, {}
         norm: FloatArray = np.zeros(())
+        for name, stacked in shaken.items():
+            stacked -= columns[name]
+            self.samples.centred(name, stacked)
         for name, stacked in columns.items():
             within, between = self.weights[name]
             inner, means = self.samples.centred(name, stacked)
@@ -139,15 +154,21 @@ class Projection:
             middles[name] = means - np.einsum("ri,cik->rck", middle, slope)
         if unit == "none":
             first = next(iter(columns.values()))
-            return Laid(inners, middles, taken, np.ones((first.shape[1], first.shape[3])))
-        size = np.sqrt(norm) + TINY
+            size = np.ones((first.shape[1], first.shape[3]))
+        else:
+            size = np.sqrt(norm) + TINY
         if unit == "first":
             size = np.repeat(size[:, :1], size.shape[1], axis=1)
-        for name, inner in inners.items():
-            inner /= size[:, None]
-            middles[name] /= size
-            taken[name] = taken[name] / size[:, None]
-        return Laid(inners, middles, taken, size)
+        if unit != "none":
+            for name, inner in inners.items():
+                inner /= size[:, None]
+                middles[name] /= size
+                taken[name] = taken[name] / size[:, None]
+        for noise in shaken.values():
+            noise /= size[:, None]
+        across = {n: self.noise[n].transpose(0, 2, 1)[:, None] @ x for n, x in shaken.items()}
+        own = {n: x.transpose(0, 1, 3, 2) @ x for n, x in shaken.items()}
+        return Laid(inners, middles, taken, size, across, own)
 
 
 def inverse(gram: FloatArray) -> FloatArray:

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.causes.candidates import Candidate
@@ -195,8 +194,8 @@ def _judged(
         likely = family_probabilities(ranked, numbers)
         scored = likely[0].best
         cause = scored.candidate.cause
-        gain = held_out.gain([k.scored.candidate for k in kept], scored.candidate)
-        if float(np.exp(min(numbers.sharpness * gain, 300.0))) < numbers.kept_evidence:
+        evidence = held_out.evidence([k.scored.candidate for k in kept], scored.candidate)
+        if evidence < numbers.kept_evidence:
             notes.append(
                 f"{cause.family} ({cause.place.name}) was found in the training runs and not"
                 " confirmed on the test runs."
