@@ -35,7 +35,7 @@ class Numbers:
     sharpness: float = 12.0
     choice_price: float = 0.02
     cause_cost: float = 0.08
-    function_cost: float = 0.08
+    function_cost: float = 0.16
     kept_evidence: float = 20.0
 
 

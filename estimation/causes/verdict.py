@@ -142,6 +142,8 @@ def answer(
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
     layout = lay_out(models, timed, sealed.discover)
+    timed = [r for r in timed if r.name not in layout.left_out]
+    sealed = sealed.without(layout.left_out)
     add_instruments(layout, sealed.discover)
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
@@ -362,6 +364,7 @@ def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> 
             f"{len(sealed.discover)} training runs: with fewer than {LEAST_TO_NAME} no effect is"
             " named."
         )
+    found += [f"Left out: {reason}" for reason in layout.left_out.values()]
     found += [
         f"All training runs are at one level of {condition}: an effect that depends on it cannot"
         " be distinguished from one that does not."
