@@ -52,7 +52,7 @@ def test_an_asymmetric_loss_is_identified_and_lowers_the_error_on_test_runs() ->
 
 def test_a_run_with_too_few_samples_is_left_out_with_a_note() -> None:
     runs = recordings(_asymmetric)
-    runs[3] = runs[3].slice_time(0.0, 0.8)
+    runs[3] = runs[3].slice_time(0.0, 0.3)
     answer = diagnose(runs, [motor()], split(runs))
     assert [f.family for f in answer.findings] == ["friction.viscous_asymmetry"]
     assert any("Left out" in note and "'03'" in note for note in answer.notes)
