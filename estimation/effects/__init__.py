@@ -22,6 +22,7 @@ __all__ = [
     "UnknownEffectError",
     "catalogue",
     "effect",
+    "families",
 ]
 
 
@@ -71,6 +72,12 @@ def _unusable(entry: EntryPoint, why: str) -> UnknownEffectError:
         f"Its entry point is {entry.value}.",
         f"Correct {package}, or remove it.",
     )
+
+
+def families() -> tuple[str, ...]:
+    """Return the families that a diagnosis may report; the last one is `unknown`."""
+    found = {kind.family for kind in catalogue().values() if kind.balances}
+    return (*sorted(found), "unknown")
 
 
 def effect(name: str) -> Effect:

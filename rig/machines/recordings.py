@@ -28,7 +28,7 @@ def open_recordings(
     Raises:
         UsageError: The path does not exist, or the format is not known.
         DataError: The recordings cannot be read.
-        NoPlantError: There is no such machine.
+        NoPlantError: No such machine.
     """
     if machine is None or format_name is not None or LogImporter().recognises(path):
         return open_campaign(path, format_name, skip_bad)

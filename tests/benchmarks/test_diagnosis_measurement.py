@@ -24,14 +24,14 @@ from benchmarks.diagnosis.ratio import errors_without
 from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
+from benchmarks.varied import DEVELOP, JUDGE, HiddenTruth
+from benchmarks.varied import Truth as VariedTruth
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.result import FAMILIES
+from estimation.effects import families
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
-from rig.simulation.varied import DEVELOP, JUDGE, HiddenTruth
-from rig.simulation.varied import Truth as VariedTruth
 
 pytestmark = pytest.mark.integration
 
@@ -61,7 +61,7 @@ def test_every_hidden_effect_has_an_answer() -> None:
 def test_every_family_is_hidden_in_some_case_or_cannot_be() -> None:
     hidden_ = {truth.family for truth in CATALOGUED.values()}
     assert not hidden_ & NOT_HIDDEN.keys()
-    assert hidden_ | NOT_HIDDEN.keys() == set(FAMILIES)
+    assert hidden_ | NOT_HIDDEN.keys() == set(families())
 
 
 def test_what_comes_or_fades_does_so_from_run_to_run() -> None:

@@ -1,0 +1,152 @@
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.varied import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
+from benchmarks.varied.plant import draw_plant
+from benchmarks.varied.residual import EQUATIONS, Fitted, Prepared, fit, prepare
+from estimation.recording import Recording
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
+
+pytestmark = pytest.mark.integration
+
+FIRST = DEVELOP.start
+
+
+@cache
+def case_of(kind: str, seed: int = FIRST) -> Case:
+    return draw(seed, kind)
+
+
+def prepared(case: Case, recordings: tuple[Recording, ...]) -> list[Prepared]:
+    return [prepare(recording, case.stage.plant.ratio) for recording in recordings]
+
+
+def left(case: Case, recordings: tuple[Recording, ...]) -> dict[str, Fitted]:
+    runs = prepared(case, recordings)
+    return {equation: fit(runs, equation) for equation in EQUATIONS}
+
+
+def test_a_seed_and_kind_give_the_same_samples_every_time() -> None:
+    one, other = draw(FIRST, "strong"), case_of("strong")
+    for first, second in zip(one.recordings, other.recordings, strict=True):
+        assert first.conditions == second.conditions
+        for name in first.columns:
+            np.testing.assert_array_equal(first[name], second[name])
+
+
+def test_seeds_differ_in_rig_protocol_and_effect() -> None:
+    cases = [case_of("strong", FIRST + k) for k in range(3)]
+    assert len({case.stage.plant.ratio for case in cases}) == 3
+    assert len({case.stage.protocol for case in cases}) == 3
+    assert len({case.truth.effects[0].recipe for case in cases}) == 3
+
+
+def test_rigs_vary_over_factors() -> None:
+    plants = [draw_plant(np.random.default_rng(k)) for k in range(20)]
+    for name in ("ratio", "constant", "gear_stiffness", "cable_stiffness", "motor_inertia"):
+        values = [getattr(plant, name) for plant in plants]
+        assert max(values) > 10.0 * min(values), name
+
+
+@pytest.mark.parametrize(("kind", "low", "high"), [("strong", 2.2, 5.0), ("weak", 1.25, 1.9)])
+def test_the_stated_strength_is_what_the_declared_model_shows(
+    kind: str, low: float, high: float
+) -> None:
+    case = case_of(kind)
+    (effect,) = case.truth.effects
+    without, with_it = left(case, tuple(case.twin)), left(case, case.recordings)
+    ratio = with_it[effect.equation].rms(effect.runs) / without[effect.equation].rms(effect.runs)
+    assert ratio == pytest.approx(effect.strength, rel=1e-6)
+    assert low <= ratio <= high
+    for equation in EQUATIONS:
+        assert case.truth.clean_rms[equation] == pytest.approx(without[equation].rms())
+
+
+def test_the_true_structure_leaves_what_the_clean_twin_leaves() -> None:
+    case = case_of("strong")
+    (effect,) = case.truth.effects
+    runs = prepared(case, case.recordings)
+    oracle = fit(runs, effect.equation, case.truth.columns[effect.equation])
+    clean = case.truth.clean_rms[effect.equation]
+    assert oracle.rms() < 1.1 * clean
+    assert case.truth.with_rms[effect.equation] > 2.0 * clean
+
+
+def test_a_clean_residual_is_the_noise_of_its_sensors() -> None:
+    case = case_of("clean", FIRST + 1)
+    assert not case.truth.effects
+    stage = case.stage
+    noisy = left(case, case.recordings)
+    silent = left(case, tuple(stage.record(k, silent=True) for k in stage.every))
+    for equation in EQUATIONS:
+        assert silent[equation].rms() < 0.4 * noisy[equation].rms()
+
+
+def test_an_effect_of_some_runs_is_in_these_alone() -> None:
+    case = case_of("some_runs")
+    (effect,) = case.truth.effects
+    twin, there = tuple(case.twin), set(effect.runs)
+    assert 0 < len(there) < len(twin)
+    for k, (clean, recording) in enumerate(zip(twin, case.recordings, strict=True)):
+        same = all(np.array_equal(clean[name], recording[name]) for name in clean.columns)
+        assert same != (k in there)
+
+
+def test_a_pair_holds_two_families() -> None:
+    first, second = case_of("pair").truth.effects
+    assert first.family != second.family
+
+
+def test_a_confounded_case_states_the_families_that_cannot_be_separated() -> None:
+    truth = case_of("confounded").truth
+    assert len(truth.together) >= 2
+    assert truth.effects[0].family in truth.together
+
+
+def test_an_effect_outside_the_catalogue_has_no_name_but_variables() -> None:
+    (effect,) = case_of("outside").truth.effects
+    assert effect.family == "unknown"
+    assert effect.variables
+
+
+def test_a_faulty_sensor_does_not_move_the_plant() -> None:
+    faulty = (case_of("strong", FIRST + k) for k in range(14))
+    case = next(c for c in faulty if c.truth.effects[0].family.startswith("sensor."))
+    others = list(next(iter(case.twin)).columns)
+    for clean, recording in zip(case.twin, case.recordings, strict=True):
+        changed = [n for n in others if not np.array_equal(clean[n], recording[n])]
+        assert len(changed) == 1
+
+
+def test_written_logs_read_back_equal(tmp_path: Path) -> None:
+    case = case_of("clean", FIRST + 1)
+    read = list(open_campaign(case.write(tmp_path / "runs")))
+    assert [r.name for r in read] == [r.name for r in case.recordings]
+    for one, other in zip(case.recordings, read, strict=True):
+        assert one.conditions == other.conditions
+        assert one.started_at_ns == other.started_at_ns
+        np.testing.assert_array_equal(one.time_s, other.time_s)
+        for name in one.columns:
+            np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_ranges_of_seeds_are_apart() -> None:
+    for one, other in ((CALIBRATE, DEVELOP), (DEVELOP, JUDGE), (CALIBRATE, JUDGE)):
+        assert not any(seed in other for seed in (one[0], one[-1]))
+        assert not any(seed in one for seed in (other[0], other[-1]))
+    assert [part_of(r[0]) for r in (CALIBRATE, DEVELOP, JUDGE)] == ["calibrate", "develop", "judge"]
+
+
+def test_a_seed_of_no_range_and_an_unknown_kind_are_refused() -> None:
+    with pytest.raises(UsageError):
+        draw(-1, "strong")
+    with pytest.raises(UsageError):
+        draw(FIRST, "huge")
+
+
+def test_a_given_gear_ratio_is_kept() -> None:
+    assert draw(FIRST, "clean", gear_ratio=35.0).stage.plant.ratio == 35.0
