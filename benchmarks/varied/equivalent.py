@@ -14,12 +14,11 @@ from scipy import optimize
 
 from benchmarks.varied import residual
 from benchmarks.varied.residual import EQUATIONS, GEARBOX, Fitted, Prepared
-from estimation.candidates import candidates
 from estimation.derived import zero_phase_channels
 from estimation.effects import Remembering
-from estimation.effects.roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.model import Term
 from estimation.recording import FloatArray, Recording
+from rig.simulation.reference_roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, candidates
 
 POINTS = 25
 """Most points of a family's shapes that are tried."""
