@@ -17,7 +17,6 @@ import numpy as np
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import check_change, check_levels
-from calibration.record import Fit
 from calibration.regression import Regression, regress
 from calibration.sessions.motion import moves, need_channel, steady
 from estimation.recording import FloatArray
@@ -98,13 +97,7 @@ class DriveCurrentSession:
             if constant is None
             else f"{friction * constant:.3g} N m by the data sheet's constant",
         }
-        fit = Fit(
-            "driver",
-            {"gain_a": float(driver.values[0]), "offset_a": float(driver.values[1])},
-            driver.nested(),
-            driver.residual_rms,
-            int(currents.size),
-        )
+        fit = driver.as_fit("driver", "gain_a", "offset_a")
         series = {
             m.recording.name: (run["spindle_velocity_rad_s"], left * 1e3)
             for m, run, left in zip(measurements, runs, turning.residuals, strict=True)

@@ -5,10 +5,10 @@ rig, its controller and sensors, the protocol and the form of what is hidden are
 seed, over factors; a form is a random function, so no case repeats another's formula.
 """
 
-from benchmarks.varied.case import Case, NoCaseError, draw
-from benchmarks.varied.recipes import KINDS
-from benchmarks.varied.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
-from benchmarks.varied.truth import HiddenTruth, Truth
+from rig.simulation.varied.case import Case, NoCaseError, draw
+from rig.simulation.varied.recipes import KINDS
+from rig.simulation.varied.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
+from rig.simulation.varied.truth import HiddenTruth, Truth
 
 __all__ = [
     "CALIBRATE",

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.varied.drawn import Drawn, Ranges, Recipe
-from benchmarks.varied.forms import Random, Table, bend, course, falling, grid, rising, smooth
-from benchmarks.varied.hidden import BANK, Hidden
-from benchmarks.varied.plant import Plant, over
 from estimation.recording import FloatArray
+from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
+from rig.simulation.varied.forms import Random, Table, bend, course, falling, grid, rising, smooth
+from rig.simulation.varied.hidden import BANK, Hidden
+from rig.simulation.varied.plant import Plant, over
 
 Form = Callable[[FloatArray], FloatArray]
 Drawer = Callable[[Random, Ranges], Table]

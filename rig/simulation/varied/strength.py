@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.varied import residual
-from benchmarks.varied.faults import Fault
-from benchmarks.varied.hidden import Hidden
-from benchmarks.varied.residual import EQUATIONS, Fitted, Prepared
-from benchmarks.varied.stage import Stage, Switched, UnstableError
+from rig.simulation.varied import residual
+from rig.simulation.varied.faults import Fault
+from rig.simulation.varied.hidden import Hidden
+from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared
+from rig.simulation.varied.stage import Stage, Switched, UnstableError
 
 SHOWN = {
     "motor": ("motor",),

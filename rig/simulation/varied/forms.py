@@ -21,7 +21,7 @@ class Table:
     """A function of one variable.
 
     Attributes:
-        variable: Name from `benchmarks.varied.hidden.VARIABLES`.
+        variable: Name from `rig.simulation.varied.hidden.VARIABLES`.
         low: First point of the grid.
         high: Last point.
         values: Shape (`POINTS`,).

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.varied.forms import Table
 from estimation.recording import FloatArray
+from rig.simulation.varied.forms import Table
 
 VARIABLES = (
     "one",

@@ -21,9 +21,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from benchmarks.varied import hidden
 from rig.simulation import plant as reference
 from rig.simulation.plant import TICK_S, braking, clip
+from rig.simulation.varied import hidden
 
 (
     MOTOR_ANGLE,

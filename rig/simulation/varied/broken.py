@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from benchmarks.varied.drawn import Drawn, Ranges, Recipe, order_over
-from benchmarks.varied.faults import Fault
-from benchmarks.varied.forms import POINTS, Random, Table, course, grid, wave
-from benchmarks.varied.frictions import power
-from benchmarks.varied.plant import Plant, over
+from rig.simulation.varied.drawn import Drawn, Ranges, Recipe, order_over
+from rig.simulation.varied.faults import Fault
+from rig.simulation.varied.forms import POINTS, Random, Table, course, grid, wave
+from rig.simulation.varied.frictions import power
+from rig.simulation.varied.plant import Plant, over
 
 TURN = 2.0 * np.pi
 PLACES = {
