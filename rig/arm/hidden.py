@@ -1,4 +1,4 @@
-"""Hidden torque of an arm's joints by families of effects, each joint with a form drawn anew.
+"""Hidden torque of an arm's joints by families of effects, each joint with a form of its own.
 
 The recipes are those of the simulated rigs (`rig.simulation.varied`): tables of random functions
 and banks of elements with memory, so the form of a hidden effect is drawn, not written. A joint
