@@ -1,6 +1,4 @@
-"""How often the intervals of state estimators hold: on runs, frequencies and loads left out, and
-adapted to another instrument.
-"""
+"""How often the intervals of state estimators hold, where they were not fitted."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
