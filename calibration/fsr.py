@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import ArrayLike
 from scipy import stats
 
-from calibration.errors import CalibrationError
+from calibration.fsr_curve import FsrCurve, is_monotone
 from calibration.quality import (
     BadDataError,
     check_change,
@@ -23,20 +22,14 @@ from calibration.quality import (
     check_rails,
     finite,
 )
-from calibration.record import Fit
 from estimation.recording import FloatArray
 
 MINIMUM_RUNS = 3
 MINIMUM_POINTS = 60
 HYSTERESIS_BINS = 10
+HIGHEST_DEGREE = 5
 WORTH = 0.05
 """A higher degree must lower the error on runs left out by more than this share to be taken."""
-BISECTIONS = 60
-"""Halvings of the voltage range in the inverse: more than a double has bits."""
-
-
-class FsrRangeError(CalibrationError):
-    """A voltage or a force outside what was calibrated."""
 
 
 @dataclass(frozen=True)
@@ -61,104 +54,6 @@ class FsrRun:
             raise BadDataError("points", f"{self.name}: columns of unequal length, or empty.")
         if not (np.diff(columns[0]) > 0).all():
             raise BadDataError("points", f"{self.name}: time does not rise.")
-
-
-def is_monotone(coefficients: Sequence[float] | FloatArray, low: float, high: float) -> bool:
-    """Return whether a polynomial, lowest power first, rises everywhere from low to high."""
-    slope = polynomial.polyder(np.asarray(coefficients, dtype=np.float64))
-    bends = polynomial.polyroots(polynomial.polytrim(polynomial.polyder(slope)))
-    inside = [x.real for x in bends if abs(x.imag) < 1e-9 and low < x.real < high]
-    return bool((polynomial.polyval(np.array([low, high, *inside]), slope) > 0).all())
-
-
-@dataclass(frozen=True)
-class FsrCurve:
-    """Force over voltage, F = c0 + c1 x + c2 x^2 + ..., x in V and F in N.
-
-    Attributes:
-        coefficients: c0, c1, ...
-        low_v: Least voltage it holds for.
-        high_v: Greatest voltage it holds for.
-        covariance: Of the coefficients, shape (p, p); empty if unknown.
-        residual_rms_n: Root mean square residual, N; NaN if unknown.
-        runs: Number of runs fitted on.
-        points: Number of samples fitted on.
-    """
-
-    coefficients: tuple[float, ...]
-    low_v: float
-    high_v: float
-    covariance: tuple[tuple[float, ...], ...] = ()
-    residual_rms_n: float = float("nan")
-    runs: int = 0
-    points: int = 0
-
-    def __post_init__(self) -> None:
-        if not (self.low_v < self.high_v and np.isfinite(self.coefficients).all()):
-            raise CalibrationError("A curve has finite coefficients and a range from low to high.")
-        if not is_monotone(self.coefficients, self.low_v, self.high_v):
-            raise BadDataError(
-                "not_monotone",
-                f"The polynomial of degree {len(self.coefficients) - 1} falls somewhere between "
-                f"{self.low_v:g} and {self.high_v:g} V.",
-                "One voltage must mean one force, and more voltage more force.",
-                "Choose a lower degree, or check the sign of the force.",
-            )
-
-    def force_n(self, fsr_v: ArrayLike) -> FloatArray:
-        """Return the force at voltages, any shape.
-
-        Raises:
-            FsrRangeError: One lies outside the range.
-        """
-        volts = np.asarray(fsr_v, dtype=np.float64)
-        _refuse_outside(volts, self.low_v, self.high_v, "V")
-        return np.asarray(polynomial.polyval(volts, np.array(self.coefficients)))
-
-    def fsr_v(self, force_n: ArrayLike) -> FloatArray:
-        """Return the voltage at forces, any shape: the inverse, by bisection.
-
-        Raises:
-            FsrRangeError: One lies outside the range.
-        """
-        forces = np.asarray(force_n, dtype=np.float64)
-        ends = self.force_n([self.low_v, self.high_v])
-        _refuse_outside(forces, float(ends[0]), float(ends[1]), "N")
-        low, high = np.full(forces.shape, self.low_v), np.full(forces.shape, self.high_v)
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            is_below = self.force_n(middle) < forces
-            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
-        return np.asarray((low + high) / 2)
-
-    def interval_n(self, fsr_v: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Return the interval of one force at voltages, any shape.
-
-        It is Student's with as many degrees of freedom as runs less one: samples of one run share
-        its errors.
-
-        Raises:
-            FsrRangeError: One lies outside the range.
-            CalibrationError: The curve comes without a covariance.
-        """
-        if not self.covariance:
-            raise CalibrationError("The curve comes without a covariance, so it has no interval.")
-        force = self.force_n(fsr_v)
-        powers = polynomial.polyvander(np.asarray(fsr_v, float), len(self.coefficients) - 1)
-        curve = np.einsum("...i,ij,...j->...", powers, np.array(self.covariance), powers)
-        spread = np.sqrt(np.maximum(curve, 0.0) + self.residual_rms_n**2)
-        half = float(stats.t.ppf((1 + level) / 2, self.runs - 1)) * spread
-        return force - half, force + half
-
-    def as_fit(self) -> Fit:
-        """Return it as a calibration record keeps it."""
-        names = {f"c{k}": value for k, value in enumerate(self.coefficients)}
-        rms = None if np.isnan(self.residual_rms_n) else self.residual_rms_n
-        return Fit("polynomial", names, self.covariance, rms, self.points)
-
-
-ZHANG_2022 = FsrCurve((0.105, 2.57, -4.63, 3.71), 0.0, 1.0)
-"""Equation 5 of Zhang et al. 2022; x from 0 to 1 V."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +95,6 @@ def fit_fsr(
     *,
     force_at_zero_n: float | None = None,
     rail_v: float = 1.0,
-    max_degree: int = 5,
     hysteresis_limit: float = 0.15,
     drift_limit: float = 0.05,
 ) -> FsrResult:
@@ -212,7 +106,6 @@ def fit_fsr(
             within one standard error of the runs' differences, or within 5 %, of the least.
         force_at_zero_n: Force at 0 V, held fixed; fitted if None.
         rail_v: Upper end of the amplifier's range.
-        max_degree: Greatest degree to try.
         hysteresis_limit: Greatest hysteresis that passes, share of the span of force.
         drift_limit: Greatest drift from first to last run that passes, share of the span of force.
 
@@ -225,7 +118,7 @@ def fit_fsr(
     if hysteresis is not None:
         fix = "Condition the sensor by loading it to 110 % several times, and press more slowly."
         check_limit("hysteresis", hysteresis, hysteresis_limit, "Hysteresis", fix)
-    tried = range(1, max_degree + 1) if degree is None else (degree,)
+    tried = range(1, HIGHEST_DEGREE + 1) if degree is None else (degree,)
     errors = {}
     for d in tried:
         whole = _solve(volts, forces, d, force_at_zero_n)
@@ -348,9 +241,9 @@ def _lowest_as_good(errors: dict[int, FloatArray]) -> int:
     best = min(errors, key=lambda d: float(errors[d].mean()))
     for degree in sorted(errors):
         worse = errors[degree] - errors[best]
-        is_told_apart = worse.mean() > worse.std(ddof=1) / np.sqrt(worse.size)
+        differs = worse.mean() > worse.std(ddof=1) / np.sqrt(worse.size)
         is_worth_it = np.sqrt(errors[degree].mean()) > (1 + WORTH) * np.sqrt(errors[best].mean())
-        if not (is_told_apart and is_worth_it):
+        if not (differs and is_worth_it):
             return degree
     return best
 
@@ -384,13 +277,3 @@ def _curve(runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None) -
 
 def _mean_residual(curve: FsrCurve, run: FsrRun) -> float:
     return float(np.mean(run.force_n - curve.force_n(run.fsr_v)))
-
-
-def _refuse_outside(values: FloatArray, low: float, high: float, unit: str) -> None:
-    outside = ~((values >= low) & (values <= high))
-    if outside.any():
-        raise FsrRangeError(
-            f"{int(outside.sum())} of {values.size} values lie outside {low:g} .. {high:g} {unit}.",
-            "A polynomial is not valid beyond the calibrated range.",
-            "Calibrate over a wider range, or exclude those samples.",
-        )

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.fsr import Creep, FsrCurve, FsrRun
+from calibration.fsr import Creep, FsrRun
+from calibration.fsr_curve import FsrCurve
 from estimation.recording import FloatArray
 
 CREEP_START_S = 0.1

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import stats
 
 from calibration.quality import BadDataError, check_limit, check_points
+from calibration.record import Fit
 from estimation.recording import FloatArray
 
 Run = tuple[FloatArray, FloatArray]
@@ -37,9 +38,16 @@ class Regression:
         freedom = max(1, len(self.residuals) - 1)
         return np.asarray(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(np.diag(self.covariance)))
 
-    def nested(self) -> tuple[tuple[float, ...], ...]:
-        """Return the covariance as a record keeps it."""
-        return tuple(map(tuple, self.covariance.tolist()))
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return sum(residual.size for residual in self.residuals)
+
+    def as_fit(self, form: str, *names: str) -> Fit:
+        """Return it as a calibration record keeps it, its coefficients by name."""
+        parameters = dict(zip(names, self.values.tolist(), strict=True))
+        covariance = tuple(map(tuple, self.covariance.tolist()))
+        return Fit(form, parameters, covariance, self.residual_rms, self.size)
 
 
 def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:

@@ -252,35 +252,3 @@ def arrival_fit(
             break
         line = _straight(device_s[early], host_s[early], np.inf)
     return line
-
-
-@dataclass(frozen=True, slots=True)
-class Alignment:
-    """Streams of several devices on the host's time.
-
-    Attributes:
-        host_s: Host times of each device's samples, s, by device.
-        residual_s: Residual of each device's line, s, by device.
-    """
-
-    host_s: dict[str, NDArray[np.float64]]
-    residual_s: dict[str, float]
-
-
-def align(device_s: dict[str, NDArray[np.float64]], lines: dict[str, ClockLine]) -> Alignment:
-    """Put the device times of several devices on the host's time base.
-
-    Args:
-        device_s: Device times, s, by device.
-        lines: The line of each device.
-
-    Raises:
-        ClockError: A device has no line.
-    """
-    missing = sorted(set(device_s) - set(lines))
-    if missing:
-        raise ClockError(f"The clock of {', '.join(missing)} is not known.")
-    return Alignment(
-        {name: lines[name].to_host(times) for name, times in device_s.items()},
-        {name: lines[name].residual_s for name in device_s},
-    )

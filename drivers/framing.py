@@ -14,25 +14,15 @@ Networking 7(2), 1999. CRC: polynomial 0x1021, start 0xFFFF, not reflected, no f
 
 from binascii import crc_hqx
 from dataclasses import dataclass
-from functools import lru_cache
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import framing_compiled as compiled
 from drivers.errors import FrameError
+from drivers.framing_compiled import CRC_SIZE, CRC_START, MAX_BLOCK, MAX_WIRE
 
 DELIMITER = b"\x00"
-CRC_START = 0xFFFF
-CRC_SIZE = 2
-MAX_BLOCK = 254
-"""Most bytes COBS carries behind one code byte."""
-MAX_PAYLOAD = 1024
-"""Longest payload a board takes or sends; longer frames are noise."""
-MAX_BULK_PAYLOAD = MAX_BLOCK - CRC_SIZE
-"""Longest payload of the bulk path: one code byte of overhead, whatever the content."""
-MAX_WIRE = MAX_PAYLOAD + CRC_SIZE + (MAX_PAYLOAD + CRC_SIZE) // MAX_BLOCK + 1
-"""Longest frame on the wire, without its delimiter."""
 
 
 def crc16(data: bytes) -> int:
@@ -43,7 +33,7 @@ def crc16(data: bytes) -> int:
 def cobs_encode(data: bytes) -> bytes:
     """Return `data` stuffed so that it holds no zero byte, without a delimiter."""
     encoded = np.empty(len(data) + len(data) // MAX_BLOCK + 1, np.uint8)
-    size = _cobs_encode(np.frombuffer(data, np.uint8), encoded)
+    size = compiled.cobs_encode(np.frombuffer(data, np.uint8), encoded)
     return encoded[:size].tobytes()
 
 
@@ -54,7 +44,7 @@ def cobs_decode(encoded: bytes) -> bytes:
         FrameError: A zero byte inside, or a block that runs past the end.
     """
     data = np.empty(len(encoded), np.uint8)
-    size = _cobs_decode(np.frombuffer(encoded, np.uint8), data)
+    size = compiled.cobs_decode(np.frombuffer(encoded, np.uint8), data)
     if size < 0:
         raise FrameError("A frame is not COBS.", "Bytes were lost or changed on the link.")
     return data[:size].tobytes()
@@ -106,17 +96,17 @@ def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
         data: Bytes as received, starting at a frame's start.
         payload_size: Size of the frequent frames' payload, bytes, 0 to `MAX_BULK_PAYLOAD`.
     """
-    tables, start = _crc_tables(payload_size)
+    tables, start = compiled.crc_tables(payload_size)
     stream = np.frombuffer(data, np.uint8)
     ends = np.flatnonzero(stream == 0)
     room = len(data) // (payload_size + CRC_SIZE + 2)
     payloads = np.empty(room * payload_size, np.uint8)
     crcs = np.empty(room, np.uint16)
     spans = np.empty((len(ends), 2), np.int64)
-    whole, bad, bad_bytes, found = _unstuff(
-        stream, ends, payload_size, MAX_WIRE, payloads, crcs, spans
+    whole, bad, bad_bytes, found = compiled.unstuff(
+        stream, ends, payload_size, payloads, crcs, spans
     )
-    good = _keep_good(payloads, whole, payload_size, crcs, tables, start)
+    good = compiled.keep_good(payloads, whole, payload_size, crcs, tables, start)
     bad += whole - good
     bad_bytes += (whole - good) * (payload_size + CRC_SIZE + 2)
     tail = data[ends[-1] + 1 :] if len(ends) else data
@@ -134,9 +124,9 @@ def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
 def encode_frames(payloads: NDArray[np.uint8]) -> bytes:
     """Encode equal-sized payloads, shape (n, payload_size), as one run of frames."""
     count, payload_size = payloads.shape
-    tables, start = _crc_tables(payload_size)
+    tables, start = compiled.crc_tables(payload_size)
     wire = np.empty((count, payload_size + CRC_SIZE + 2), np.uint8)
-    _encode(np.ascontiguousarray(payloads).ravel(), payload_size, tables, start, wire)
+    compiled.encode(np.ascontiguousarray(payloads).ravel(), payload_size, tables, start, wire)
     return wire.tobytes()
 
 
@@ -174,198 +164,3 @@ class FrameStream:
 
     def _nothing(self, bad: int, bad_bytes: int) -> DecodedFrames:
         return DecodedFrames(np.empty((0, self._payload_size), np.uint8), [], bad, bad_bytes, b"")
-
-
-@lru_cache
-def _crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
-    """Return the CRC's share of each byte value at each place, and the share of the start value.
-
-    The CRC is linear over GF(2): that of a message of fixed length is the XOR of the contribution
-    of each byte at its place. The look-ups are independent, unlike those of a byte-wise CRC. Shape
-    (payload_size * 256,).
-    """
-    if not 0 <= payload_size <= MAX_BULK_PAYLOAD:
-        raise ValueError(f"bulk payloads have 0 to {MAX_BULK_PAYLOAD} bytes, not {payload_size}")
-    tables = np.empty((payload_size, 256), np.uint16)
-    for place in range(payload_size):
-        zeros_behind = bytes(payload_size - 1 - place)
-        tables[place] = [crc_hqx(bytes([value]) + zeros_behind, 0) for value in range(256)]
-    return tables.ravel(), crc_hqx(bytes(payload_size), CRC_START)
-
-
-# The loops below index flat arrays and never slice: a slice costs these kernels more than the copy.
-
-
-@numba.njit(cache=True)
-def _cobs_encode(data: NDArray[np.uint8], encoded: NDArray[np.uint8]) -> int:
-    """Stuff `data` into `encoded`; return the size."""
-    code_at, size, code = 0, 1, 1
-    for index, value in enumerate(data):
-        if value != 0:
-            encoded[size] = value
-            size += 1
-            code += 1
-        full = code == MAX_BLOCK + 1
-        if value == 0 or (full and index + 1 < data.size):  # a full block at the end needs no more
-            encoded[code_at] = code
-            code_at, size, code = size, size + 1, 1
-    encoded[code_at] = code
-    return size
-
-
-@numba.njit(cache=True)
-def _cobs_decode(encoded: NDArray[np.uint8], data: NDArray[np.uint8]) -> int:
-    """Undo `_cobs_encode` into `data`; return the size, or -1 for what is not COBS."""
-    position = size = 0
-    while position < encoded.size:
-        code = int(encoded[position])
-        if code == 0 or position + code > encoded.size:
-            return -1
-        for offset in range(1, code):
-            value = encoded[position + offset]
-            if value == 0:
-                return -1
-            data[size] = value
-            size += 1
-        position += code
-        if code <= MAX_BLOCK and position < encoded.size:
-            data[size] = 0
-            size += 1
-    return size
-
-
-@numba.njit(cache=True)
-def _unstuff(
-    data: NDArray[np.uint8],
-    ends: NDArray[np.int64],
-    payload_size: int,
-    max_wire: int,
-    payloads: NDArray[np.uint8],
-    crcs: NDArray[np.uint16],
-    spans: NDArray[np.int64],
-) -> tuple[int, int, int, int]:
-    """Undo COBS of every frame that fits, given where each ends, and note the spans of the others.
-
-    Fills `payloads` (flat) and `crcs`, as received and not yet compared: comparing them here would
-    hold up the next frame behind each frame's last branch.
-    """
-    wire = payload_size + 3  # code byte, payload, CRC
-    position = whole = bad = bad_bytes = found = 0
-    for end in ends:
-        length = end - position
-        if length == wire:
-            if _unstuff_frame(data, position, payload_size, payloads, crcs, whole):
-                whole += 1
-            else:
-                bad += 1
-                bad_bytes += length + 1
-        elif length > max_wire:
-            bad += 1
-            bad_bytes += length + 1
-        elif length > 0:  # two delimiters in a row are a legal idle
-            spans[found, 0] = position
-            spans[found, 1] = end
-            found += 1
-        position = end + 1
-    return whole, bad, bad_bytes, found
-
-
-@numba.njit(cache=True)
-def _unstuff_frame(
-    data: NDArray[np.uint8],
-    position: int,
-    payload_size: int,
-    payloads: NDArray[np.uint8],
-    crcs: NDArray[np.uint16],
-    row: int,
-) -> bool:
-    """Undo COBS of the frame at `position`; False when it is not COBS."""
-    first = row * payload_size
-    for place in range(payload_size):
-        payloads[np.uintp(first + place)] = data[np.uintp(position + 1 + place)]
-    low = data[position + payload_size + 1]
-    high = data[position + payload_size + 2]
-    wire = payload_size + 3
-    following = int(data[position])
-    while following < wire:  # every later code byte stands where a zero was
-        place = following - 1
-        if place < payload_size:
-            payloads[np.uintp(first + place)] = 0
-        elif place == payload_size:
-            low = np.uint8(0)
-        else:
-            high = np.uint8(0)
-        following += int(data[np.uintp(position + following)])
-    crcs[row] = low + 256 * high
-    return following == wire
-
-
-@numba.njit(cache=True)
-def _keep_good(
-    payloads: NDArray[np.uint8],
-    whole: int,
-    payload_size: int,
-    crcs: NDArray[np.uint16],
-    tables: NDArray[np.uint16],
-    start: int,
-) -> int:
-    """Move the payloads whose CRC fits to the front; return how many there are."""
-    good = 0
-    for row in range(whole):
-        first = row * payload_size
-        if _crc(payloads, first, payload_size, tables, start) != crcs[row]:
-            continue
-        if good != row:
-            for place in range(payload_size):
-                payloads[good * payload_size + place] = payloads[first + place]
-        good += 1
-    return good
-
-
-@numba.njit(cache=True)
-def _crc(
-    payloads: NDArray[np.uint8],
-    first: int,
-    payload_size: int,
-    tables: NDArray[np.uint16],
-    start: int,
-) -> int:
-    """Return the CRC of one payload; four sums side by side, so that none waits for another."""
-    sums_0, sums_1, sums_2, sums_3 = np.uint32(start), np.uint32(0), np.uint32(0), np.uint32(0)
-    place = 0
-    while place + 4 <= payload_size:
-        at, table = first + place, place << 8
-        sums_0 ^= tables[np.uintp(table + payloads[np.uintp(at)])]
-        sums_1 ^= tables[np.uintp(table + 256 + payloads[np.uintp(at + 1)])]
-        sums_2 ^= tables[np.uintp(table + 512 + payloads[np.uintp(at + 2)])]
-        sums_3 ^= tables[np.uintp(table + 768 + payloads[np.uintp(at + 3)])]
-        place += 4
-    while place < payload_size:
-        sums_0 ^= tables[np.uintp((place << 8) + payloads[np.uintp(first + place)])]
-        place += 1
-    return int(sums_0 ^ sums_1 ^ sums_2 ^ sums_3)
-
-
-@numba.njit(cache=True)
-def _encode(
-    payloads: NDArray[np.uint8],
-    payload_size: int,
-    tables: NDArray[np.uint16],
-    start: int,
-    wire: NDArray[np.uint8],
-) -> None:
-    """Fill `wire`, shape (n, payload_size + 4), with one frame a row."""
-    for row in range(wire.shape[0]):
-        first = row * payload_size
-        for place in range(payload_size):
-            wire[row, place + 1] = payloads[np.uintp(first + place)]
-        crc = _crc(payloads, first, payload_size, tables, start)
-        wire[row, payload_size + 1] = crc & 0xFF
-        wire[row, payload_size + 2] = crc >> 8
-        wire[row, payload_size + 3] = 0
-        following = payload_size + 3
-        for place in range(payload_size + 2, 0, -1):
-            if wire[row, place] == 0:
-                wire[row, place] = following - place
-                following = place
-        wire[row, 0] = following

@@ -137,7 +137,7 @@ def holoborodko_coefficients(points: int = 11, exact_degree: int = 4) -> FloatAr
         Coefficients c_1 .. c_((N-1)/2).
 
     Raises:
-        FilterError: There is no such differentiator.
+        FilterError: No such differentiator.
     """
     half = (points - 1) // 2
     if points % 2 == 0 or exact_degree not in (2, 4) or half < exact_degree // 2:
@@ -171,7 +171,7 @@ def holoborodko_derivative(
         exact_degree: 2 or 4, see `holoborodko_coefficients`.
 
     Raises:
-        FilterError: Fewer than three samples, or there is no such differentiator.
+        FilterError: Fewer than three samples, or no such differentiator.
     """
     signal_values = np.asarray(values, dtype=np.float64)
     n = len(signal_values)

@@ -125,7 +125,7 @@ def simulate(
         seed: Seed of the sensors' noise.
 
     Raises:
-        UsageError: There is no such protocol or effect.
+        UsageError: No such protocol or effect.
     """
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.simulation.hidden import HiddenEffect
@@ -142,8 +142,8 @@ def declared(name: Path | str | None = None, *, machine: Path | str | None = Non
         machine: A machine file, or the name of a shipped machine; its equations are declared.
 
     Raises:
-        ModelFileError: There is no such file or model, or it is wrong.
-        PlantFileError: There is no such machine, or its file is wrong.
+        ModelFileError: No such file or model, or it is wrong.
+        PlantFileError: No such machine, or its file is wrong.
     """
     from estimation import model_file
     from estimation.plant_models import declared as equations_of

@@ -70,8 +70,8 @@ def _replies() -> list[bytes]:
     payloads = [
         teensy.encode_ack(teensy.Ack(1, 2, 0, 1, 99)),
         teensy.encode_pong(3, 4, 5),
-        teensy.encode_hello_reply(1, "TEENSY-1", REFERENCE.protocol_hash),
-        teensy.encode_trip_report(1, 4, 3, 5, 6, 7, 8),
+        teensy.encode_hello_reply(1, teensy.Identity("TEENSY-1", "", REFERENCE.protocol_hash)),
+        teensy.encode_trip_report(1, 4, 3, (5, 6, 7, 8)),
         np.zeros(1, SAMPLE_DTYPE).tobytes(),
     ]
     return [encode_frame(payload) for payload in payloads]

@@ -8,7 +8,7 @@ K the motor's torque constant times the gear's ratio times its efficiency, F the
 and gear at the spindle, c the remaining zeros. F / K is the current that only turns the drive.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,9 @@ import numpy as np
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change, check_levels, check_limit
-from calibration.record import Fit
 from calibration.regression import refuse_drift, regress
 from calibration.sessions.motion import moves, need_channel, steady
+from estimation.recording import FloatArray
 
 CURRENT, TORQUE, COMMAND = "motor_current_a", "proximal_torque_n_m", "motor_command_ratio"
 LOADS_A = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -61,24 +61,8 @@ class CurrentSession:
         check_change(torques, 0.02, "The torque")
         loads = np.array([float(m.recording.conditions["load_command_a"]) for m in measurements])
         check_levels(loads, 3, "The load")
-        torque = regress(
-            [
-                (
-                    np.column_stack(
-                        [
-                            run[CURRENT],
-                            -run["direction"],
-                            -run["spindle_velocity_rad_s"],
-                            np.ones_like(run[CURRENT]),
-                        ]
-                    ),
-                    run[TORQUE],
-                )
-                for run in runs
-            ],
-            least_runs=6,
-        )
-        gain, friction, damping, offset = torque.values
+        torque = regress([_equation(run) for run in runs], least_runs=6)
+        gain, friction = torque.values[:2]
         if gain <= 0:
             raise BadDataError(
                 "not_monotone",
@@ -107,25 +91,9 @@ class CurrentSession:
             "drift_ratio": drift,
             "witness_rms_n_m": float(np.sqrt(torque.held_out.mean())),
         }
-        torque_fit = Fit(
-            "current",
-            {
-                "torque_constant_n_m_a": float(gain),
-                "friction_n_m": float(friction),
-                "damping_n_m_s_rad": float(damping),
-                "offset_n_m": float(offset),
-            },
-            torque.nested(),
-            torque.residual_rms,
-            int(torques.size),
-        )
-        driver_fit = Fit(
-            "driver",
-            {"gain_a": float(driver.values[0]), "offset_a": float(driver.values[1])},
-            driver.nested(),
-            driver.residual_rms,
-            int(torques.size),
-        )
+        names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
+        torque_fit = torque.as_fit("current", *names)
+        driver_fit = driver.as_fit("driver", "gain_a", "offset_a")
         series = {
             m.recording.name: (run[CURRENT], left * 1e3)
             for m, run, left in zip(measurements, runs, torque.residuals, strict=True)
@@ -139,3 +107,10 @@ class CurrentSession:
             found,
             Residuals("motor current, A", "residual, mN m", series),
         )
+
+
+def _equation(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the columns of the torque's equation in a run, shape (n, 4), and the torque."""
+    current, speed = run[CURRENT], run["spindle_velocity_rad_s"]
+    columns = np.column_stack([current, -run["direction"], -speed, np.ones_like(current)])
+    return columns, run[TORQUE]

@@ -96,13 +96,7 @@ class EncoderSession:
         names = ["ratio", "offset_rad", "compliance_rad_n_m", "lost_motion_rad"]
         names += ["wave_sine_rad", "wave_cosine_rad"] if is_waved else []
         angles = np.concatenate([run[pair.channel] for run in runs])
-        error_fit = Fit(
-            "encoder",
-            dict(zip(names, used.values.tolist(), strict=True)),
-            used.nested(),
-            used.residual_rms,
-            int(angles.size),
-        )
+        error_fit = used.as_fit("encoder", *names)
         zero = float(at.mean())
         variance = float(at.var(ddof=1) / at.size)
         line_fit = Fit(

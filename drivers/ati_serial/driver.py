@@ -54,7 +54,7 @@ class AtiSerial:
         assumed: What is taken for granted about it.
 
     Raises:
-        DriverError: There is no such calibration.
+        DriverError: No such calibration.
     """
 
     name = "ati-serial"

@@ -6,6 +6,7 @@ The board's logic and its guards exist once, in C++; whatever runs them on the h
 import ctypes
 import weakref
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -54,18 +55,35 @@ def firmware_library() -> Path | None:
     return _LIBRARY if _LIBRARY.is_file() else None
 
 
+@dataclass(frozen=True, slots=True)
+class BoardStart:
+    """How a board was started.
+
+    Attributes:
+        serial: Serial number the board gives.
+        tick_us: Device clock at the first tick.
+        boot: Number of this start of the board.
+        simulated: Whether the encoder counts have their zeros and the motors are cold, as on a
+            simulated rig; a real board is started with neither.
+    """
+
+    serial: str = "SIM-0001"
+    tick_us: int = 0
+    boot: int = 1
+    simulated: bool = True
+
+
+AS_SIMULATED = BoardStart()
+
+
 class FirmwareBoard:
     """The firmware core on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
         bench: The physics.
-        serial: Serial number the board gives.
-        start_tick_us: Device clock at the first tick.
+        start: How the board was started.
         library: The shared library; the built one when None.
         profile: Samples and motors of the board.
-        boot: Number of this start of the board.
-        simulated: Whether the encoder counts have their zeros and the motors are cold, as on a
-            simulated rig; a real board is started with neither.
         own: Widest gains and limits the board takes, as wiring*.hpp gives them to a real one; any
             when None.
 
@@ -76,22 +94,21 @@ class FirmwareBoard:
     def __init__(
         self,
         bench: FirmwareBench,
-        serial: str = "SIM-0001",
-        start_tick_us: int = 0,
+        start: BoardStart = AS_SIMULATED,
         library: Path | None = None,
         profile: Profile = REFERENCE,
-        boot: int = 1,
-        simulated: bool = True,
         own: tuple[Sequence[Any], ArmLimits] | None = None,
     ) -> None:
         self._bench = bench
-        self._next_tick_us = start_tick_us
+        self._next_tick_us = start.tick_us
         self._tick_us = profile.tick_us
         self._functions = _library(library)
-        self._handle = self._functions.rig_board_create(profile.name.encode(), serial.encode())
+        self._handle = self._functions.rig_board_create(
+            profile.name.encode(), start.serial.encode()
+        )
         if not self._handle:
             raise MemoryError("no memory for a firmware board")
-        self._functions.rig_board_booted(self._handle, boot, simulated)
+        self._functions.rig_board_booted(self._handle, start.boot, start.simulated)
         if own is not None:
             taken = self._functions.rig_board_limit(self._handle, settings_bytes(profile, *own))
             if not taken:

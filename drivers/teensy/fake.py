@@ -1,6 +1,6 @@
 """A plain simulated board: it takes and gives the bytes a real one would, and guards nothing.
 
-For simulation where there is no compiler. It speaks the whole protocol, sessions and the watchdog
+For simulation without a compiler. It speaks the whole protocol, sessions and the watchdog
 on the host's silence included, and follows setpoints; limits it takes and does not hold. The board
 with guards is the compiled core (`drivers.teensy.core`).
 
@@ -11,8 +11,7 @@ refuses REFERENCE.
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
-from collections.abc import Callable
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
-from drivers.teensy.logic import ENGAGED, STATE, BoardLogic, Drive
+from drivers.teensy.logic import ENGAGED, STATE, Bench, BoardLogic, Drive
 from drivers.teensy.protocol import (
     GAIN_NAMES,
     STATUS_ARMED,
@@ -30,6 +29,7 @@ from drivers.teensy.protocol import (
     STATUS_WATCHDOG_TRIPPED,
     TRIP_SHIFT,
     Ack,
+    Identity,
     Kind,
     Result,
     Trip,
@@ -45,55 +45,28 @@ _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 _SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT
 
 
-class Bench(Protocol):
-    """The physics behind a board, in ticks of its profile."""
-
-    @property
-    def advance(self) -> Callable[..., NDArray[np.int32]]:
-        """Run closed-loop ticks and return the counts, a row a tick, int32.
-
-        Within a tick: the inputs are sampled into a row, the profile's tick
-        (`drivers.teensy.reference_board.drive_tick`, `drivers.teensy.grasper_board.grasper_tick`)
-        writes what the motors get behind them, the physics moves a tick. The result does not depend
-        on how ticks are divided between calls.
-
-        Args:
-            ticks: Number of ticks.
-            plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
-                `Drive`, changed in place.
-        """
-        ...
-
-
 class PythonBoard:
     """A board for simulation on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
         bench: The physics.
-        serial: Serial number the board gives.
         start_tick_us: Device clock at the first tick.
         protocol_hash: Protocol hash of the board; its profile's if None.
-        build_hash: Build hash of the board.
         logic: What its profile does a tick.
     """
 
     def __init__(
         self,
         bench: Bench,
-        serial: str = "SIM-0001",
         start_tick_us: int = 0,
         protocol_hash: int | None = None,
-        build_hash: int = 0,
         logic: BoardLogic = REFERENCE_LOGIC,
     ) -> None:
         self._bench = bench
         self._logic = logic
         self._profile = logic.profile
-        self._serial = serial
-        self._protocol_hash = (
-            self._profile.protocol_hash if protocol_hash is None else protocol_hash
-        )
-        self._build_hash = build_hash
+        own_hash = self._profile.protocol_hash if protocol_hash is None else protocol_hash
+        self._identity = Identity("SIM-0001", "", own_hash, boot=1)
         self._next_tick_us = start_tick_us
         self._stream = FrameStream(0)  # no command is frequent
         self._out = bytearray()
@@ -155,16 +128,8 @@ class PythonBoard:
             return
         if kind is Kind.HELLO:
             self._last_command = None  # another program, whose numbers begin anew
-            self._send(
-                protocol.encode_hello_reply(
-                    sequence,
-                    self._serial,
-                    self._protocol_hash,
-                    self._build_hash,
-                    status=self._status,
-                    offer=self._offer,
-                )
-            )
+            now = replace(self._identity, status=self._status, offer=self._offer)
+            self._send(protocol.encode_hello_reply(sequence, now))
         elif kind is Kind.PING:
             if self._is_live(int(fields["session"])) and self._is_new(sequence):
                 self._hear(sequence)
@@ -183,7 +148,7 @@ class PythonBoard:
         silent_us = self._silent_us
         numbers = (silent_us, self._watchdog_us, self._trip_us, silent_us)
         code = self._trip
-        return protocol.encode_trip_report(sequence, code, 255, *(numbers if code else (0,) * 4))
+        return protocol.encode_trip_report(sequence, code, 255, numbers if code else (0, 0, 0, 0))
 
     def _execute(self, kind: Kind, payload: bytes, fields: np.void) -> Result:
         if kind is Kind.ARM:

@@ -1,8 +1,8 @@
 """What the plain simulated board does a tick, by profile."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,3 +84,23 @@ class BoardLogic:
         for column, (low, high) in self.converted.items():
             found |= (counts[:, column] <= low) | (counts[:, column] >= high)
         return found
+
+
+class Bench(Protocol):
+    """The physics behind a board, in ticks of its profile."""
+
+    @property
+    def advance(self) -> Callable[..., NDArray[np.int32]]:
+        """Run closed-loop ticks and return the counts, a row a tick, int32.
+
+        Within a tick: the inputs are sampled into a row, the profile's tick
+        (`drivers.teensy.reference_board.drive_tick`, `drivers.teensy.grasper_board.grasper_tick`)
+        writes what the motors get behind them, the physics moves a tick. The result does not depend
+        on how ticks are divided between calls.
+
+        Args:
+            ticks: Number of ticks.
+            plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
+                `Drive`, changed in place.
+        """
+        ...

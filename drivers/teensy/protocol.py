@@ -296,49 +296,33 @@ def encode_reference(sequence: int, counts: Sequence[int]) -> bytes:
     return np.array((VERSION, Kind.REFERENCE, sequence, *counts), REFERENCE_DTYPE).tobytes()
 
 
-def encode_hello_reply(
-    sequence: int,
-    serial: str,
-    protocol_hash: int,
-    build_hash: int = 0,
-    boot: int = 1,
-    status: int = STATUS_REFERENCED,
-    offer: int = 0,
-) -> bytes:
-    """Return the payload of the answer to a hello."""
-    fields = (
-        VERSION,
-        Kind.HELLO_REPLY,
-        sequence,
-        protocol_hash,
-        FIRMWARE_VERSION,
-        build_hash,
-        serial.encode()[:24],
-        boot,
-        status,
-        offer,
-    )
+def encode_hello_reply(sequence: int, identity: Identity) -> bytes:
+    """Return the payload of the answer to a hello, with this program's firmware version."""
+    own = identity
+    numbers = (own.protocol_hash, FIRMWARE_VERSION, own.build_hash)
+    state = (own.boot, own.status, own.offer)
+    fields = (VERSION, Kind.HELLO_REPLY, sequence, *numbers, own.serial.encode()[:24], *state)
     return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
 
 
 def encode_ack(ack: Ack) -> bytes:
     """Return the payload of an acknowledgement."""
-    fields = (
-        VERSION,
-        Kind.ACK,
-        ack.sequence,
-        ack.command,
-        ack.result,
-        ack.status,
-        ack.queue_free,
-    )
-    return np.array(fields, ACK_DTYPE).tobytes()
+    result = (ack.command, ack.result, ack.status, ack.queue_free)
+    return np.array((VERSION, Kind.ACK, ack.sequence, *result), ACK_DTYPE).tobytes()
 
 
 def encode_trip_report(
-    sequence: int, code: int, channel: int, value: int, limit: int, tick_us: int, late_us: int
+    sequence: int, code: int, channel: int, numbers: tuple[int, int, int, int]
 ) -> bytes:
-    """Return the payload of the answer to a question for the trip; values are cut to 32 bits."""
+    """Return the payload of the answer to a question for the trip.
+
+    Args:
+        sequence: Number of the question.
+        code: What the board tripped over.
+        channel: Place of the count that crossed.
+        numbers: That count and its limit, cut to 32 bits; time of the trip and lateness, us.
+    """
+    value, limit, tick_us, late_us = numbers
     whole = [max(MISSING, min(number, TOP)) for number in (value, limit)]
     late_us = min(late_us, 2**32 - 1)
     fields = (VERSION, Kind.TRIP_REPORT, sequence, code, channel, *whole, tick_us, late_us)
@@ -352,23 +336,13 @@ def encode_pong(sequence: int, token: int, tick_us: int) -> bytes:
 
 def decode_identity(fields: np.void) -> Identity:
     """Return the content of a hello reply."""
-    return Identity(
-        serial=bytes(fields["serial"]).decode("ascii", "replace"),
-        firmware_version=version_text(int(fields["firmware_version"])),
-        protocol_hash=int(fields["protocol_hash"]),
-        build_hash=int(fields["build_hash"]),
-        boot=int(fields["boot"]),
-        status=int(fields["status"]),
-        offer=int(fields["offer"]),
-    )
+    names = ("protocol_hash", "build_hash", "boot", "status", "offer")
+    serial = bytes(fields["serial"]).decode("ascii", "replace")
+    version = version_text(int(fields["firmware_version"]))
+    return Identity(serial, version, *(int(fields[name]) for name in names))
 
 
 def decode_ack(fields: np.void) -> Ack:
     """Return the content of an acknowledgement."""
-    return Ack(
-        sequence=int(fields["sequence"]),
-        command=int(fields["command"]),
-        result=int(fields["result"]),
-        status=int(fields["status"]),
-        queue_free=int(fields["queue_free"]),
-    )
+    names = ("sequence", "command", "result", "status", "queue_free")
+    return Ack(*(int(fields[name]) for name in names))

@@ -1,7 +1,7 @@
 """The master's three potentiometers, read by the converter of a Teensy that drives no motor."""
 
 from drivers.registry import Driver
-from drivers.teensy.channels import linear
+from drivers.teensy.channels import raw_channel
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.grasper import GRASPER
 from drivers.transport import open_transport
@@ -10,12 +10,7 @@ from drivers.transport.transport import Transport
 JOINTS = ("yaw", "pitch", "grasp")
 
 POTS = tuple(
-    linear(
-        f"{joint}_count",
-        f"force_{k}",
-        description=f"potentiometer of the {joint}, 12 bits",
-        profile=GRASPER,
-    )
+    raw_channel(f"{joint}_count", f"force_{k}", GRASPER, f"potentiometer of the {joint}, 12 bits")
     for k, joint in enumerate(JOINTS, start=1)
 )
 """The board's three analogue inputs, which at a grasper are its force sensors."""

@@ -7,7 +7,6 @@ Not modelled: the time bytes take on the wire, and a host that is late (see the 
 own tests for lost and damaged bytes).
 """
 
-from collections.abc import Callable
 from time import monotonic, sleep
 from typing import Protocol
 
@@ -41,8 +40,6 @@ class SimulatedTransport:
         url: Name for messages.
         step_s: Longest virtual time between looks at the board's output.
         pace: Virtual seconds a real second, None for as fast as possible.
-        wait: Waits real seconds; for tests of the pace.
-        clock: Real clock, seconds; for tests of the pace.
         tick_s: A tick of the board, s.
     """
 
@@ -52,8 +49,6 @@ class SimulatedTransport:
         url: str = "sim://",
         step_s: float = 0.05,
         pace: float | None = None,
-        wait: Callable[[float], None] = sleep,
-        clock: Callable[[], float] = monotonic,
         tick_s: float = TICK_S,
     ) -> None:
         self.board = board
@@ -61,8 +56,6 @@ class SimulatedTransport:
         self._url = url
         self._step_ticks = max(1, round(step_s / tick_s))
         self._pace = pace
-        self._wait = wait
-        self._clock = clock
         self._ticks = 0
         self._closed = False
         self._paced_from: tuple[float, int] | None = None
@@ -109,8 +102,8 @@ class SimulatedTransport:
         if self._pace is None:
             return
         if self._paced_from is None:
-            self._paced_from = (self._clock(), self._ticks)
+            self._paced_from = (monotonic(), self._ticks)
         began_s, ticks = self._paced_from
-        late_s = self._clock() - began_s - (self._ticks - ticks) * self._tick_s / self._pace
+        late_s = monotonic() - began_s - (self._ticks - ticks) * self._tick_s / self._pace
         if late_s < 0:
-            self._wait(-late_s)
+            sleep(-late_s)

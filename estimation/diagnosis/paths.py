@@ -83,7 +83,7 @@ def period_samples(path: Recording) -> int:
     """Return the length of a path's period: where its positions are most like themselves.
 
     Raises:
-        SplitError: There is no such length that fits three times into the path.
+        SplitError: No such length that fits three times into the path.
     """
     angles = [
         values

@@ -21,6 +21,7 @@ __all__ = [
     "UnknownEffectError",
     "catalogue",
     "effect",
+    "families",
 ]
 
 
@@ -42,6 +43,12 @@ def catalogue() -> Mapping[str, Effect]:
             ):
                 found[kind.id] = kind()
     return MappingProxyType(dict(sorted(found.items())))
+
+
+def families() -> tuple[str, ...]:
+    """Return the families that a diagnosis may report; the last one is `unknown`."""
+    found = {kind.family for kind in catalogue().values() if kind.balances}
+    return (*sorted(found), "unknown")
 
 
 def effect(name: str) -> Effect:

@@ -11,7 +11,7 @@ M. T. Hagan, "Gauss-Newton approximation to Bayesian learning", ICNN 1997; start
 after D. Nguyen and B. Widrow, IJCNN 1990.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -97,7 +97,6 @@ def train(
     targets: FloatArray,
     names: tuple[Sequence[str], Sequence[str]],
     settings: Settings | None = None,
-    on_step: Callable[[int, float], None] = lambda step, rmse: None,
     validation: tuple[FloatArray, FloatArray] | None = None,
     start: Network | None = None,
 ) -> Training:
@@ -108,7 +107,6 @@ def train(
         targets: Shape (n, o).
         names: Names of the inputs and of the outputs.
         settings: How to train; `Settings()` if None.
-        on_step: Called with the step's number and the error after each accepted step.
         validation: Further inputs and targets, which are not trained on: the weights of the step
             with the least error on them are kept.
         start: A network to train on, all its weights, as in transfer learning; it keeps its ranges
@@ -136,7 +134,7 @@ def train(
         fit.start_from(start)
     if validation is not None:
         fit.hold_out(to_unit(validation[0], ranges[0]), to_unit(validation[1], ranges[1]))
-    reason, converged = fit.run(on_step)
+    reason, converged = fit.run()
     hidden, output = fit.weights()
     return Training(
         network=Network(tuple(names[0]), tuple(names[1]), ranges[0], ranges[1], hidden, output),
@@ -147,29 +145,6 @@ def train(
         parameters=fit.count,
         rmse=fit.rmse,
     )
-
-
-def normal_equations(
-    network: Network, rows: FloatArray, targets: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return J'J, shape (p, p), and J'e, shape (p,), of a network on rows.
-
-    J is the derivative of the mapped outputs by the weights, e the mapped outputs less the mapped
-    targets. The weights are ordered as `network.hidden`, then `network.output`, row by row.
-
-    Args:
-        network: The network.
-        rows: Shape (n, d).
-        targets: Shape (n, o).
-    """
-    import torch
-
-    unit = to_unit(rows, network.input_range)
-    x = torch.from_numpy(np.column_stack([unit, np.ones(len(unit))]))
-    y = torch.from_numpy(to_unit(targets, network.output_range))
-    hidden, output = (torch.from_numpy(np.array(w)) for w in (network.hidden, network.output))
-    curvature, slope = _normal(_blocks(x, y), hidden, output)
-    return curvature.numpy(), slope.numpy()
 
 
 def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
@@ -241,13 +216,9 @@ class _Fit:
         self._x = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
         self._y = torch.from_numpy(np.ascontiguousarray(targets))
         generator = np.random.default_rng(settings.seed)
-        self._shapes = (
-            (settings.nodes, inputs.shape[1] + 1),
-            (targets.shape[1], settings.nodes + 1),
-        )
-        self._w = torch.from_numpy(
-            np.concatenate([first.ravel() for first in _first_weights(*self._shapes, generator)])
-        )
+        self._shapes = (settings.nodes, inputs.shape[1] + 1), (targets.shape[1], settings.nodes + 1)
+        first = _first_weights(*self._shapes, generator)
+        self._w = torch.from_numpy(np.concatenate([weights.ravel() for weights in first]))
         self.count = len(self._w)
         self.steps = 0
         self.gamma = float(self.count)
@@ -288,7 +259,7 @@ class _Fit:
         hidden, output = self._parts(self._w if self._best is None else self._best[1])
         return hidden.numpy().copy(), output.numpy().copy()
 
-    def run(self, on_step: Callable[[int, float], None]) -> tuple[str, bool]:
+    def run(self) -> tuple[str, bool]:
         """Train; return why it stopped and whether that is convergence."""
         self._compare()
         damping = self.FIRST_DAMPING
@@ -303,7 +274,6 @@ class _Fit:
             self._update_evidence(curvature)
             self._compare()
             history.append(self.rmse)
-            on_step(self.steps, self.rmse)
             if self.steps >= self.settings.patience:
                 before = history[-1 - self.settings.patience]
                 if before - history[-1] < self.settings.tolerance * before:

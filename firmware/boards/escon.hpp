@@ -1,5 +1,5 @@
-// An ESCON 24/2 at a board: the code for a current, and the current of a reading. The twin
-// of drivers/escon/scaling.py. No Arduino here, so that it runs on any host.
+// An ESCON 24/2 at a board: the code for a current, and the current of a reading. No
+// Arduino here, so that it runs on any host.
 #pragma once
 
 #include <cmath>

@@ -191,6 +191,7 @@ def prepare(
     own = regressor(PSM, fine)[:, :, base.columns]
     padded = np.pad(own, ((0, 0), (0, rows - own.shape[1]), (0, 0)))
     parts = [padded, gripper(PSM, fine), *(effect.columns(fine) for effect in effects)]
+    own_block = base_block(damping, parts[1].shape[2])
     return Prepared(
         name=recording.name,
         position=coarse.position[kept, : len(PSM.joints)],
@@ -198,25 +199,46 @@ def prepare(
         thesis=regressor(PSM, coarse)[kept][:, :, base.columns],
         closed=regressor(PSM_CLOSED, coarse)[kept][:, :, base_of(PSM_CLOSED).columns],
         table=np.concatenate([smoothed(part, rate_hz)[kept] for part in parts], axis=2),
-        blocks=_blocks(effects, [part.shape[2] for part in parts], damping),
+        blocks=blocks_of(own_block, effects, [part.shape[2] for part in parts[2:]], damping),
         independent_share=min(1.0, 2 * LOW_PASS.cutoff_hz * every / rate_hz),
     )
 
 
-def _blocks(
-    effects: Sequence[ArmEffect], widths: Sequence[int], damping: float
-) -> tuple[Block, ...]:
-    base, own_gripper, *rest = widths
+def base_block(damping: float, own_gripper: int = 0) -> Block:
+    """Return the block of an arm's base columns and of its gripper's own, frictions bounded."""
     friction = [name.startswith("F") and len(name) == 3 for name in base_of(PSM).names]
     frictions = np.array([*friction, *([False, True, True, True][:own_gripper])])
-    blocks = [Block("base", np.arange(base + own_gripper), frictions, damping, own_length=True)]
-    start = base + own_gripper
-    for effect, width in zip(effects, rest, strict=True):
-        at = np.arange(start, start + width)
+    return Block("base", np.arange(len(frictions)), frictions, damping, own_length=True)
+
+
+def blocks_of(
+    base: Block, effects: Sequence[ArmEffect], widths: Sequence[int], damping: float = DAMPING
+) -> tuple[Block, ...]:
+    """Return the blocks of declared columns and of effects, each of so many columns."""
+    blocks = [base]
+    start = len(base.at)
+    for effect, width in zip(effects, widths, strict=True):
         signs = np.full(width, effect.dissipative)
+        at = np.arange(start, start + width)
         blocks.append(Block(effect.name, at, signs, damping * effect.damping))
         start += width
     return tuple(blocks)
+
+
+def of_columns(
+    name: str, torque: FloatArray, table: FloatArray, blocks: tuple[Block, ...], joints: int
+) -> Prepared:
+    """Return a path of columns that were made elsewhere, ready to be fitted or searched.
+
+    Args:
+        name: Name of the path.
+        torque: Shape (n, rows).
+        table: The base, then every candidate, shape (n, rows, columns).
+        blocks: Which columns belong to what; the base first.
+        joints: Rows that are scored.
+    """
+    none = table[:, :joints, :0]
+    return Prepared(name, np.zeros((len(torque), joints)), torque, none, none, table, blocks, 1.0)
 
 
 def search(

@@ -1,13 +1,12 @@
 """A simulated patient-side manipulator with effects that its model does not declare.
 
-The declared part is the thesis' own model with plausible parameters. The hidden part has forms that
-the catalogue of arm effects does not hold: Dahl friction, friction that grows with another joint's
-position, and a slow drift. Its size is set by `HIDDEN_SHARE`, per joint.
+The declared part is the thesis' own model with plausible parameters. The hidden part is Dahl
+friction, friction that grows with another joint's position, and a slow drift, or a drawn family of
+the same size (`rig.arm.hidden`). Its size is set by `HIDDEN_SHARE`, per joint.
 """
 
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from estimation.arm.kinematics import tip_pose
@@ -16,6 +15,7 @@ from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import spatial_jacobians
 from estimation.recording import FloatArray, Recording
+from rig.arm.hidden import OWN, HiddenTorque, bouc_wen, draw_hidden
 
 RATE_HZ = 100.0
 
@@ -50,11 +50,13 @@ class SimulatedArm:
         values: Its declared parameters, in the order of `estimation.arm.regressor.names`.
         hidden: Strengths of its hidden friction, drift and cross friction, shape (3, joints).
         slip: Displacement over which its Dahl friction turns, rad or m, shape (joints,).
+        form: Hidden torque of a drawn family, in place of those frictions and drift.
     """
 
     values: FloatArray
     hidden: FloatArray
     slip: FloatArray
+    form: HiddenTorque | None = None
 
 
 def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:
@@ -91,8 +93,8 @@ class ArmRun:
     wrench: FloatArray
 
 
-def draw_arm(rng: np.random.Generator) -> SimulatedArm:
-    """Draw an arm."""
+def draw_arm(rng: np.random.Generator, family: str = OWN) -> SimulatedArm:
+    """Draw an arm, whose hidden torque is of a family of `rig.arm.hidden`."""
     values = np.array([_plausible(name) for name in names(PSM)])
     values = values * np.exp(SEED_SPREAD * rng.normal(size=len(values)))
     reach = np.array([joint.upper - joint.lower for joint in PSM.joints])
@@ -100,7 +102,25 @@ def draw_arm(rng: np.random.Generator) -> SimulatedArm:
     declared = np.std(regressor(PSM, motion) @ values, axis=0)
     scale = HIDDEN_SHARE * declared
     hidden = scale * np.exp(SEED_SPREAD * rng.normal(size=(3, len(scale))))
-    return SimulatedArm(values, hidden, 0.01 * reach * np.exp(SEED_SPREAD * rng.normal(size=6)))
+    arm = SimulatedArm(values, hidden, 0.01 * reach * np.exp(SEED_SPREAD * rng.normal(size=6)))
+    if family == OWN:
+        return arm
+    rms = np.std(hidden_torque(arm, motion), axis=0)
+    return replace(arm, form=draw_hidden(family, rng, motion, rms))
+
+
+def hidden_torque(arm: SimulatedArm, motion: Motion) -> FloatArray:
+    """Return what no model declares, along a motion, shape (n, joints)."""
+    if arm.form is not None:
+        return arm.form(motion)
+    friction = bouc_wen(motion.position, arm.slip)
+    middle = motion.position - motion.position.mean(axis=0)
+    share = np.abs(middle) / np.abs(middle).max(axis=0)
+    cross = friction * np.roll(share, 1, axis=1)
+    drift = np.linspace(-0.5, 0.5, len(motion))[:, None] * np.ones(6)
+    hidden: FloatArray = arm.hidden[0] * friction + arm.hidden[1] * cross
+    hidden += 0.3 * arm.hidden[2] * drift
+    return hidden
 
 
 _LINKS = {"m": (4.0, 2.0, 0.4), "lz": (0.3, -0.3, -0.13), "ly": (0.2, -0.25, 0.02)}
@@ -243,36 +263,8 @@ def simulate(
     declared = regressor(PSM, motion) @ arm.values
     applied = np.zeros((len(motion), 6)) if wrench is None else wrench
     external = np.einsum("nij,ni->nj", spatial_jacobians(PSM, motion.position), applied)
-    friction = dahl(motion.position, arm.slip)
-    middle = motion.position - motion.position.mean(axis=0)
-    share = np.abs(middle) / np.abs(middle).max(axis=0)
-    cross = friction * np.roll(share, 1, axis=1)
-    drift = np.linspace(-0.5, 0.5, len(motion))[:, None] * np.ones(6)
-    hidden = arm.hidden[0] * friction + arm.hidden[1] * cross + 0.3 * arm.hidden[2] * drift
     noise = NOISE_SHARE * np.std(declared, axis=0) * rng.normal(size=declared.shape)
     counts = 2e-5 * rng.normal(size=motion.position.shape) * np.ptp(motion.position, axis=0)
-    return ArmRun(motion.position + counts, declared + hidden + external + noise, applied)
-
-
-@numba.njit(cache=True)
-def _dahl(position, slip):  # type: ignore[no-untyped-def]
-    state = np.zeros_like(position)
-    for k in range(1, len(position)):
-        for j in range(position.shape[1]):
-            moved = position[k, j] - position[k - 1, j]
-            z = state[k - 1, j] + moved / slip[j] - abs(moved) / slip[j] * state[k - 1, j]
-            state[k, j] = min(max(z, -1.0), 1.0)
-    return state
-
-
-def dahl(position: FloatArray, slip: FloatArray) -> FloatArray:
-    """Return Dahl's friction, between -1 and 1: an exponential turn over a displacement.
-
-    P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976.
-
-    Args:
-        position: Shape (n, joints).
-        slip: Displacement of the turn, shape (joints,).
-    """
-    state: FloatArray = _dahl(np.ascontiguousarray(position), slip)
-    return state
+    return ArmRun(
+        motion.position + counts, declared + hidden_torque(arm, motion) + external + noise, applied
+    )

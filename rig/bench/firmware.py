@@ -48,7 +48,7 @@ class Versions:
 
 
 def source_hash() -> int | None:
-    """Return the CRC-32 of the core's sources, None where there is no source tree.
+    """Return the CRC-32 of the core's sources, None without a source tree.
 
     It is the one POSIX `cksum` gives, over the files in the order of their names.
     """

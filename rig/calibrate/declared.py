@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.fsr import FsrCurve
+from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory
 from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
 from calibration.procedure import Measurement, Result
@@ -215,7 +215,7 @@ def fsr_of(result: Result) -> tuple[FsrCurve, FsrMemory]:
 def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
     """Return a line from one to the other, whose gain and zero a fit may still move."""
     terms = (
-        Term(effect("motor.torque_constant"), 1, {"source": source}),
+        Term(effect("transmission.ratio"), 1, {"load": source}),
         Term(effect("sensor.offset"), 1),
     )
     about = "The calibrated reading of the sensor against its reference."

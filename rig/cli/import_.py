@@ -17,6 +17,27 @@ MOST_RUNS = 12
 """Runs listed on the screen; more are counted."""
 
 
+ColumnOption = Annotated[
+    list[str] | None,
+    typer.Option(help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."),
+]
+ConditionOption = Annotated[
+    list[str] | None,
+    typer.Option(help="NAME=COLUMN[:UNIT], what is constant in a run; may be repeated."),
+]
+RunsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Where runs begin: gap_s=1, lap_s=6.24, changes=COLUMN, falls=COLUMN,"
+        " mark=COLUMN, resets=true; may be repeated."
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Another key of [data], such as even_rate_hz=100; may be repeated."),
+]
+
+
 def import_(
     path: Annotated[
         Path, typer.Argument(help="CSV, TSV, Parquet, .mat, .npz, JSON, JSON lines, or a folder.")
@@ -30,33 +51,13 @@ def import_(
             autocompletion=complete_machine,
         ),
     ] = None,
-    column: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."
-        ),
-    ] = None,
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=COLUMN[:UNIT], what is constant in a run; may be repeated."),
-    ] = None,
-    runs: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Where runs begin: gap_s=1, lap_s=6.24, changes=COLUMN, falls=COLUMN,"
-            " mark=COLUMN, resets=true; may be repeated."
-        ),
-    ] = None,
+    column: ColumnOption = None,
+    condition: ConditionOption = None,
+    runs: RunsOption = None,
     rate: Annotated[
         float | None, typer.Option(help="Sample rate, Hz, where no column holds the time.")
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="Another key of [data], such as even_rate_hz=100; may be repeated.",
-        ),
-    ] = None,
+    set_: SetOption = None,
     preview: Annotated[
         bool, typer.Option("--preview", help="Show what would be imported; write no recording.")
     ] = False,

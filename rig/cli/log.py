@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.help import GroupedHelp
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.log_export import export
+from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
-    from calibration.linear import CalibrationSet
     from rig.log.check import LogReport
     from rig.log.reader import LogFile
     from rig.log.repair import RepairReport
@@ -121,120 +121,7 @@ def repair(
         _show_repair(report)
 
 
-@log_app.command()
-def export(
-    path: Annotated[
-        Path, typer.Argument(help="A log; or a folder, for one table of all its runs.")
-    ],
-    format_name: Annotated[
-        str, typer.Option("--format", help="csv or parquet; of a single log npz, too.")
-    ] = "csv",
-    topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
-    calibration: Annotated[
-        str | None,
-        typer.Option(help="Apply this set instead: a TOML file, or a shipped set's name."),
-    ] = None,
-    record: Annotated[
-        list[str] | None,
-        typer.Option(help="Apply this record of the store, by hash; may be repeated."),
-    ] = None,
-    store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
-    json: JsonFlag = False,
-) -> None:
-    """Export a log, one file for each topic; or a campaign as one table.
-
-    The table of a campaign (a folder or an archive of any format that is known) has a row a sample,
-    with its run and conditions. Parquet holds units, instrument, calibrations and notes as
-    metadata; for a CSV they are written to NAME.csv.json.
-    """
-    from rig.errors import UsageError
-    from rig.log.export import ExportFormat, export_log
-
-    if path.is_dir() or not path.name.endswith((".mcap", ".part")):
-        if topic or calibration or record:
-            raise UsageError("--topic, --calibration and --record are of a single log.")
-        _export_campaign(path, format_name, out, force, json)
-        return
-    known = [item.value for item in ExportFormat]
-    if format_name not in known:
-        raise UsageError(
-            f"There is no format {format_name!r}.", fix=f"Choose one of {', '.join(known)}."
-        )
-    applied = _other_calibrations(path, calibration, record or [], store)
-    written = export_log(
-        path, ExportFormat(format_name), out, topic, force=force, calibrations=applied
-    )
-    if json:
-        names = None if applied is None else {applied.name: applied.content_hash}
-        emit_json({"written": written, "calibrations": names})
-    else:
-        for target in written:
-            results(json).print(f"wrote {target}")
-
-
-def _export_campaign(
-    path: Path, format_name: str, out: Path | None, force: bool, json: bool
-) -> None:
-    """Write all runs at a path as one table."""
-    from rig.cli.left_out import say_left_out
-    from rig.errors import UsageError
-    from rig.importers.registry import open_campaign
-    from rig.importers.tidy import TidyFormat, write_tidy
-
-    known = [item.value for item in TidyFormat]
-    if format_name not in known:
-        raise UsageError(
-            f"A campaign is not exported as {format_name!r}.",
-            fix=f"Choose one of {', '.join(known)}.",
-        )
-    campaign = open_campaign(path)
-    say_left_out(path, campaign)
-    if out is not None and out.is_dir():
-        out = out / f"{path.resolve().name}.{format_name}"
-    target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
-    written = write_tidy(campaign, target, TidyFormat(format_name), force)
-    if json:
-        emit_json({"written": [written], "runs": campaign.evidence.names})
-    else:
-        results(json).print(f"wrote {written}: {len(campaign.evidence)} runs")
-
-
-def _other_calibrations(
-    path: Path, calibration: str | None, records: list[str], store: Path | None
-) -> "CalibrationSet | None":
-    """Return the set an export is to be made with; None for the one it was recorded with.
-
-    If the log exceeds the range of a record, the rules apply: a remark, or an error.
-    """
-    if calibration is None and not records:
-        return None
-    from calibration.linear import load_calibration_set, shipped_calibration_set
-    from calibration.rules import judge_range, refuse_errors
-    from calibration.store import CalibrationStore, compose, default_folder
-    from rig.log.reader import read_log
-    from rig.log.recalibrate import carried_calibrations
-    from rig.log.streams import COUNTS
-
-    log = read_log(path, topics=(COUNTS,))
-    if calibration is None:
-        base = carried_calibrations(log)
-    elif calibration.endswith(".toml"):
-        base = load_calibration_set(Path(calibration))
-    else:
-        base = shipped_calibration_set(calibration)
-    kept = CalibrationStore(store or default_folder())
-    found = [kept.get(start) for start in records]
-    made = compose(base, found)
-    if COUNTS in log.topics:
-        rows = log.topics[COUNTS].rows
-        verdicts = [v for r in found for v in judge_range(r, rows[r.input])]
-        for verdict in refuse_errors(verdicts):
-            remarks().print(f"{verdict.channel}: {verdict.message}", markup=False)
-    return made
+log_app.command()(export)
 
 
 def _logs(path: Path) -> list[Path]:

@@ -130,7 +130,7 @@ def data_text(table: Path, plant: Plant) -> str:
     """Return `[data]` for a table: a line for each channel, and the table's columns as remarks.
 
     Raises:
-        UsageError: There is no such file.
+        UsageError: No such file.
         DataError: The table cannot be read.
     """
     from rig.importers.table.mapping import Data, Mapping

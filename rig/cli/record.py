@@ -12,7 +12,9 @@ from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
-    from rig.machines.machine import Machine
+    from rig.machines.machine import Machine, MachinePlan
+    from rig.recording.campaign import RunResult
+    from rig.recording.watch import RunWatch
 
 
 def record(
@@ -45,18 +47,11 @@ def record(
     Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
     """
     from calibration.rules import refuse_errors
-    from rig.bench.logger import open_logger
-    from rig.bench.session import Session
     from rig.configuration.check import refuse_problems
-    from rig.errors import KNOWN_ERRORS, UsageError
+    from rig.errors import UsageError
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
-    from rig.recording.campaign import (
-        RunResult,
-        open_campaign_folder,
-        read_manifest,
-        record_campaign,
-    )
+    from rig.recording.campaign import open_campaign_folder, read_manifest
     from rig.recording.watch import watch_runs
 
     screen = remarks()
@@ -82,11 +77,35 @@ def record(
     watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
+    recorded = _recorded(settings, todo, folder, notes, watch)
+    bad = [result.name for result in recorded if result.drifted or not result.complete]
+    results(json).print(
+        f"{len(recorded)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
+    )
+    if json:
+        found = {"folder": folder, "runs": recorded, "look_at": bad}
+        emit_json(found if watch is None else {**found, "models": watch.to_json()})
+    return 1 if bad else 0
+
+
+def _recorded(
+    settings: "Config",
+    todo: "list[MachinePlan]",
+    folder: Path,
+    notes: str,
+    watch: "RunWatch | None",
+) -> "list[RunResult]":
+    """Record the runs and show how they go; state how to go on if not all are."""
+    from rig.bench.logger import open_logger
+    from rig.bench.session import Session
+    from rig.errors import KNOWN_ERRORS
+    from rig.recording.campaign import record_campaign
+
+    screen = remarks()
     recorded: list[RunResult] = []
     try:
         with Session(settings, open_logger(settings)) as session, progress() as bar:
-            samples = sum(run.samples for run in todo)
-            task = bar.add_task("recording", total=samples)
+            task = bar.add_task("recording", total=sum(run.samples for run in todo))
             done = 0
 
             def show(name: str, taken: int, expected: int) -> None:
@@ -111,14 +130,7 @@ def record(
             f"rig record --resume {folder}"
         )
         raise
-    bad = [result.name for result in recorded if result.drifted or not result.complete]
-    results(json).print(
-        f"{len(recorded)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
-    )
-    if json:
-        told = {"folder": folder, "runs": recorded, "look_at": bad}
-        emit_json(told if watch is None else {**told, "models": watch.to_json()})
-    return 1 if bad else 0
+    return recorded
 
 
 def _default_protocol(machine: "Machine", settings: "Config") -> str:

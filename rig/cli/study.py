@@ -195,7 +195,7 @@ def _fit_kinds(source: "Source", left_out: dict[str, str], seed: int) -> "tuple[
 @study_app.command()
 def zhao(
     prototype: Annotated[str, typer.Option(help="third, journal or ball.")] = "third",
-    seeds: Annotated[int, typer.Option(min=2, help="Simulated graspers.")] = 20,
+    seeds: Annotated[int, typer.Option(min=2, help="Simulated graspers of each family.")] = 4,
     spread: Annotated[
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
@@ -207,6 +207,7 @@ def zhao(
 ) -> None:
     """Reproduce Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016, simulated."""
     from rig.errors import UsageError
+    from rig.grasper.hidden import FAMILIES, OWN
     from rig.grasper.plant import PROTOTYPES
     from rig.studies.zhao import page as shown
     from rig.studies.zhao.haptics import haptics_of
@@ -216,10 +217,10 @@ def zhao(
         raise UsageError(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
-    steps = 3 + 2 * seeds  # three diagnoses
+    steps = (3 + seeds) * len(FAMILIES) + seeds  # three diagnoses a family, and haptics
     with resumable(state, "zhao", steps, "graspers") as (kept, step):
         study = run_study(prototype, seeds, spread, kept, workers=workers, on_step=step)
-        added = study.lacking["grasp"].terms
+        added = study.lacking[OWN, "grasp"].terms
         haptics = haptics_of(prototype, seeds, spread, added, kept, workers=workers, on_step=step)
     drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
@@ -231,7 +232,7 @@ def zhao(
     show_result(lines, shown.tables(study, haptics), out, markdown, json)
     if json:
         cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
-        found = {dof: lacking.findings for dof, lacking in study.lacking.items()}
+        found = {", ".join(key): each.findings for key, each in study.lacking.items()}
         emit_json({"study": {**cells, "findings": found}, "haptics": haptics})
 
 

@@ -22,7 +22,7 @@ StateFolder = Annotated[
     typer.Option("--state", help="Folder of finished parts; a cache folder by default."),
 ]
 
-Arms = Annotated[int, typer.Option(min=1, help="Simulated arms, from seed 0.")]
+Arms = Annotated[int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")]
 
 TablesFile = Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")]
 
@@ -144,7 +144,7 @@ def excitation(
 
 @arm_studies.command()
 def wrench(
-    seeds: Arms = 20,
+    seeds: Arms = 2,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
     out: TablesFile = None,
@@ -152,10 +152,11 @@ def wrench(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
+    from rig.arm.hidden import FAMILIES
     from rig.studies.pique import wrench_page as shown
     from rig.studies.pique.wrench import run_wrench_study
 
-    with resumable(state, "wrench", seeds) as (kept, on_arm):
+    with resumable(state, "wrench", seeds * len(FAMILIES)) as (kept, on_arm):
         study = run_wrench_study(seeds, kept, workers, on_arm)
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.NOTES]
@@ -165,7 +166,7 @@ def wrench(
 
 @arm_studies.command()
 def delsol(
-    seeds: Arms = 20,
+    seeds: Arms = 2,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
     state: StateFolder = None,
     out: TablesFile = None,
@@ -173,10 +174,11 @@ def delsol(
     json: JsonFlag = False,
 ) -> None:
     """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
+    from rig.arm.hidden import FAMILIES
     from rig.studies.delsol import page as shown
     from rig.studies.delsol.study import run_delsol
 
-    with resumable(state, "delsol", seeds) as (kept, on_arm):
+    with resumable(state, "delsol", seeds * len(FAMILIES)) as (kept, on_arm):
         study = run_delsol(seeds, kept, workers, on_arm)
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), shown.NOTE]
@@ -186,7 +188,7 @@ def delsol(
 
 @arm_studies.command()
 def zhang(
-    seeds: Arms = 20,
+    seeds: Arms = 2,
     workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
     state: StateFolder = None,
     out: TablesFile = None,
@@ -194,11 +196,12 @@ def zhang(
     json: JsonFlag = False,
 ) -> None:
     """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
+    from rig.arm.hidden import FAMILIES
     from rig.studies.zhang import page as shown
     from rig.studies.zhang.figures import write_figures
     from rig.studies.zhang.study import run_zhang
 
-    with resumable(state, "zhang", seeds) as (kept, on_arm):
+    with resumable(state, "zhang", seeds * len(FAMILIES)) as (kept, on_arm):
         study = run_zhang(seeds, kept, workers, on_arm)
     drawn = write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.notes(study)]

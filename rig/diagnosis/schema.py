@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from estimation.diagnosis.result import FAMILIES, SCHEMA, VARIABLES
+from estimation.diagnosis.result import SCHEMA, VARIABLES
+from estimation.effects import families
 
 FILE = "docs/schemas/rig.diagnosis-1.json"
 
@@ -13,7 +14,7 @@ Balance = Annotated[
     str,
     Field(pattern=r"^(motor|gearbox|cable|stretch|grasp|pitch|yaw|joint\.\d+|calibration\.\S+)$"),
 ]
-Family = Annotated[str, Field(json_schema_extra={"enum": list(FAMILIES)})]
+Family = Annotated[str, Field(json_schema_extra={"enum": list(families())})]
 Variable = Annotated[str, Field(pattern=rf"^({'|'.join(VARIABLES)}|joint_\d+)$")]
 Name = Literal["identified", "one_of", "depends_on", "something_missing"]
 Number = Annotated[float, Field(allow_inf_nan=False)]

@@ -4,7 +4,6 @@ Within a tick of 0.5 ms: sensors are sampled, the board computes from them, the 
 """
 
 import hashlib
-from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,7 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
             for motor in range(MOTORS):
                 command_e4 = row[grasper_board.COMMAND_E4 + motor]
                 currents[motor] = FULL_SCALE_A * 1e-4 * command_e4
-                grasper_plant.step_axis(state[motor], axes[motor], currents[motor])
+                grasper_plant.step_axis(state[motor], axes[motor], currents[motor], 1.0)
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
@@ -76,7 +75,7 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
             call_board_tick(function, board, now_us, inputs.ctypes.data, outputs.ctypes.data)
             for motor in range(MOTORS):
                 currents[motor] = FULL_SCALE_A * 1e-4 * outputs[motor]
-                grasper_plant.step_axis(state[motor], axes[motor], currents[motor])
+                grasper_plant.step_axis(state[motor], axes[motor], currents[motor], 1.0)
 
     return with_controllers, with_board
 
@@ -105,7 +104,7 @@ class GrasperBench:
     ) -> None:
         (yaw,), (jaw_1, jaw_2) = prototype.axes["yaw"], prototype.axes["grasp"]
         varied = [vary(axis, seed + k, spread) for k, axis in enumerate((yaw, jaw_1, jaw_2))]
-        self._axes = np.array([astuple(axis) for axis in varied], np.float64)
+        self._axes: NDArray[np.float64] = np.array([axis.values for axis in varied])
         self._state = np.zeros((MOTORS, 3))
         self._currents = np.zeros(MOTORS)
         self._seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))

@@ -27,12 +27,6 @@ class GrasperError(RigError):
     exit_code = ExitCode.USAGE
 
 
-class JointLimitError(GrasperError):
-    """A joint is outside its limits."""
-
-    exit_code = ExitCode.SAFETY
-
-
 @dataclass(frozen=True)
 class Limits:
     """Range of each joint, rad.
@@ -108,28 +102,6 @@ class Coupling:
     def actuator_torque(self, joint_n_m: ArrayLike) -> FloatArray:
         """Statics: joint torques to the actuator torques that hold them, N m; A^T."""
         return self._through(self.jacobian.T, joint_n_m)
-
-    def check_limits(self, joint_rad: ArrayLike) -> None:
-        """Hold joint angles against the limits; passes where there are none.
-
-        Args:
-            joint_rad: Joint angles, shape (..., n).
-
-        Raises:
-            JointLimitError: A joint is outside its limits, or not a number.
-        """
-        if self.limits is None:
-            return
-        angles = self._checked(joint_rad)
-        inside = (angles >= self.limits.low_rad) & (angles <= self.limits.high_rad)
-        for index in np.flatnonzero(~inside.reshape(-1, len(self.joints)).all(axis=0)):
-            low, high = self.limits.low_rad[index], self.limits.high_rad[index]
-            worst = angles.reshape(-1, len(self.joints))[:, index]
-            raise JointLimitError(
-                f"{self.name}: {self.joints[index]} goes from {worst.min():.4g} to "
-                f"{worst.max():.4g} rad.",
-                f"Its limits are {low:.4g} and {high:.4g} rad.",
-            )
 
     @property
     def _inverse(self) -> FloatArray:

@@ -3,19 +3,20 @@
 All quantities are seen at the joint, closing positive; N is the ratio of the gearhead:
 
     N^2 J q'' = N K i - friction - contact
-    friction = (Fc + mu |contact|) s + b q'
+    friction = f (Fc + mu |contact|) s + b q'
     s' = q' (1 - s sgn q') / delta - (s - rho sgn s) / tau    where |s| > rho
     contact = k max(q - q0, 0)
 
-s is the state of a bristle (Dahl 1968) that, held, relaxes to the share rho: plastic journal
-bearings let go of a part of their friction in seconds. That is an assumption; it gives what Zhao
-and Nelson 2016 show in their Figures 11 to 14: a peak on loading, a slow decay, an error after two
-seconds that grows with the load, and after half a minute one that does not. The motor follows the
-master by a position controller with integral action, sampled at 2 kHz.
+f is 1, or a table over one variable that a study hides (`Form`). s is the state of a bristle (Dahl
+1968) that, held, relaxes to the share rho: plastic journal bearings let go of a part of their
+friction in seconds. That is an assumption; it gives what Zhao and Nelson 2016 show in their Figures
+11 to 14: a peak on loading, a slow decay, an error after two seconds that grows with the load, and
+after half a minute one that does not. The motor follows the master by a position controller with
+integral action, sampled at 2 kHz.
 """
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numba
@@ -26,6 +27,27 @@ FloatArray = NDArray[np.float64]
 
 RATE_HZ = 2000.0
 SUBSTEPS = 5
+
+
+FORM_VARIABLES = ("load", "speed", "angle", "time", "acceleration")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Form:
+    """A factor on the level of friction: a table over the size of one variable.
+
+    Attributes:
+        variable: Place in `FORM_VARIABLES`: N m, rad/s, rad, s, rad/s^2.
+        high: End of the table, which begins at 0; beyond it the last value stays.
+        values: Shape (points,).
+    """
+
+    variable: int
+    high: float
+    values: FloatArray
+
+
+NO_FORM = Form(0, 1.0, np.ones(2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +70,7 @@ class AxisParameters:
         current_offset_a: Of the current sensor.
         current_noise_a: Standard deviation of one sample.
         force_noise_n: Standard deviation of one sample of the force sensor.
+        form: Factor on the level of friction.
     """
 
     gearhead_ratio: float = 66.0
@@ -65,6 +88,13 @@ class AxisParameters:
     current_offset_a: float = 0.0
     current_noise_a: float = 2e-3
     force_noise_n: float = 5e-3
+    form: Form = NO_FORM
+
+    @property
+    def values(self) -> FloatArray:
+        """The numbers, in their order, without the form."""
+        numbers = [float(getattr(self, field.name)) for field in fields(self)[:-1]]
+        return np.array(numbers)
 
 
 HIDDEN = (
@@ -109,15 +139,18 @@ def contact_torque(p: Any, angle_rad: float) -> float:
 
 
 @numba.njit(cache=True)
-def step_axis(state: Any, p: Any, current_a: float) -> None:
-    """Move one axis by a tick of 0.5 ms, its current constant; `state` is changed in place."""
+def step_axis(state: Any, p: Any, current_a: float, factor: float) -> None:
+    """Move one axis by a tick of 0.5 ms; `state` is changed in place.
+
+    The current and the factor on the level of friction are constant.
+    """
     inertia = p[0] * p[0] * p[2]
     gain = p[0] * p[1]
     h = 1.0 / RATE_HZ / SUBSTEPS
     q, w, s = state[ANGLE], state[SPEED], state[BRISTLE]
     for _ in range(SUBSTEPS):
         contact = contact_torque(p, q)
-        level = p[3] + p[4] * contact
+        level = factor * (p[3] + p[4] * contact)
         ds = w / p[6] * (1.0 - s * np.sign(w))
         if abs(s) > p[7]:
             ds -= (s - p[7] * np.sign(s)) / p[8]
@@ -129,7 +162,16 @@ def step_axis(state: Any, p: Any, current_a: float) -> None:
 
 
 @numba.njit(cache=True)
-def _run(p: Any, target: Any, kp: float, ki: float, kd: float, limit_a: float) -> Any:
+def _factor(variable: int, high: float, table: Any, sizes: Any) -> float:
+    place = min(abs(sizes[variable]) / high, 1.0) * (table.shape[0] - 1)
+    at = min(int(place), table.shape[0] - 2)
+    return float(table[at] + (place - at) * (table[at + 1] - table[at]))
+
+
+@numba.njit(cache=True)
+def _run(p: Any, variable: int, high: float, table: Any, target: Any) -> Any:
+    kp, ki, kd, limit_a = KP, KI, KD, LIMIT_A
+    sizes = np.zeros(5)
     n = target.shape[0]
     out = np.empty((n, 4))
     gain = p[0] * p[1]
@@ -149,7 +191,9 @@ def _run(p: Any, target: Any, kp: float, ki: float, kd: float, limit_a: float) -
         out[k, 1] = q
         out[k, 2] = contact_torque(p, q)
         out[k, 3] = state[BRISTLE]
-        step_axis(state, p, i)
+        sizes[0], sizes[1], sizes[2], sizes[3] = out[k, 2], state[SPEED], q, k / RATE_HZ
+        step_axis(state, p, i, _factor(variable, high, table, sizes))
+        sizes[4] = (state[SPEED] - sizes[1]) * RATE_HZ
     return out
 
 
@@ -165,8 +209,9 @@ def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[s
         `motor_current_a`, `motor_angle_rad` (of the shaft), `joint_angle_rad` and `force_n`, each
         of shape (n,).
     """
-    values = np.array(astuple(axis), dtype=np.float64)
-    out = _run(values, np.ascontiguousarray(target_rad, np.float64), KP, KI, KD, LIMIT_A)
+    form = axis.form
+    target = np.ascontiguousarray(target_rad, np.float64)
+    out = _run(axis.values, form.variable, form.high, form.values, target)
     random = np.random.default_rng(seed)
     n = len(target_rad)
     return {

@@ -57,7 +57,7 @@ class PsmImporter:
         """Open a file, or the files of a folder sorted by name, as a campaign.
 
         Raises:
-            DataError: There is no such file. Reading a run raises DataError where its file is
+            DataError: No such file. Reading a run raises DataError where its file is
                 damaged, naming file, line and what was expected.
         """
         files = _files(path)

@@ -47,7 +47,7 @@ class Window:
 
         Args:
             time_s: Device time, shape (n,), increasing, n at least 1.
-            values: Shape (signals, n); NaN where there is no value.
+            values: Shape (signals, n); NaN without a value.
         """
         bin_of = np.floor(time_s / self._bin_s).astype(np.int64)
         newest = int(bin_of[-1])

@@ -165,7 +165,7 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
 
 
 def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
-    """Return the record at a place and where the next begins; None if there is no whole one."""
+    """Return the record at a place and where the next begins; None without a whole one."""
     if start + _HEAD.size > len(buffer):
         return None
     opcode, length = _HEAD.unpack_from(buffer, start)

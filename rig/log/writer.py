@@ -8,7 +8,7 @@ whole one.
 
 What was written is held in memory until it has waited `FLUSH_AFTER_S` or spans that much data time,
 then it goes to the operating system as one chunk for each stream. What the operating system has,
-`kill -9` cannot take away; only a power cut can, and `sync` covers that.
+`kill -9` cannot take away; only a power cut can.
 """
 
 import os
@@ -201,12 +201,6 @@ class LogWriter:
                     part = messages[start : start + step]
                     self._container.add_chunk(self._channels[topic], part)
             self._file.flush()
-
-    def sync(self) -> None:
-        """Flush, and wait until the disk has everything: call it on a fault."""
-        self.flush()
-        with self._giving_to_system():
-            os.fsync(self._file.fileno())
 
     def mark(self, mark: Mark) -> None:
         """Write an operator's mark at once."""

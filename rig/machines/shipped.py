@@ -19,7 +19,7 @@ def place_of(path: Path) -> Path:
     """Return the file of a machine: the path, or the file of that name in `shipped`.
 
     Raises:
-        NoPlantError: There is no such file and no such name.
+        NoPlantError: No such file and no such name.
     """
     known = shipped()
     place = known.get(str(path), path)
@@ -36,7 +36,7 @@ def read_machine(path: Path) -> Plant:
     """Read a machine file, or a shipped machine by its name.
 
     Raises:
-        NoPlantError: There is no such file and no such name.
+        NoPlantError: No such file and no such name.
         PlantFileError: The file cannot be read.
     """
     return plant_file.read(place_of(path))

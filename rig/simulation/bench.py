@@ -26,6 +26,7 @@ from rig.simulation import (
     hidden_sensors,
     noise,
     parameters,
+    places,
     plant,
     sensors,
 )
@@ -56,6 +57,7 @@ def _fingerprint() -> str:
         hidden_sensors,
         noise,
         parameters,
+        places,
         plant,
         sensors,
     ):
@@ -98,20 +100,12 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
 
     @numba.njit(cache=True)
     def with_controller(  # type: ignore[no-untyped-def]
-        state,
-        p,
-        s,
-        effects,
-        seed,
-        first_tick,
-        target,
-        load_ma,
-        board,
-        control_state,
-        gains,
-        rows,
+        state, rig, first_tick, commands, drive, rows
     ):
         _ = source
+        p, s, effects, seed = rig
+        target, load_ma = commands
+        board, control_state, gains = drive
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
@@ -121,9 +115,11 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
-        state, p, s, effects, seed, first_tick, ticks, function, board, tick_us
+        state, rig, first_tick, ticks, call, tick_us
     ):
         _ = source
+        p, s, effects, seed = rig
+        function, board = call
         inputs = np.zeros(7, np.int32)
         outputs = np.zeros(2, np.int32)
         for k in range(ticks):
@@ -169,14 +165,16 @@ class SimulatedBench:
         self.ticks_done = 0
         start_rad = -(start_count + 0.5) * sensors.TURN_RAD / self.sensors.spindle_count_per_turn
         self._state = plant.rest_state(self.parameters, start_rad)
-        self._constants = plant.constants_of(self.parameters)
-        self._scales = sensors.scales_of(self.sensors)
-        self._table = hidden.table(self.effects)
-        self._seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
+        self._rig = (
+            plant.constants_of(self.parameters),
+            sensors.scales_of(self.sensors),
+            hidden.table(self.effects),
+            np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8])),
+        )
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """A copy of the plant's true state, places as in `rig.simulation.plant`."""
+        """A copy of the plant's true state, see `rig.simulation.places`."""
         return self._state.copy()
 
     def advance(
@@ -207,17 +205,9 @@ class SimulatedBench:
                     f"{name} has shape {array.shape}.", f"{ticks} ticks need shape ({ticks},)."
                 )
         rows = np.empty((ticks, COLUMNS), np.int32)
+        commands = np.ascontiguousarray(target, np.int32), np.ascontiguousarray(load_ma, np.int32)
         _run_with_controller(
-            self._state,
-            self._constants,
-            self._scales,
-            self._table,
-            self._seed,
-            self.ticks_done,
-            np.ascontiguousarray(target, np.int32),
-            np.ascontiguousarray(load_ma, np.int32),
-            *drive.arrays,
-            rows,
+            self._state, self._rig, self.ticks_done, commands, tuple(drive.arrays), rows
         )
         self.ticks_done += ticks
         return rows
@@ -242,16 +232,6 @@ class SimulatedBench:
                 f"A board cannot be run for {ticks} ticks through address {tick_address:#x}.",
                 fix="Pass the address of the loaded library's `rig_board_tick`.",
             )
-        _run_with_board(
-            self._state,
-            self._constants,
-            self._scales,
-            self._table,
-            self._seed,
-            self.ticks_done,
-            ticks,
-            tick_address,
-            board_address,
-            tick_us,
-        )
+        call = tick_address, board_address
+        _run_with_board(self._state, self._rig, self.ticks_done, ticks, call, tick_us)
         self.ticks_done += ticks

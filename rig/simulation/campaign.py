@@ -30,7 +30,7 @@ def simulate_reference_campaign(
         effects: Hidden effects switched on in every run.
 
     Raises:
-        UsageError: The protocol does not exist, or there is no such effect.
+        UsageError: The protocol does not exist, or no such effect.
     """
     plans = load_protocol(protocol).plans()
     table(effects)  # an unknown name is refused now

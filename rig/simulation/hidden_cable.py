@@ -53,7 +53,6 @@ def spindle_friction_n_m(
     cable_torque: float,
     clock_s: float,
     age_s: float,
-    wrist_angle: float,
 ) -> float:
     """Return the contribution of the hidden effects to the Coulomb level at the spindle.
 
@@ -64,7 +63,6 @@ def spindle_friction_n_m(
         cable_torque: Torque the cable carries, at the jaw.
         clock_s: Time since the bench was started.
         age_s: State of the contact that ages.
-        wrist_angle: Pitch of the wrist, rad.
     """
     extra = 0.0
     if effects[CABLE_POSITION_FRICTION, STRENGTH] != 0.0:
@@ -82,6 +80,22 @@ def spindle_friction_n_m(
     if effects[CABLE_CAPSTAN, STRENGTH] != 0.0:
         row = effects[CABLE_CAPSTAN]
         extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
+    return extra
+
+
+@numba.njit()
+def wrist_friction_n_m(
+    effects: NDArray[np.float64], spindle_speed: float, cable_torque: float, wrist_angle: float
+) -> float:
+    """Return the contribution of effects of the wrist to the Coulomb level at the spindle.
+
+    Args:
+        effects: From `hidden.table`.
+        spindle_speed: rad/s.
+        cable_torque: Torque the cable carries, at the jaw.
+        wrist_angle: Pitch of the wrist, rad.
+    """
+    extra = 0.0
     if effects[WRIST_CAPSTAN, STRENGTH] != 0.0:
         row = effects[WRIST_CAPSTAN]
         wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)

@@ -45,8 +45,6 @@ def motor_friction_n_m(
     effects: NDArray[np.float64],
     speed: float,
     spindle_angle: float,
-    twist_torque: float,
-    gear: float,
     state: float,
     clock_s: float,
 ) -> float:
@@ -56,14 +54,10 @@ def motor_friction_n_m(
         effects: From `hidden.table`.
         speed: Of the motor shaft, rad/s.
         spindle_angle: rad.
-        twist_torque: Torque the gear carries, at the spindle.
-        gear: Spindle turns a motor turn.
         state: State of the two-state friction, 0 or 1.
         clock_s: Time since the bench was started.
     """
     extra = 0.0
-    if effects[GEAR_LOAD_FRICTION, STRENGTH] != 0.0:
-        extra += gear * gear_load_friction_n_m(effects[GEAR_LOAD_FRICTION], twist_torque)
     if effects[GEAR_STRIBECK, STRENGTH] != 0.0:
         extra += gear_stribeck_n_m(effects[GEAR_STRIBECK], speed)
     if effects[MOTOR_ASYMMETRY, STRENGTH] != 0.0:
@@ -76,12 +70,23 @@ def motor_friction_n_m(
         extra += gear_angle_viscous_n_m(effects[GEAR_ANGLE_VISCOUS], speed, spindle_angle)
     if effects[MOTOR_VISCOUS_ASYMMETRY, STRENGTH] != 0.0:
         extra += motor_viscous_asymmetry_n_m(effects[MOTOR_VISCOUS_ASYMMETRY], speed)
-    if effects[GEAR_LOAD_VISCOUS, STRENGTH] != 0.0:
-        extra += gear * gear_load_viscous_n_m(effects[GEAR_LOAD_VISCOUS], speed, twist_torque)
     if effects[GREASE_WARMUP, STRENGTH] != 0.0:
         extra += grease_warmup_n_m(effects[GREASE_WARMUP], clock_s)
     if effects[GEAR_WEAR, STRENGTH] != 0.0:
         extra += effects[GEAR_WEAR, STRENGTH] * 0.3e-3
+    return extra
+
+
+@numba.njit()
+def gear_friction_n_m(
+    effects: NDArray[np.float64], motor_speed: float, twist_torque: float
+) -> float:
+    """Return the hidden friction that grows with the torque in the gear, at the spindle."""
+    extra = 0.0
+    if effects[GEAR_LOAD_FRICTION, STRENGTH] != 0.0:
+        extra += gear_load_friction_n_m(effects[GEAR_LOAD_FRICTION], twist_torque)
+    if effects[GEAR_LOAD_VISCOUS, STRENGTH] != 0.0:
+        extra += gear_load_viscous_n_m(effects[GEAR_LOAD_VISCOUS], motor_speed, twist_torque)
     return extra
 
 

@@ -25,47 +25,33 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden, hidden_cable, hidden_drive, hidden_sensors
+from rig.simulation import hidden, hidden_cable, hidden_drive
 from rig.simulation.parameters import PlantParameters
+from rig.simulation.places import (
+    AGE,
+    BRISTLE,
+    CLOCK,
+    CREEP_STRAIN,
+    CURRENT,
+    DISTAL_TORQUE,
+    HEAT,
+    HYSTERESIS,
+    JAW_ANGLE,
+    JAW_SPEED,
+    LAG_FIRST,
+    LAG_SECOND,
+    LOAD_CURRENT,
+    MOTOR_ANGLE,
+    MOTOR_SPEED,
+    PROXIMAL_TORQUE,
+    SPINDLE_ANGLE,
+    SPINDLE_SPEED,
+    STATE_SIZE,
+    TWO_STATE,
+)
 
 TICK_S = 1e-3
 """One tick of the logger, s."""
-
-(
-    MOTOR_ANGLE,
-    MOTOR_SPEED,
-    SPINDLE_ANGLE,
-    SPINDLE_SPEED,
-    JAW_ANGLE,
-    JAW_SPEED,
-    CURRENT,
-    LOAD_CURRENT,
-    PROXIMAL_TORQUE,
-    DISTAL_TORQUE,
-    BRISTLE,
-    CREEP_STRAIN,
-    PROXIMAL_DRIFT,
-    DISTAL_DRIFT,
-    CLOCK,
-    HYSTERESIS,
-    HEAT,
-    TWO_STATE,
-    LAG_FIRST,
-    LAG_SECOND,
-    CREEP_FAST,
-    CREEP_SLOW,
-    SENSOR_LAG_FIRST,
-    SENSOR_LAG_SECOND,
-    AGE,
-    PROXIMAL_COLOUR,
-    DISTAL_COLOUR,
-    CURRENT_COLOUR,
-    RING,
-) = range(29)
-STATE_SIZE = RING + hidden_sensors.RING
-"""Places in the state, SI units: motion, currents, torques at the torque sensors, the drift of the
-two torque zeros, the time since the start, and the states of hidden effects; the last ones are the
-jaw angles that a delayed encoder remembers."""
 
 _Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
 
@@ -153,6 +139,9 @@ def step_tick(
     The proximal sensor carries the drive unit: it measures the gear's output torque and the
     reaction to the rotor's acceleration. The distal sensor carries the load motor: it measures that
     motor's torque and its friction. Both are left in the state as of the last substep.
+
+    This is one function so that its variables stay in registers: cut into functions of the state it
+    takes more than twice as long.
 
     Args:
         state: Shape (`STATE_SIZE`,), changed in place.
@@ -286,8 +275,9 @@ def step_tick(
                 row = effects[hidden.GEAR_TWO_STATE]
                 rubbing = hidden_drive.gear_two_state(row, rubbing, motor_speed)
             motor_limit += hidden_drive.motor_friction_n_m(
-                effects, motor_speed, spindle, twist_torque, gear, rubbing, clock
+                effects, motor_speed, spindle, rubbing, clock
             )
+            motor_limit += gear * hidden_drive.gear_friction_n_m(effects, motor_speed, twist_torque)
         before = motor_speed
         motor_speed += dt_motor * (
             motor_torque - p.motor_viscous_n_m_s_rad * motor_speed - gear * twist_torque
@@ -307,8 +297,9 @@ def step_tick(
                 row = effects[hidden.CABLE_DWELL]
                 age += dt * hidden_cable.cable_dwell_rate(row, age, spindle_speed)
             spindle_limit += hidden_cable.spindle_friction_n_m(
-                effects, spindle, spindle_speed, cable, clock, age, wrist
+                effects, spindle, spindle_speed, cable, clock, age
             )
+            spindle_limit += hidden_cable.wrist_friction_n_m(effects, spindle_speed, cable, wrist)
         if spindle_ripple:
             row = effects[hidden.SPINDLE_RIPPLE]
             spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)

@@ -8,7 +8,7 @@ creep with the logarithm of time, the amplifier's curve (the inverse of the cubi
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.fsr import ZHANG_2022
+from calibration.fsr_curve import ZHANG_2022
 
 FloatArray = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden, hidden_sensors, plant
+from rig.simulation import hidden, hidden_sensors, places, plant
 from rig.simulation.noise import normal
 from rig.simulation.parameters import SensorParameters
 
@@ -50,92 +50,104 @@ def sample(
     """Write the seven sampled counts of this tick and let the torque zeros drift by one tick.
 
     Args:
-        state: State of the plant, shape (`plant.STATE_SIZE`,); only its drifts and the sensors' own
-            states are changed.
+        state: State of the plant, shape (`places.STATE_SIZE`,); only its drifts and the states of
+            the sensors are changed.
         s: From `scales_of`.
         effects: From `hidden.table`.
         seed: Scrambled seed of the bench.
         tick: Tick number since the bench was made.
         counts: Where to write, shape (7,) or longer, int32.
     """
-    walk = s.torque_walk_n_m_s * np.sqrt(plant.TICK_S)
-    state[plant.PROXIMAL_DRIFT] += s.proximal_ramp_n_m_s * plant.TICK_S + walk * normal(
-        seed, tick, 0
-    )
-    state[plant.DISTAL_DRIFT] += s.distal_ramp_n_m_s * plant.TICK_S + walk * normal(seed, tick, 1)
-
-    if s.torque_colour_n_m != 0.0 or s.current_colour_a != 0.0:
-        keep = np.exp(-plant.TICK_S / s.colour_time_s)
-        fresh = np.sqrt(1.0 - keep * keep)
-        for k in range(3):
-            place = plant.PROXIMAL_COLOUR + k
-            state[place] = keep * state[place] + fresh * normal(seed, tick, 6 + k)
-
-    counts[MOTOR] = int(np.floor(state[plant.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
+    _drift(state, s, seed, tick)
+    counts[MOTOR] = int(np.floor(state[places.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
     counts[SPINDLE] = int(
-        np.floor(-state[plant.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
+        np.floor(-state[places.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
     )
-    strength = effects[:, hidden.STRENGTH]
-    jaw = state[plant.JAW_ANGLE]
-    if strength[hidden.JAW_ENCODER_WAVE] != 0.0:
+    jaw = state[places.JAW_ANGLE]
+    if effects[hidden.JAW_ENCODER_WAVE, hidden.STRENGTH] != 0.0:
         jaw += hidden_sensors.jaw_encoder_wave_rad(effects[hidden.JAW_ENCODER_WAVE], jaw)
-    if strength[hidden.JAW_DELAY] != 0.0:
-        jaw = hidden_sensors.delayed(effects[hidden.JAW_DELAY], state[plant.RING :], tick, jaw)
+    if effects[hidden.JAW_DELAY, hidden.STRENGTH] != 0.0:
+        jaw = hidden_sensors.delayed(effects[hidden.JAW_DELAY], state[places.RING :], tick, jaw)
     counts[JAW] = int(np.floor(jaw / TURN_RAD * s.jaw_count_per_turn))
 
     per_count = 1.0 / s.torque_n_m_per_count
     limit = s.torque_limit_count
-    seen = state[plant.PROXIMAL_TORQUE]
-    if strength[hidden.PROXIMAL_LAG] != 0.0:
-        places = state[plant.SENSOR_LAG_FIRST :]
-        seen = hidden_sensors.proximal_lag_n_m(
-            effects[hidden.PROXIMAL_LAG], places, seen, plant.TICK_S
-        )
-    if strength[hidden.PROXIMAL_CREEP] != 0.0:
-        places = state[plant.CREEP_FAST :]
-        seen += hidden_sensors.proximal_creep_n_m(
-            effects[hidden.PROXIMAL_CREEP], places, seen, plant.TICK_S
-        )
-    if strength[hidden.PROXIMAL_BEND] != 0.0:
-        seen *= hidden_sensors.proximal_bend_ratio(effects[hidden.PROXIMAL_BEND], seen)
     proximal = (
-        seen
+        _proximal_n_m(state, effects)
         + s.proximal_offset_n_m
-        + state[plant.PROXIMAL_DRIFT]
+        + state[places.PROXIMAL_DRIFT]
         + s.proximal_noise_n_m * normal(seed, tick, 2)
-        + s.torque_colour_n_m * state[plant.PROXIMAL_COLOUR]
+        + s.torque_colour_n_m * state[places.PROXIMAL_COLOUR]
     )
-    seen = state[plant.DISTAL_TORQUE]
-    if strength[hidden.DISTAL_DRIFT] != 0.0:
-        seen += hidden_sensors.distal_drift_n_m(effects[hidden.DISTAL_DRIFT], state[plant.CLOCK])
-    if strength[hidden.DISTAL_CROSSTALK] != 0.0:
-        seen += hidden_sensors.distal_crosstalk_n_m(
-            effects[hidden.DISTAL_CROSSTALK], state[plant.CURRENT]
-        )
     distal = (
-        seen
+        _distal_n_m(state, effects)
         + s.distal_offset_n_m
-        + state[plant.DISTAL_DRIFT]
+        + state[places.DISTAL_DRIFT]
         + s.distal_noise_n_m * normal(seed, tick, 3)
-        + s.torque_colour_n_m * state[plant.DISTAL_COLOUR]
+        + s.torque_colour_n_m * state[places.DISTAL_COLOUR]
     )
     counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
     counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
 
-    current = state[plant.CURRENT]
-    if strength[hidden.CURRENT_SENSOR_BEND] != 0.0:
-        current *= hidden_sensors.current_sensor_bend_ratio(
-            effects[hidden.CURRENT_SENSOR_BEND], current
-        )
+    current = state[places.CURRENT]
+    if effects[hidden.CURRENT_SENSOR_BEND, hidden.STRENGTH] != 0.0:
+        row = effects[hidden.CURRENT_SENSOR_BEND]
+        current *= hidden_sensors.current_sensor_bend_ratio(row, current)
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
-    current += s.current_colour_a * state[plant.CURRENT_COLOUR]
+    current += s.current_colour_a * state[places.CURRENT_COLOUR]
     counts[CURRENT] = _converted(
         current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count
     )
 
-    grip = max(state[plant.DISTAL_TORQUE], 0.0) / s.lever_arm_m
+    grip = max(state[places.DISTAL_TORQUE], 0.0) / s.lever_arm_m
     fsr = grip / s.fsr_n_per_count + s.fsr_offset_count + s.fsr_noise_count * normal(seed, tick, 5)
     counts[FSR] = _converted(fsr, 1.0, 0.0, s.fsr_limit_count)
+
+
+@numba.njit()
+def _drift(state: NDArray[np.float64], s: Any, seed: np.uint64, tick: int) -> None:
+    """Move the zeros of the torque sensors and the coloured noise by a tick."""
+    walk = s.torque_walk_n_m_s * np.sqrt(plant.TICK_S)
+    for k in range(2):
+        ramp = s.proximal_ramp_n_m_s if k == 0 else s.distal_ramp_n_m_s
+        state[places.PROXIMAL_DRIFT + k] += ramp * plant.TICK_S + walk * normal(seed, tick, k)
+    if s.torque_colour_n_m != 0.0 or s.current_colour_a != 0.0:
+        keep = np.exp(-plant.TICK_S / s.colour_time_s)
+        fresh = np.sqrt(1.0 - keep * keep)
+        for k in range(3):
+            place = places.PROXIMAL_COLOUR + k
+            state[place] = keep * state[place] + fresh * normal(seed, tick, 6 + k)
+
+
+@numba.njit()
+def _proximal_n_m(state: NDArray[np.float64], effects: NDArray[np.float64]) -> float:
+    """Return the torque at the spindle as its sensor sees it, with the sensor's hidden effects."""
+    seen = state[places.PROXIMAL_TORQUE]
+    row = effects[hidden.PROXIMAL_LAG]
+    if row[hidden.STRENGTH] != 0.0:
+        memory = state[places.SENSOR_LAG_FIRST :]
+        seen = hidden_sensors.proximal_lag_n_m(row, memory, seen, plant.TICK_S)
+    row = effects[hidden.PROXIMAL_CREEP]
+    if row[hidden.STRENGTH] != 0.0:
+        memory = state[places.CREEP_FAST :]
+        seen += hidden_sensors.proximal_creep_n_m(row, memory, seen, plant.TICK_S)
+    row = effects[hidden.PROXIMAL_BEND]
+    if row[hidden.STRENGTH] != 0.0:
+        seen *= hidden_sensors.proximal_bend_ratio(row, seen)
+    return float(seen)
+
+
+@numba.njit()
+def _distal_n_m(state: NDArray[np.float64], effects: NDArray[np.float64]) -> float:
+    """Return the torque at the jaw as its sensor sees it, with the sensor's hidden effects."""
+    seen = state[places.DISTAL_TORQUE]
+    row = effects[hidden.DISTAL_DRIFT]
+    if row[hidden.STRENGTH] != 0.0:
+        seen += hidden_sensors.distal_drift_n_m(row, state[places.CLOCK])
+    row = effects[hidden.DISTAL_CROSSTALK]
+    if row[hidden.STRENGTH] != 0.0:
+        seen += hidden_sensors.distal_crosstalk_n_m(row, state[places.CURRENT])
+    return float(seen)
 
 
 def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:

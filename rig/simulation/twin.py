@@ -6,7 +6,7 @@ artefact of the method: the null of a parametric bootstrap (Efron and Tibshirani
 to the Bootstrap", 1993, chapter 6).
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -100,26 +100,6 @@ class Twin:
             simulate(reference, self.plant, self.sensors, seed * 100_003 + index)
             for index, reference in enumerate(self.references)
         )
-
-
-def twins(
-    models: Iterable[Model], campaign: Campaign, count: int, seed: int = 0
-) -> Iterator[Campaign]:
-    """Yield synthetic campaigns of the declared model.
-
-    Args:
-        models: Fitted models of the equations; see `rig.simulation.fitted.plant_of`.
-        campaign: Recorded runs; excluded runs have no simulated null.
-        count: Number of campaigns.
-        seed: Seed of the first one's noise; each has its own.
-
-    Raises:
-        DataError: A run lacks something that a simulated null needs, or a model makes no plant.
-        NotFittedError: A model has no values.
-    """
-    twin = build_twin(models, campaign)
-    for index in range(count):
-        yield Campaign.of(twin(seed * 1_000_003 + index))
 
 
 def build_twin(models: Iterable[Model], campaign: Campaign) -> Twin:

@@ -64,12 +64,14 @@ def kept_outcomes(
 
 
 def source_digest(schema: str) -> str:
-    """Return a name for the source that outcomes come from: estimation, simulation, studies."""
+    """Return a name for the source that outcomes come from; pages only show them."""
     root = Path(__file__).parents[2]
-    parts = [root / "estimation", root / "rig" / "simulation", root / "rig" / "studies"]
+    rooms = ("simulation", "arm", "grasper", "studies")
+    parts = [root / "estimation", *(root / "rig" / room for room in rooms)]
     digest = hashlib.sha256(schema.encode())
     for path in sorted(path for part in parts for path in part.rglob("*.py")):
-        digest.update(path.read_bytes())
+        if not path.stem.endswith("page"):
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -25,7 +25,7 @@ from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
-from estimation.diagnosis.result import FAMILIES
+from estimation.effects import families
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
@@ -61,7 +61,7 @@ def test_every_hidden_effect_has_an_answer() -> None:
 def test_every_family_is_hidden_in_some_case_or_cannot_be() -> None:
     hidden_ = {truth.family for truth in CATALOGUED.values()}
     assert not hidden_ & NOT_HIDDEN.keys()
-    assert hidden_ | NOT_HIDDEN.keys() == set(FAMILIES)
+    assert hidden_ | NOT_HIDDEN.keys() == set(families())
 
 
 def test_what_comes_or_fades_does_so_from_run_to_run() -> None:

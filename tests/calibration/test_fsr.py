@@ -8,15 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibration.errors import CalibrationError
-from calibration.fsr import (
-    ZHANG_2022,
-    FsrCurve,
-    FsrRangeError,
-    FsrRun,
-    fit_fsr,
-    hysteresis_ratio,
-    measure_creep,
-)
+from calibration.fsr import FsrRun, fit_fsr, hysteresis_ratio, measure_creep
+from calibration.fsr_curve import ZHANG_2022, FsrCurve, FsrRangeError
 from calibration.quality import BadDataError
 from calibration.record import CalibrationRecord, Validity
 

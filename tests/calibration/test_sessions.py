@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from calibration.fsr import Creep, FsrCurve, FsrRun
+from calibration.fsr import Creep, FsrRun
+from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory, fit_memory
 from calibration.ft import at_point, fit_tool
 from calibration.linear import shipped_calibration_set

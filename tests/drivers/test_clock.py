@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.clock import ClockError, ClockFit, TickUnwrapper, align, arrival_fit
+from drivers.clock import ClockError, ClockFit, TickUnwrapper, arrival_fit
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
@@ -132,22 +132,6 @@ def test_a_reset_of_the_device_begins_a_new_line(start_us: int) -> None:
     host_s = float(fit.line.to_host(np.array([tick_s]))[0])
     wraps_s = WRAP * 1e-6
     assert min(abs(host_s - 40), abs(host_s - 40 - wraps_s)) < 2e-4
-
-
-def test_several_devices_meet_on_one_time_base() -> None:
-    clocks = {"a": DriftingClock(45.0, 7, 8), "b": DriftingClock(-45.0, WRAP - 10**7, 9)}
-    lines = {name: fitted(clock, 60, 1e-4).line for name, clock in clocks.items()}
-    events_s = np.linspace(5, 55, 11)
-    times = {
-        name: np.array([clock.device_s(float(at)) for at in events_s])
-        for name, clock in clocks.items()
-    }
-    aligned = align(times, lines)
-    for name in clocks:
-        assert np.abs(aligned.host_s[name] - events_s).max() < 1e-4
-        assert 0 < aligned.residual_s[name] < 2e-4
-    with pytest.raises(ClockError, match="clock of b"):
-        align(times, {"a": lines["a"]})
 
 
 @settings(max_examples=30)

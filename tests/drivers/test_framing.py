@@ -9,7 +9,6 @@ from cobs import cobs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers import framing
 from drivers.errors import FrameError
 from drivers.framing import (
     FrameStream,
@@ -21,6 +20,7 @@ from drivers.framing import (
     encode_frame,
     encode_frames,
 )
+from drivers.framing_compiled import MAX_BULK_PAYLOAD, MAX_WIRE
 
 SIZE = 42
 long_binary = st.one_of(
@@ -73,11 +73,11 @@ def test_a_frame_comes_back(payload: bytes) -> None:
     frame = encode_frame(payload)
     assert frame.endswith(b"\x00")
     assert 0 not in frame[:-1]
-    assert len(frame) <= framing.MAX_WIRE + 1
+    assert len(frame) <= MAX_WIRE + 1
     assert decode_frame(frame[:-1]) == payload
 
 
-@given(st.integers(0, framing.MAX_BULK_PAYLOAD), st.integers(0, 2**32 - 1))
+@given(st.integers(0, MAX_BULK_PAYLOAD), st.integers(0, 2**32 - 1))
 @settings(max_examples=40)
 def test_bulk_frames_are_single_frames(size: int, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -153,4 +153,4 @@ def test_noise_is_decoded_as_one_frame_at_a_time_would(noise: bytes) -> None:
 
 def test_a_bulk_payload_has_one_code_byte_at_most() -> None:
     with pytest.raises(ValueError, match="253"):
-        decode_frames(b"", framing.MAX_BULK_PAYLOAD + 1)
+        decode_frames(b"", MAX_BULK_PAYLOAD + 1)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drivers.teensy import protocol
 from drivers.teensy.control import control_tick, new_state
-from drivers.teensy.core import CoreGuard, FirmwareBoard, FirmwareMissingError
+from drivers.teensy.core import BoardStart, CoreGuard, FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.teensy.reference import Limits
 from tests.drivers.bench_physics import PlainBench, ScriptedBench
@@ -272,7 +272,7 @@ def test_a_hot_motor_is_armed_again_when_it_has_cooled(library: Path) -> None:
 def test_a_board_that_was_just_started_takes_its_motors_for_hot(library: Path) -> None:
     limits = dataclasses.replace(WIDEST, continuous_current=100, i2t=5000)  # cools in 0.5 s
     inputs = np.zeros((3000, 7), np.int32)
-    board = FirmwareBoard(ScriptedBench(inputs), library=library, simulated=False)
+    board = FirmwareBoard(ScriptedBench(inputs), BoardStart(simulated=False), library)
     host = RawHost(board)
     host.run(150)
     assert host.ack(protocol.encode_reference(7, (0, 0, 0)))[0] is Result.OK

@@ -55,13 +55,13 @@ def test_arm_comes_back(sequence: int, gains: list[float], limits: tuple[int, ..
 
 @given(u16, st.sampled_from(list(Trip)), i32, i32, st.integers(0, 2**32 - 1))
 def test_a_trip_report_comes_back(sequence: int, code: Trip, value: int, limit: int, at: int):
-    payload = protocol.encode_trip_report(sequence, code, 3, value, limit, at, 2**40)
+    payload = protocol.encode_trip_report(sequence, code, 3, (value, limit, at, 2**40))
     report = REFERENCE.decode_trip_report(REFERENCE.decode(payload)[2])
     assert report == protocol.TripReport(code, "proximal", value, limit, at, 2**32 - 1)
 
 
 def test_an_unknown_trip_is_refused() -> None:
-    fields = REFERENCE.decode(protocol.encode_trip_report(1, 99, 255, 0, 0, 0, 0))[2]
+    fields = REFERENCE.decode(protocol.encode_trip_report(1, 99, 255, (0, 0, 0, 0)))[2]
     with pytest.raises(FrameError, match="99"):
         REFERENCE.decode_trip_report(fields)
 
@@ -81,13 +81,10 @@ def test_an_ack_comes_back(sequence: int, command: Kind, result: int, status: in
 
 
 def test_identity_and_pong_come_back() -> None:
-    fields = REFERENCE.decode(
-        protocol.encode_hello_reply(9, "TEENSY-0042", REFERENCE.protocol_hash)
-    )[2]
-    identity = protocol.decode_identity(fields)
-    assert identity.serial == "TEENSY-0042"
-    assert identity.protocol_hash == REFERENCE.protocol_hash
-    assert identity.firmware_version == protocol.version_text(protocol.FIRMWARE_VERSION)
+    version = protocol.version_text(protocol.FIRMWARE_VERSION)
+    sent = protocol.Identity("TEENSY-0042", version, REFERENCE.protocol_hash, 7, 2, 3, 4)
+    fields = REFERENCE.decode(protocol.encode_hello_reply(9, sent))[2]
+    assert protocol.decode_identity(fields) == sent
     kind, sequence, pong = REFERENCE.decode(protocol.encode_pong(5, 2**64 - 1, 2**32 - 1))
     assert (kind, sequence) == (Kind.PONG, 5)
     assert (int(pong["token"]), int(pong["tick_us"])) == (2**64 - 1, 2**32 - 1)

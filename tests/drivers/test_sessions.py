@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.teensy import protocol
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.protocol import Kind, Result, Trip
 from drivers.teensy.reference import Limits
@@ -165,7 +165,7 @@ def test_a_trip_is_cleared_by_its_name_alone(board: Board) -> None:
 def test_offers_differ_between_starts_of_a_board(library: object) -> None:
     offers = set()
     for boot in range(1, 40):
-        host = RawHost(FirmwareBoard(PlainBench(), boot=boot))
+        host = RawHost(FirmwareBoard(PlainBench(), BoardStart(boot=boot)))
         for _ in range(5):
             offers.add(host.hello().offer)
             assert host.arm() is Result.OK

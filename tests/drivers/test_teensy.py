@@ -17,7 +17,7 @@ from drivers.errors import (
 )
 from drivers.framing import encode_frame
 from drivers.teensy import protocol
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.protocol import Result
@@ -36,9 +36,9 @@ MakeBoard = Callable[..., Board]
 def make_board(request: pytest.FixtureRequest) -> MakeBoard:
     """A board on its bench: the Python fake, and the firmware core."""
     if request.param == "fake":
-        return lambda **options: PythonBoard(PlainBench(), **options)
+        return lambda tick_us=0: PythonBoard(PlainBench(), tick_us)
     library = request.getfixturevalue("library")
-    return lambda **options: FirmwareBoard(PlainBench(), library=library, **options)
+    return lambda tick_us=0: FirmwareBoard(PlainBench(), BoardStart(tick_us=tick_us), library)
 
 
 def logger_of(board: Board) -> TeensyLogger:
@@ -66,9 +66,9 @@ def joined(batches: list[SampleBatch]) -> np.ndarray:
 
 
 def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) -> None:
-    logger = logger_of(make_board(serial="TEENSY-0042"))
+    logger = logger_of(make_board())
     identity = logger.identify()
-    assert identity.serial == "TEENSY-0042"
+    assert identity.serial == "SIM-0001"
     assert identity.protocol_hash == REFERENCE.protocol_hash
     logger.start()
     rest = joined(read_for(logger, 100))
@@ -97,7 +97,7 @@ def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) ->
 
 def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board: MakeBoard) -> None:
     start_us = 2**32 - 120_000
-    logger = logger_of(make_board(start_tick_us=start_us))
+    logger = logger_of(make_board(start_us))
     logger.start()
     batches = read_for(logger, 300)
     samples, ticks = joined(batches), np.concatenate([batch.tick_us for batch in batches])

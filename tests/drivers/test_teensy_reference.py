@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import CommandRefusedError
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_REFERENCED, Result
 from drivers.teensy.reference import Limits
@@ -20,7 +20,7 @@ STANDS = np.array([[700, -40, 9, 1, -1, 2, 0], [700, -40, 9, 2, 1, -2, 0]] * 500
 
 def logger_of(library: Path, inputs: np.ndarray = STANDS, boot: int = 7) -> TeensyLogger:
     bench = ScriptedBench(inputs)
-    board = FirmwareBoard(bench, library=library, boot=boot, simulated=False)
+    board = FirmwareBoard(bench, BoardStart(boot=boot, simulated=False), library)
     return TeensyLogger(SimulatedTransport(board, "sim://"))
 
 

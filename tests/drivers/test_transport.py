@@ -227,7 +227,7 @@ def test_virtual_time_passes_by_reading_alone() -> None:
         transport.read(1.0)
 
 
-def test_a_pace_waits_only_for_time_not_yet_passed() -> None:
+def test_a_pace_waits_only_for_time_not_yet_passed(monkeypatch: pytest.MonkeyPatch) -> None:
     real_s = [100.0]
     waits: list[float] = []
 
@@ -235,9 +235,9 @@ def test_a_pace_waits_only_for_time_not_yet_passed() -> None:
         waits.append(seconds)
         real_s[0] += seconds
 
-    transport = SimulatedTransport(
-        CountingBoard(), step_s=0.01, pace=2.0, wait=wait, clock=lambda: real_s[0]
-    )
+    monkeypatch.setattr("drivers.transport.simulated.sleep", wait)
+    monkeypatch.setattr("drivers.transport.simulated.monotonic", lambda: real_s[0])
+    transport = SimulatedTransport(CountingBoard(), step_s=0.01, pace=2.0)
     transport.read(0.08)
     assert transport.now_s == pytest.approx(0.04)
     assert sum(waits) == pytest.approx(0.02, abs=0.006)

@@ -235,6 +235,7 @@ def test_a_model_of_warm_up_is_fitted_on_the_campaign_and_runs_live():
     assert np.concatenate(steps) == pytest.approx(offline, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.long
 def test_a_change_between_runs_is_found_by_the_diagnosis():
     def rubs(motor_rad, speed_rad_s, load_n_m):
         return 0.01 * np.tanh(speed_rad_s / 3.0)

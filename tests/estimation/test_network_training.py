@@ -1,13 +1,11 @@
 """Training a network: it needs torch, and is skipped visibly without it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from estimation.errors import MissingExtraError
 from estimation.networks import training
-from estimation.networks.network import NetworkError, to_unit
+from estimation.networks.network import NetworkError
 from estimation.networks.training import Settings, train
 from tests.estimation.test_networks import IN, OUT, make
 
@@ -18,26 +16,6 @@ pytest.importorskip("torch", reason="torch is not installed (extra learn)")
 
 def rows(count: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform([-1.0, 0.0], [2.0, 0.5], (count, 2))
-
-
-def test_the_normal_equations_are_those_of_the_numerical_derivative():
-    network = make(outputs=2)
-    x = rows(9)
-    y = np.random.default_rng(1).normal(size=(9, 2))
-    weights = np.concatenate([network.hidden.ravel(), network.output.ravel()])
-
-    def mapped(w: np.ndarray) -> np.ndarray:
-        hidden = w[: network.hidden.size].reshape(network.hidden.shape)
-        output = w[network.hidden.size :].reshape(network.output.shape)
-        moved = replace(network, hidden=hidden, output=output)
-        return to_unit(moved(x), network.output_range).ravel()
-
-    steps = 1e-6 * np.eye(len(weights))
-    jacobian = np.column_stack([(mapped(weights + s) - mapped(weights - s)) / 2e-6 for s in steps])
-    error = mapped(weights) - to_unit(y, network.output_range).ravel()
-    curvature, slope = training.normal_equations(network, x, y)
-    np.testing.assert_allclose(curvature, jacobian.T @ jacobian, atol=1e-7)
-    np.testing.assert_allclose(slope, jacobian.T @ error, atol=1e-6)
 
 
 def test_training_recovers_a_known_function_and_its_noise():
@@ -61,14 +39,11 @@ def test_pure_noise_determines_almost_no_weight():
     assert np.std(found.network(rows(300, 9))) < 0.25
 
 
-def test_the_error_falls_with_every_block_of_rows_and_the_seed_fixes_the_result(monkeypatch):
+def test_blocks_of_rows_do_not_matter_and_the_seed_fixes_the_result(monkeypatch):
     x = rows(900)
     y = np.sin(3 * x[:, :1]) * x[:, 1:]
-    errors: list[float] = []
     settings = Settings(nodes=6, iterations=40, seed=4)
-    whole = train(x, y, (IN, OUT[:1]), settings, lambda step, rmse: errors.append(rmse))
-    assert len(errors) == whole.iterations
-    assert errors[-1] < 0.1 * errors[0]
+    whole = train(x, y, (IN, OUT[:1]), settings)
     again = train(x, y, (IN, OUT[:1]), settings)
     np.testing.assert_array_equal(again.network.hidden, whole.network.hidden)
     monkeypatch.setattr(training, "BLOCK", 100)

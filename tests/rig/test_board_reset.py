@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.board_start import BoardResetError
 from rig.bench.session import Session
@@ -17,7 +17,7 @@ class BoardThatIsReset:
 
     def __init__(self, library: Path, reset_at_tick: int) -> None:
         self._bench, self._library = SimulatedBench(), library
-        self._board = FirmwareBoard(self._bench, library=library, boot=4)
+        self._board = FirmwareBoard(self._bench, BoardStart(boot=4), library)
         self._left = reset_at_tick
 
     def receive(self, data: bytes) -> None:
@@ -28,7 +28,9 @@ class BoardThatIsReset:
 
     def advance(self, ticks: int) -> None:
         if 0 < self._left <= ticks:
-            self._board = FirmwareBoard(self._bench, library=self._library, boot=5, simulated=False)
+            self._board = FirmwareBoard(
+                self._bench, BoardStart(boot=5, simulated=False), self._library
+            )
         self._left -= ticks
         self._board.advance(ticks)
 

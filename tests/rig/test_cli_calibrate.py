@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from calibration.fsr import ZHANG_2022
+from calibration.fsr_curve import ZHANG_2022
 from calibration.store import CalibrationStore
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
 from rig.configuration.config import Config
@@ -91,7 +91,7 @@ def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(
 
 def test_a_board_without_zeros_does_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = MiswiredBench({})
-    link = SimulatedTransport(FirmwareBoard(bench, simulated=False), step_s=0.02)
+    link = SimulatedTransport(FirmwareBoard(bench, BoardStart(simulated=False)), step_s=0.02)
     monkeypatch.setattr("rig.doctor.commission.open_logger", lambda _: link)
     *_, last = commission(simulated())
     assert not last.passed

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation.diagnosis.result import (
-    FAMILIES,
     SCHEMA,
     VARIABLES,
     VERDICTS,
@@ -19,6 +18,7 @@ from estimation.diagnosis.result import (
     Value,
 )
 from estimation.diagnosis.split import Sealed
+from estimation.effects import families
 from rig.diagnosis.schema import DiagnosisSchema, json_schema
 
 FIELDS = {
@@ -42,8 +42,8 @@ RUNS = st.lists(st.text(min_size=1), max_size=3).map(tuple)
 def findings(draw: st.DrawFn) -> Finding:
     verdict = draw(st.sampled_from(VERDICTS[:-1]))
     named = verdict in ("identified", "one_of")
-    family = draw(st.sampled_from([f for f in FAMILIES if f != "unknown"])) if named else "unknown"
-    others = [f for f in FAMILIES if f not in ("unknown", family)]
+    family = draw(st.sampled_from(families()[:-1])) if named else "unknown"
+    others = [f for f in families()[:-1] if f != family]
     values = st.builds(Value, NUMBERS, st.sampled_from(["N m", "1"]), PAIRS)
     return Finding(
         balance=draw(BALANCES),
@@ -108,7 +108,7 @@ def test_the_published_schema_asks_for_every_field_and_knows_every_family() -> N
     assert set(schema["required"]) == FIELDS
     assert set(schema["$defs"]["Finding"]["required"]) == OF_FINDING
     assert schema["$defs"]["Finding"]["additionalProperties"] is False
-    assert set(schema["$defs"]["Finding"]["properties"]["family"]["enum"]) == set(FAMILIES)
+    assert set(schema["$defs"]["Finding"]["properties"]["family"]["enum"]) == set(families())
 
 
 @pytest.mark.parametrize(

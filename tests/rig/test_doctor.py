@@ -9,7 +9,7 @@ import pytest
 
 from drivers.device import Batch, Device, SampleFlag
 from drivers.registry import fakes
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
@@ -41,7 +41,7 @@ def test_a_healthy_simulated_rig_has_no_complaint() -> None:
 def test_a_board_that_was_restarted_needs_its_reference(
     monkeypatch: pytest.MonkeyPatch, library: Path
 ) -> None:
-    board = FirmwareBoard(SimulatedBench(), library=library, simulated=False)
+    board = FirmwareBoard(SimulatedBench(), BoardStart(simulated=False), library)
     link = SimulatedTransport(board)
     monkeypatch.setattr("rig.doctor.examine.open_logger", lambda _: link)
     findings = by_check(list(examine(simulated())))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import CommandRefusedError
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench import referencing
 from rig.bench.session import Session
@@ -21,7 +21,7 @@ STILL = (np.full(50, 0.3), np.zeros(50))
 @pytest.fixture
 def restarted(library: Path, monkeypatch: pytest.MonkeyPatch) -> FirmwareBoard:
     """A board without zeros; every link that the command opens goes to it."""
-    board = FirmwareBoard(SimulatedBench(), library=library, boot=9, simulated=False)
+    board = FirmwareBoard(SimulatedBench(), BoardStart(boot=9, simulated=False), library)
     monkeypatch.setattr(
         referencing, "open_logger", lambda config: SimulatedTransport(board, "sim://")
     )

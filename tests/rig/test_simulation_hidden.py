@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
-from rig.simulation import plant
+from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import (
     NAMES,
@@ -246,9 +246,9 @@ def test_the_two_state_friction_remembers_that_it_was_fast() -> None:
 def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
     idle = np.zeros(2000, np.int32)
-    bench._state[plant.JAW_ANGLE] -= 0.1
+    bench._state[places.JAW_ANGLE] -= 0.1
     bench.advance(2000, idle, idle, Drive.idle())
-    speeds = bench.state[[plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]]
+    speeds = bench.state[[places.MOTOR_SPEED, places.SPINDLE_SPEED, places.JAW_SPEED]]
     np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
-from rig.simulation import plant
+from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import HiddenEffect
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
@@ -33,12 +33,12 @@ FREE = PlantParameters(
 
 def energy_j(state: NDArray[np.float64], p: PlantParameters, gear_error_rad: float = 0.0) -> float:
     """Kinetic energy of the three bodies and elastic energy of gear and cable."""
-    twist = state[plant.MOTOR_ANGLE] / p.gear_ratio - state[plant.SPINDLE_ANGLE] + gear_error_rad
-    stretch = p.cable_ratio * state[plant.SPINDLE_ANGLE] + p.jaw_zero_rad - state[plant.JAW_ANGLE]
+    twist = state[places.MOTOR_ANGLE] / p.gear_ratio - state[places.SPINDLE_ANGLE] + gear_error_rad
+    stretch = p.cable_ratio * state[places.SPINDLE_ANGLE] + p.jaw_zero_rad - state[places.JAW_ANGLE]
     return 0.5 * float(
-        p.rotor_inertia_kg_m2 * state[plant.MOTOR_SPEED] ** 2
-        + p.spindle_inertia_kg_m2 * state[plant.SPINDLE_SPEED] ** 2
-        + p.jaw_inertia_kg_m2 * state[plant.JAW_SPEED] ** 2
+        p.rotor_inertia_kg_m2 * state[places.MOTOR_SPEED] ** 2
+        + p.spindle_inertia_kg_m2 * state[places.SPINDLE_SPEED] ** 2
+        + p.jaw_inertia_kg_m2 * state[places.JAW_SPEED] ** 2
         + p.gear_stiffness_n_m_rad * twist**2
         + p.cable_stiffness_n_m_rad * stretch**2
     )
@@ -47,7 +47,7 @@ def energy_j(state: NDArray[np.float64], p: PlantParameters, gear_error_rad: flo
 def energies_after_a_pluck(parameters: PlantParameters, ticks: int) -> NDArray[np.float64]:
     """Stretch the cable by 0.1 rad, let go with the motor off, and return energy tick by tick."""
     bench = SimulatedBench(parameters, start_count=683)
-    bench._state[plant.JAW_ANGLE] -= 0.1
+    bench._state[places.JAW_ANGLE] -= 0.1
     none, drive = np.zeros(1, np.int32), Drive.idle()
     energies = [energy_j(bench.state, parameters)]
     for _ in range(ticks):
@@ -65,13 +65,13 @@ def test_energy_is_kept_when_nothing_dissipates() -> None:
 def test_an_eccentric_gear_keeps_energy_too() -> None:
     effect = HiddenEffect("gear_eccentricity", 5.0, (16.0, 0.4))
     bench = SimulatedBench(FREE, effects=[effect], start_count=683)
-    bench._state[plant.JAW_ANGLE] -= 0.1
-    bench._state[plant.MOTOR_SPEED] = 60.0
-    bench._state[plant.SPINDLE_SPEED] = 60.0 / 35.0
+    bench._state[places.JAW_ANGLE] -= 0.1
+    bench._state[places.MOTOR_SPEED] = 60.0
+    bench._state[places.SPINDLE_SPEED] = 60.0 / 35.0
     none, drive = np.zeros(1, np.int32), Drive.idle()
     energies = []
     for _ in range(300):  # before the jaw meets its stop
-        angle = 16.0 * float(bench.state[plant.SPINDLE_ANGLE])
+        angle = 16.0 * float(bench.state[places.SPINDLE_ANGLE])
         error = 5.0 * 2e-3 * (np.sin(angle + 0.4) + 0.3 * np.sin(2.0 * angle))
         energies.append(energy_j(bench.state, FREE, error))
         bench.advance(1, none, none, drive)
@@ -82,14 +82,14 @@ def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
     """With the spindle clamped a swinging rotor gives T / N of the gear's torque T back."""
     clamped = replace(FREE, spindle_friction_n_m=10.0)
     bench = SimulatedBench(clamped, start_count=683)
-    bench._state[plant.MOTOR_ANGLE] += 0.5
+    bench._state[places.MOTOR_ANGLE] += 0.5
     none, drive = np.zeros(1, np.int32), Drive.idle()
     seen, gear = [], []
     for _ in range(1000):
         bench.advance(1, none, none, drive)
         now = bench.state
-        twist = now[plant.MOTOR_ANGLE] / 35.0 - now[plant.SPINDLE_ANGLE]
-        seen.append(now[plant.PROXIMAL_TORQUE])
+        twist = now[places.MOTOR_ANGLE] / 35.0 - now[places.SPINDLE_ANGLE]
+        seen.append(now[places.PROXIMAL_TORQUE])
         gear.append(clamped.gear_stiffness_n_m_rad * twist)
     assert np.std(gear) > 0.04
     assert np.std(seen) / np.std(gear) == pytest.approx(1.0 - 1.0 / 35.0, abs=0.004)
@@ -113,12 +113,12 @@ def test_closing_torque_balances_load_ratio_and_friction() -> None:
         p.cable_ratio * cable + p.spindle_friction_n_m + p.cable_load_friction_ratio * cable
     )
     at_motor = at_spindle / p.gear_ratio + p.motor_friction_n_m
-    assert state[plant.JAW_SPEED] == pytest.approx(p.cable_ratio * speed_rad_s, rel=0.05)
-    assert state[plant.DISTAL_TORQUE] == pytest.approx(
+    assert state[places.JAW_SPEED] == pytest.approx(p.cable_ratio * speed_rad_s, rel=0.05)
+    assert state[places.DISTAL_TORQUE] == pytest.approx(
         p.load_torque_n_m_a * load_a + p.load_friction_n_m, rel=1e-6
     )
-    assert state[plant.PROXIMAL_TORQUE] == pytest.approx(at_spindle, rel=0.02)
-    assert state[plant.CURRENT] * p.torque_constant_n_m_a == pytest.approx(at_motor, rel=0.04)
+    assert state[places.PROXIMAL_TORQUE] == pytest.approx(at_spindle, rel=0.02)
+    assert state[places.CURRENT] * p.torque_constant_n_m_a == pytest.approx(at_motor, rel=0.04)
 
 
 def test_friction_holds_without_creep_or_chatter() -> None:
@@ -131,11 +131,11 @@ def test_friction_holds_without_creep_or_chatter() -> None:
     before = bench.state
     bench.advance(300, idle, idle, drive)
     after = bench.state
-    moving = [plant.MOTOR_SPEED, plant.SPINDLE_SPEED, plant.JAW_SPEED]
-    standing = [plant.MOTOR_ANGLE, plant.SPINDLE_ANGLE, plant.JAW_ANGLE]
+    moving = [places.MOTOR_SPEED, places.SPINDLE_SPEED, places.JAW_SPEED]
+    standing = [places.MOTOR_ANGLE, places.SPINDLE_ANGLE, places.JAW_ANGLE]
     np.testing.assert_array_equal(after[moving], 0.0)
     np.testing.assert_array_equal(after[standing], before[standing])
-    assert after[plant.PROXIMAL_TORQUE] != 0.0  # friction holds the stored torque
+    assert after[places.PROXIMAL_TORQUE] != 0.0  # friction holds the stored torque
 
 
 @pytest.mark.parametrize("load_a", [0.1, 0.5, 1.0])
@@ -156,8 +156,8 @@ def test_the_open_stop_holds_the_jaw_against_the_load() -> None:
     hold = np.full(3000, -1800 * 2 * np.pi / 8192)
     play(bench, hold, np.full(3000, 1.0))
     state = bench.state
-    assert p.stop_open_rad - 0.01 < state[plant.JAW_ANGLE] < p.stop_open_rad
-    assert abs(state[plant.JAW_SPEED]) < 1e-6
+    assert p.stop_open_rad - 0.01 < state[places.JAW_ANGLE] < p.stop_open_rad
+    assert abs(state[places.JAW_SPEED]) < 1e-6
 
 
 def test_the_drive_limits_its_current() -> None:
@@ -165,7 +165,7 @@ def test_the_drive_limits_its_current() -> None:
     far = np.full(200, -20000, np.int32)
     gains = np.array([20.0, 0.0, 0.0, 1.0, 10000.0])
     bench.advance(200, far, np.zeros(200, np.int32), Drive.armed(gains))
-    assert bench.state[plant.CURRENT] == pytest.approx(0.56)
+    assert bench.state[places.CURRENT] == pytest.approx(0.56)
 
 
 def test_vary_is_seeded_and_keeps_scales() -> None:

@@ -13,7 +13,7 @@ from estimation.residual import largest_structure
 from rig.errors import DataError
 from rig.simulation.fitted import DECLARED_PLANT, noise_std, plant_of
 from rig.simulation.parameters import SensorParameters, vary
-from rig.simulation.twin import build_twin, twins
+from rig.simulation.twin import build_twin
 from tests.rig import declared_models as declared
 
 pytestmark = pytest.mark.integration
@@ -36,8 +36,7 @@ def fitted(recorded: Campaign) -> list[Model]:
 
 @pytest.fixture(scope="module")
 def twin(recorded: Campaign, fitted: list[Model]) -> Campaign:
-    (made,) = twins(fitted, recorded, count=1, seed=5)
-    return made
+    return Campaign.of(build_twin(fitted, recorded)(5_000_015))
 
 
 def test_fitted_balances_give_back_the_plant_they_came_from(fitted: list[Model]) -> None:

@@ -1,6 +1,7 @@
 """`rig study wrench`: tables 3.1 to 3.3 of the thesis on simulated arms."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,38 +14,66 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
-from rig.arm.simulated import GRIP_N_M, contact, contact_motion, dahl, passed_on, pin
-from rig.studies.pique.wrench import BODY, TWISTED, ati, in_tip_frame
+from rig.arm.hidden import FAMILIES, bouc_wen, draw_hidden
+from rig.arm.simulated import GRIP_N_M, contact, contact_motion, excitation, passed_on, pin
+from rig.studies.pique.wrench import (
+    BODY,
+    HAND,
+    OURS,
+    SERIES,
+    THESIS,
+    TWISTED,
+    ati,
+    in_tip_frame,
+    one_arm,
+)
 
 pytestmark = pytest.mark.long
 
+FREE = (HAND, SERIES)
 
-def test_the_command_reports_every_seed_and_whether_it_is_fair(tmp_path):
+
+def test_the_command_reports_every_family(tmp_path, monkeypatch):
+    done = {number: one_arm(number) for number in (0, 1)}
+    monkeypatch.setattr(
+        "rig.studies.pique.wrench.one_arm",
+        lambda number: replace(done[min(number, 1)], family=FAMILIES[number]),
+    )
     out = tmp_path / "wrench.md"
-    words = ["wrench", "--seeds", "2", "--json", "--out", str(out), "--state", str(tmp_path)]
+    words = ["wrench", "--seeds", "1", "--json", "--out", str(out), "--state", str(tmp_path)]
     ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path / "figures")])
     assert ran.exit_code == 0, ran.output
     assert "figures/wrench-3-3.svg" in out.read_text()
     found = json.loads(ran.stdout)
-    assert found["seeds"] == [0, 1]
-    assert len(found["cells"]) == 12
-    assert all(len(cell["nrmsd_percent"]) == 2 for cell in found["cells"])
+    assert [arm["family"] for arm in found["arms"]] == list(FAMILIES)
     thesis, ours = (
-        np.mean([c["nrmsd_percent"] for c in found["cells"] if ("thesis" in c["method"]) is own])
-        for own in (True, False)
+        np.mean([arm["errors"][table][method] for arm in found["arms"] for table in FREE])
+        for method in (THESIS, OURS)
     )
     assert ours < thesis
-    assert set(found["fair"]) == {cell["table"] for cell in found["cells"]} - {BODY}
+    assert all(f"| {family} |" in out.read_text() for family in FAMILIES)
     assert f"Table {BODY}" in out.read_text()
     assert "| thesis | 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in out.read_text()
 
 
 def test_dahl_friction_turns_over_its_displacement_and_stays_within_one():
     there_and_back = np.concatenate([np.linspace(0, 1, 1001), np.linspace(1, 0.9, 101)])[:, None]
-    friction = dahl(there_and_back, np.array([0.05]))[:, 0]
+    friction = bouc_wen(there_and_back, np.array([0.05]))[:, 0]
     assert np.isclose(friction[1000], 1.0, atol=1e-3)
     assert np.isclose(friction[1050], 1 - 2 * (1 - np.exp(-1)), atol=0.02)
     assert np.abs(friction).max() <= 1
+
+
+def test_every_hidden_family_has_the_asked_size_and_its_own_form():
+    motion, asked = excitation(np.random.default_rng(1), 30.0), np.linspace(0.5, 3.0, 6)
+    for family in FAMILIES[1:]:
+        one, same, other = (
+            draw_hidden(family, np.random.default_rng(seed), motion, asked)(motion)
+            for seed in (5, 5, 6)
+        )
+        np.testing.assert_allclose(np.std(one, axis=0), asked)
+        np.testing.assert_array_equal(one, same)
+        assert np.all(np.std(one - other, axis=0) > 1e-3 * asked)
 
 
 def test_a_pin_passes_on_forces_and_no_more_torsion_than_the_grip_holds():

@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
-from rig.arm.simulated import dahl, draw_arm
+from rig.arm.hidden import FAMILIES, bouc_wen
+from rig.arm.simulated import draw_arm
 from rig.cli.study import study_app
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
@@ -18,6 +19,7 @@ from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, wit
 from rig.studies.zhang.psm_grasp import configurations, grasp_and_release
 from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
+from rig.studies.zhang.seed import one_arm
 from rig.studies.zhang.study import PAPER, run_zhang
 
 pytestmark = pytest.mark.long
@@ -127,17 +129,21 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     monkeypatch.setattr(zhang_networks, "SETTINGS", Settings(nodes=4, iterations=8))
     monkeypatch.setattr(zhang_networks, "TRANSFER", Settings(nodes=4, iterations=5))
     monkeypatch.setattr("rig.studies.seeds._done", here)
+    done = one_arm(0)
+    monkeypatch.setattr("rig.studies.zhang.study.one_arm", lambda number: done)
     out, state = tmp_path / "zhang.md", tmp_path / "state"
     words = ["zhang", "--seeds", "1", "--json", "--out", str(out), "--state", str(state)]
     ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path)])
     assert ran.exit_code == 0, ran.output
-    (cells,) = json.loads(ran.stdout)["outcomes"]
+    found = json.loads(ran.stdout)
+    assert len(found["outcomes"]) == len(FAMILIES)
+    cells = found["outcomes"][0]
     networks, ours = (
         np.array(cells[f"I | M+C on M | {method}"])
         for method in (zhang_free.NETWORKS, zhang_free.OURS)
     )
     assert np.sum(ours < networks) >= 5
-    assert "wrist drive hysteresis" in json.loads(ran.stdout)["effects"]
+    assert "wrist drive hysteresis" in found["effects"]
     assert np.all(np.array(cells[f"I | C on M | {zhang_free.NETWORKS}"])[3:] > 1.2 * networks[3:])
     for name in KINDS:
         if name != "LND":
@@ -178,7 +184,7 @@ def test_motion_of_a_run_does_not_trail_a_smooth_path():
 def test_the_network_on_the_residual_learns_memory_and_not_noise(psm):
     rng = np.random.default_rng(8)
     motion = with_gripper(random_path(rng, 120.0), 0.1, 0.8)
-    memory = dahl(motion.position[:, :1], np.array([0.1]))[:, 0]
+    memory = bouc_wen(motion.position[:, :1], np.array([0.1]))[:, 0]
     noise = rng.normal(size=len(motion))
     cut = 5 * len(motion) // 6
     for joint in (0, 5):

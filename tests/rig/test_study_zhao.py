@@ -11,6 +11,7 @@ from estimation.model import Estimate, Term
 from rig.cli.main import main
 from rig.grasper.angle_led import angle_led
 from rig.grasper.current_force import CurrentForce
+from rig.grasper.hidden import FAMILIES, OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold, periodic
 from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis, vary
 from rig.studies.zhao import study as zhao
@@ -58,6 +59,20 @@ def test_graspers_differ_by_their_seed_and_repeat_by_it():
     assert vary(axis, 3, 0.0) == axis
 
 
+def test_a_drawn_friction_is_repeated_by_its_seed_and_moves_the_current():
+    axis = PROTOTYPES["third"].axes["pitch"][0]
+    own = play_axis(axis, hold(axis, 1.5, 1.0), 0)["motor_current_a"]
+    assert with_family(axis, OWN, 3) is axis
+    for family in FAMILIES[1:]:
+        currents = [
+            play_axis(with_family(axis, family, seed), hold(axis, 1.5, 1.0), 0)["motor_current_a"]
+            for seed in (3, 3, 4)
+        ]
+        np.testing.assert_array_equal(currents[0], currents[1])
+        assert np.abs(currents[0] - own).max() > 5 * axis.current_noise_a
+        assert np.abs(currents[0] - currents[2]).max() > 1e-6
+
+
 def bearing(dof):
     """What the diagnosis names, near where it leaves the shapes."""
     roles = {"axis_angle": "angle_rad", "axis_current": "current_a",
@@ -71,7 +86,10 @@ def bearing(dof):
 
 @pytest.fixture(scope="module")
 def mean_grasper():
-    return {dof: zhao.measure("third", dof, 0, 0.0, (bearing(dof),)) for dof in ("pitch", "yaw")}
+    return {
+        dof: zhao.measure(dof, axes_of(PROTOTYPES["third"], dof, 0, 0.0), 0, (bearing(dof),))
+        for dof in ("pitch", "yaw")
+    }
 
 
 def test_the_papers_method_lands_near_its_table(mean_grasper):
@@ -122,25 +140,27 @@ def test_what_was_measured_is_kept_and_not_measured_again(tmp_path, monkeypatch,
     seen = []
     monkeypatch.setattr(zhao, "look", lambda *_: looked)
     monkeypatch.setattr(
-        zhao, "measure", lambda p, dof, seed, *_: seen.append(seed) or replace(cell, seed=seed)
+        zhao, "measure", lambda dof, axes, seed, *_: seen.append(seed) or replace(cell, seed=seed)
     )
-    first = zhao.run_study("third", 2, 0.1, tmp_path)
-    assert seen == [0, 0, 0, 1, 1, 1]
-    again = zhao.run_study("third", 3, 0.1, tmp_path)
-    assert seen[6:] == [2, 2, 2]
-    assert again.cells["yaw"][:2] == first.cells["yaw"]
+    every = len(DOFS) * len(FAMILIES)
+    first = zhao.run_study("third", 1, 0.1, tmp_path)
+    assert seen == [0] * every
+    again = zhao.run_study("third", 2, 0.1, tmp_path)
+    assert seen[every:] == [1] * every
+    assert again.cells["yaw"][: len(FAMILIES)] == first.cells["yaw"]
     assert again.lacking == first.lacking
 
 
-def test_every_grasper_is_in_the_report(mean_grasper):
-    cells = {dof: [mean_grasper["yaw"]] for dof in DOFS}
-    lacked = {dof: Lacking((("friction.load", "identified"),), (bearing(dof),)) for dof in DOFS}
+def test_every_family_is_in_the_report(mean_grasper):
+    cells = {dof: [mean_grasper["yaw"]] * len(FAMILIES) for dof in DOFS}
+    found = (("friction.load", "identified"),)
+    lacked = {(family, dof): Lacking(found, (bearing(dof),)) for family in FAMILIES for dof in DOFS}
     text = markdown(zhao.Study("third prototype", 0.1, cells, lacked))
-    assert "| yaw, 0 |" in text
     assert "| pitch, periodic | +0.71 |" in text
-    assert "yaw: friction.load (identified), so `friction.load.bearing` was added" in text
+    assert all(f"| {family} |" in text for family in FAMILIES)
+    assert "friction.load (identified)" in text
     other = markdown(zhao.Study("ball bearings", 0.1, cells, lacked))
-    assert "the paper states no errors of this prototype" in other
+    assert "The paper states no errors of this prototype" in other
     assert "+0.71" not in other
 
 

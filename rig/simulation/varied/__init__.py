@@ -1,4 +1,4 @@
-"""Simulated campaigns that cannot be learnt by heart, for calibrating and judging a diagnosis.
+"""Simulated campaigns that cannot be memorised, for calibrating and judging a diagnosis.
 
 `draw(seed, kind)` gives a case: recordings with the reference rig's channels, and the answer. The
 rig, its controller and sensors, the protocol and the form of what is hidden are all drawn from the

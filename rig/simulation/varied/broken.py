@@ -1,4 +1,4 @@
-"""Recipes of sensor faults: catalogue names, forms drawn anew each time."""
+"""Recipes of sensor faults: catalogue names, forms drawn again each time."""
 
 import numpy as np
 

@@ -27,16 +27,16 @@ WORST_TRACKING = 0.4
 """A rig follows when its error is below this share of what it is asked for, both rms."""
 
 INADEQUATE = 0.08
-"""Most that declared equations may leave without noise and effects, share of the noise's power."""
+"""Largest noise-free residual of the declared equations, share of the noise's power."""
 
 LATE = 0.02
 """Most that lags and skewed clocks may add to a clean residual's power, as a share of it."""
 
 MOST_TOGETHER = 5
-"""Most families that a confounded case may leave open: more is a protocol that shows nothing."""
+"""Most families that a confounded case may have: with more, the protocol shows nothing."""
 
 INCOMPLETE = 1.15
-"""Most that the true structure may leave, over what is left without effects: else the effects make
+"""Largest residual of the true structure over that without effects: else the effects make
 the rig move as no equation of its parts follows, for example in a limit cycle."""
 
 Built = tuple[Stage, tuple[Switched, ...], Truth]
@@ -94,7 +94,7 @@ def spread_over(places: Sequence[int], count: int) -> tuple[int, ...]:
 
 
 def _follows(stage: Stage, runs: Sequence[int]) -> bool:
-    """Say whether the rig does what it is asked for."""
+    """Whether the rig does what it is asked for."""
     for k in runs:
         asked = stage.plans[k].setpoints[FIRST:, 0]
         error = stage.moved(k).true[FIRST:, kernel.SPINDLE_ANGLE] - asked
@@ -104,14 +104,14 @@ def _follows(stage: Stage, runs: Sequence[int]) -> bool:
 
 
 def _holds(stage: Stage, runs: Sequence[int]) -> bool:
-    """Say whether the declared equations hold without effects, to well below the noise."""
+    """Whether the declared equations hold without effects, to well below the noise."""
     noisy = replace(stage, chain=stage.chain.on_time)
     usual, silent = fits_of(noisy.prepared(runs)), fits_of(noisy.prepared(runs, silent=True))
     return all(silent[e].rms() ** 2 < INADEQUATE * usual[e].rms() ** 2 for e in EQUATIONS)
 
 
 def _on_time(stage: Stage, runs: Sequence[int]) -> Stage:
-    """Return the rig with lags and skews so small that a clean residual hardly shows them."""
+    """Return the rig with lags and skews so small that they barely show in a clean residual."""
     usual = fits_of(replace(stage, chain=stage.chain.on_time).prepared(runs))
     for share in (1.0, 0.5, 0.25, 0.12, 0.06):
         late = replace(stage, chain=stage.chain.hastened(share))

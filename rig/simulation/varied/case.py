@@ -47,7 +47,7 @@ class Case:
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
-        """The runs, with noise; simulated anew at each call."""
+        """The runs, with noise; simulated again at each call."""
         return tuple(self.stage.record(k, self.switched) for k in self.stage.every)
 
     @property
@@ -102,7 +102,7 @@ def draw(seed: int, kind: str, *, gear_ratio: float | None = None) -> Case:
             channels are made for one ratio.
 
     Raises:
-        UsageError: There is no such kind, or the seed belongs to no range.
+        UsageError: No such kind, or the seed belongs to no range.
         NoCaseError: No rig of this seed works.
     """
     part_of(seed)

@@ -136,7 +136,7 @@ def _smooth(values: FloatArray) -> FloatArray:
 
 
 def order_over(random: Random, ranges: Ranges, shaft: str, most: int) -> int:
-    """Return a whole order of a shaft that a filter of 50 Hz leaves and that the travel shows."""
+    """Return a whole order of a shaft that passes a filter of 50 Hz and that the travel shows."""
     angle, speed = f"{shaft}_angle", f"{shaft}_speed"
     highest = 22.0 * 2.0 * np.pi / max(ranges.usual[speed], 1e-6)
     lowest = 2.0 * 2.0 * np.pi / ranges.span(angle)

@@ -140,7 +140,7 @@ def relaxation(place: str, variable: str) -> Recipe:
 
 
 def inner_loop(place: str, variable: str) -> Recipe:
-    """Return a recipe of wires or teeth that rub on each other while a spring is bent."""
+    """Return a recipe of wires or teeth that rub on each other while a spring deflects."""
 
     def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
         reach = ranges.span(variable) * over(random, 0.04, 0.25)

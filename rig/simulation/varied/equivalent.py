@@ -1,7 +1,7 @@
 """Which families of the catalogue reproduce a hidden effect on the runs at hand.
 
 Worked out, not declared: the effect's own signal, as each equation sees it, is fitted by the
-declared terms with and without a family's columns beside them, free of noise. A family counts as
+declared terms with and without a family's columns, free of noise. A family counts as
 good as the effect where what it cannot reproduce would not be seen in the noise of these runs.
 """
 
@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from estimation.candidates import candidates
 from estimation.derived import zero_phase_channels
 from estimation.effects import Remembering
-from estimation.effects.roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD
 from estimation.model import Term
 from estimation.recording import FloatArray, Recording
+from rig.simulation.reference_roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, candidates
 from rig.simulation.varied import residual
 from rig.simulation.varied.residual import EQUATIONS, GEARBOX, Fitted, Prepared
 
@@ -25,25 +24,25 @@ POINTS = 25
 """Most points of a family's shapes that are tried."""
 
 ODDS = 6.0
-"""Twice the logarithm of likelihoods that noise leaves open: odds of twenty to one."""
+"""Twice the logarithm of likelihoods that noise cannot separate: odds of twenty to one."""
 
 FORM = 0.1
-"""Share of an effect's power that counts as its form, not as another cause: truths are bent, and
-the catalogue's form of the true family may leave as much."""
+"""Share of an effect's power that counts as its form, not as another cause: true forms are
+distorted, and the residual of the catalogue's form of the true family may be as large."""
 
 STRIDE = 4
 """One in so many samples of 1 kHz is walked over by a family with memory."""
 
 FREE = 0.5
-"""Share of itself by which a declared gain may change beside a family: one that takes the whole
-torque from another column is no explanation of this machine."""
+"""Share of itself by which a declared gain may change next to a family: one that takes the whole
+torque from another column does not explain this machine."""
 
 LONGEST_LAG = 60
 
 
 def reproducing(
     recordings: Sequence[Recording],
-    twin: Sequence[Prepared],
+    bare: Sequence[Prepared],
     runs: Sequence[Prepared],
     columns: Mapping[str, Sequence[FloatArray]],
     clean: Mapping[str, Fitted],
@@ -54,7 +53,7 @@ def reproducing(
     Args:
         recordings: The runs without noise and without the effect. Families take their channels from
             these: where the effect is on, a reading that carries it would reproduce anything.
-        twin: The same, filtered.
+        bare: The same without effects, filtered.
         runs: The runs without noise, the effect on, filtered.
         columns: Equation to the effect's true columns, one array (n, k) a run.
         clean: The declared equations fitted on noisy runs without the effect: what noise is.
@@ -77,7 +76,7 @@ def reproducing(
         seen = ODDS * noise / count
         if beyond < 4.0 * seen:
             continue  # this equation does not show it
-        lefts = _lefts(recordings, twin, equation, places, (base, whole, gains))
+        lefts = _lefts(recordings, bare, equation, places, (base, whole, gains))
         enough = seen + FORM * beyond
         fitting = {family for family, left in lefts.items() if left <= enough}
         good = fitting if good is None else good & fitting
@@ -105,7 +104,7 @@ def _base(run: Prepared, equation: str, fitted: Fitted) -> FloatArray:
 
 
 def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
-    """Return the mean square that a least-squares fit leaves, declared gains near their own.
+    """Return the mean square residual of a least-squares fit, declared gains near their own.
 
     Args:
         table: Declared columns, the derivative by a width if there is one, a family's columns.
@@ -136,7 +135,7 @@ def _lefts(
     places: Sequence[NDArray[np.intp]],
     fitted: tuple[FloatArray, FloatArray, FloatArray],
 ) -> dict[str, float]:
-    """Return family to the least that its columns leave beside the declared ones."""
+    """Return family to the least residual with its columns and the declared ones."""
     base, whole, gains = fitted
     model = residual.declared(equation)
     declared_ids = {term.effect.id for term in model.terms}

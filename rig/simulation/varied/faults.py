@@ -41,7 +41,7 @@ class Fault:
 def error_of(
     fault: Fault, amplitude: float, true: Mapping[str, FloatArray], first: int, start_s: float
 ) -> FloatArray:
-    """Return what a fault adds to its reading in one run, shape (n,).
+    """Return the values that a fault adds to its reading in one run, shape (n,).
 
     Args:
         fault: The fault.
@@ -60,7 +60,7 @@ def error_of(
         parts = zip(fault.weights, fault.times_s, strict=True)
         slow = sum(w * (lagged(own, float(time)) - own) for w, time in parts)
         return np.asarray(amplitude * slow)
-    assert fault.table is not None  # noqa: S101 - a function has one
+    assert fault.table is not None  # noqa: S101 - narrows the type
     clocks: dict[str, FloatArray] = {"run_time": t, "campaign_time": start_s + t}
     source: FloatArray = clocks[fault.source] if fault.source in clocks else true[fault.source]
     return amplitude * fault.table.at(source)

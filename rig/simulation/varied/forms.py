@@ -1,4 +1,4 @@
-"""Random functions on a grid: what a hidden effect's form is bent by, or made of.
+"""Random functions on a grid: what distorts a hidden effect's form, or makes it.
 
 All are tables over a range of one variable, shape (`POINTS`,); between its points a table is linear
 and beyond its ends it stays at its last value.
@@ -85,7 +85,7 @@ def rising(random: Random) -> FloatArray:
 
 
 def falling(random: Random, x: FloatArray) -> FloatArray:
-    """Return a form that falls from 1 at 0 towards 0 beyond 1, of a random kind, bent.
+    """Return a form that falls from 1 at 0 towards 0 beyond 1, of a random kind, distorted.
 
     Args:
         random: Source of the draw.

@@ -1,4 +1,4 @@
-"""Recipes of losses at motor and spindle: catalogue names, forms drawn anew each time."""
+"""Recipes of losses at motor and spindle: catalogue names, forms drawn again each time."""
 
 from collections.abc import Callable
 
@@ -26,7 +26,7 @@ def level(plant: Plant, place: str) -> float:
 
 
 def power(random: Random, low: float, high: float) -> Form:
-    """Return a bent power of a size on the unit range, with its exponent drawn."""
+    """Return a distorted power of a size on the unit range, with its exponent drawn."""
     exponent, factor = random.uniform(low, high), bend(random)
 
     def form(x: FloatArray) -> FloatArray:
@@ -48,7 +48,7 @@ def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer
 
 
 def slow(place: str) -> Drawer:
-    """Return what draws a level that falls with the size of the speed."""
+    """Return the drawer of a level that falls with the size of the speed."""
 
     def table(random: Random, ranges: Ranges) -> Table:
         return ranges.way(f"{place}_way", falling(random, grid() / random.uniform(0.05, 0.3)))
@@ -57,7 +57,7 @@ def slow(place: str) -> Drawer:
 
 
 def loaded(place: str) -> Drawer:
-    """Return what draws a level that grows with the load, of either sign."""
+    """Return the drawer of a level that grows with the load, of either sign."""
     return lambda random, ranges: ranges.sided(LOADS[place], power(random, 0.6, 1.7), odd=False)
 
 
@@ -114,7 +114,7 @@ def _centred(ranges: Ranges, variable: str) -> FloatArray:
 
 
 def speeding(place: str, family: str, low: float, high: float, odd: bool) -> Recipe:
-    """Return a recipe of a torque that is a bent power of the speed."""
+    """Return a recipe of a torque that is a distorted power of the speed."""
 
     def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
         table = ranges.sided(f"{place}_speed", power(random, low, high), odd)

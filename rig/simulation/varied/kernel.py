@@ -132,7 +132,7 @@ def _operated(rows: Any, k: int, x: float, memory: Any, last: Any, dt: float) ->
 
 @numba.njit()
 def _effect(rows: Any, k: int, x: Any, memory: Any, last: Any, dt: float) -> float:
-    """Return what an effect adds at its place, without a friction's sign."""
+    """Return the value that an effect adds at its place, without a friction's sign."""
     value = _operated(rows, k, x[rows.kinds[k, 4]], memory, last, dt)
     if rows.kinds[k, 5] != ONE:
         value *= _looked_up(rows, k, 1, x[rows.kinds[k, 5]])

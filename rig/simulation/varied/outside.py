@@ -26,7 +26,7 @@ def pushed(random: Random, ranges: Ranges) -> Table:
 
 
 def windowed(place: str) -> Drawer:
-    """Return what draws a level that is there at some loads only."""
+    """Return the drawer of a level that is there at some loads only."""
 
     def table(random: Random, ranges: Ranges) -> Table:
         return ranges.table(LOADS[place], spots(random, 1, 0.06, 0.15))

@@ -39,7 +39,7 @@ class Plan:
     Attributes:
         name: Name of the run.
         setpoints: Angle, speed and acceleration of the spindle at 1 kHz from the lead on, (n, 3).
-        level_n_m: Load torque asked for, beside the unit's spring, shape (n,).
+        level_n_m: Load torque asked for, without the unit's spring, shape (n,).
         load: The load unit in this run.
         conditions: As a recording states them.
         start_s: Campaign time of the run's first sample.

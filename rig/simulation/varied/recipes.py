@@ -46,7 +46,7 @@ def family_of(name: str) -> str:
 
 
 def needs_rest(name: str) -> bool:
-    """Say whether a recipe's effect shows only where the motion rests."""
+    """Whether a recipe's effect shows only where the motion rests."""
     return "dwell" in name or "age" in name.split()
 
 

@@ -1,4 +1,4 @@
-"""What the declared equations of the reference rig leave of a campaign: a quick linear fit.
+"""Residual of the declared equations of the reference rig on a campaign: a quick linear fit.
 
 The terms are those of the shipped models; the twist of the gear is taken with the rig's own ratio.
 """
@@ -129,7 +129,7 @@ def fit(runs: Sequence[Prepared], equation: str, added: Sequence[FloatArray] = (
     Args:
         runs: The runs.
         equation: The equation.
-        added: Columns beside the declared ones, one array (n, k) a run, filtered, at the full rate.
+        added: Further columns, one array (n, k) a run, filtered, at the full rate.
     """
     parts = [r.channels[declared(equation).target][r.places[equation]] for r in runs]
     target = np.concatenate([centred(part) for part in parts])
@@ -178,7 +178,7 @@ def _best_share(
     basis: FloatArray,
     target: FloatArray,
 ) -> int:
-    """Return the place of the width, a share of the fast speed, that leaves the least."""
+    """Return the place of the width, a share of the fast speed, with the least residual."""
     rest = target - basis @ (basis.T @ target)
     gains = []
     for share in shares:
@@ -189,7 +189,7 @@ def _best_share(
 
 
 def left_with(runs: Sequence[Prepared], fitted: Fitted) -> tuple[FloatArray, ...]:
-    """Return what other runs leave of an equation that was fitted elsewhere, at the full rate."""
+    """Return the residual on other runs of a fitted equation, at the full rate."""
     found = []
     for run in runs:
         whole = replace(run, places={fitted.equation: np.arange(len(run.channels["time_s"]))})

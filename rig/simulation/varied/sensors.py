@@ -125,7 +125,7 @@ def read(
     errors: Mapping[str, FloatArray],
     noise: Sequence[FloatArray] | None,
 ) -> dict[str, FloatArray]:
-    """Return what the sensors of a run read.
+    """Return the readings of a run's sensors.
 
     Args:
         chain: The sensors.

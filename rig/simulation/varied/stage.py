@@ -48,7 +48,7 @@ class Moved:
 
 
 FEWEST = 100
-"""A run of fewer samples in motion, of 100 a second, hardly moves."""
+"""A run of fewer samples in motion, of 100 a second, barely moves."""
 
 
 class UnstableError(Exception):
@@ -80,7 +80,7 @@ class Stage:
     noise: dict[int, tuple[FloatArray, ...]] = field(default_factory=dict, repr=False)
 
     def moved(self, index: int, switched: Sequence[Switched] = ()) -> Moved:
-        """Return what the plant does in one run; kept where no effect moves it.
+        """Return the motion of the plant in one run; kept where no effect moves it.
 
         Raises:
             UnstableError: The motion does not stay finite.
@@ -107,12 +107,12 @@ class Stage:
     def errors(
         self, index: int, moved: Moved, switched: Sequence[Switched]
     ) -> dict[str, FloatArray]:
-        """Return what faulty sensors add in one run, channel to values from the lead on."""
+        """Return the additions of faulty sensors in one run: channel to values from the lead on."""
         faults = [s for s in switched if index in s.runs and isinstance(s.drawn.part, Fault)]
         true = {name: moved.true[:, k] for k, name in enumerate(READINGS)}
         found: dict[str, FloatArray] = {}
         for s in faults:
-            assert isinstance(s.drawn.part, Fault)  # noqa: S101 - chosen so above
+            assert isinstance(s.drawn.part, Fault)  # noqa: S101 - narrows the type
             error = error_of(s.drawn.part, s.amplitude, true, FIRST, self.plans[index].start_s)
             found[s.drawn.part.reading] = found.get(s.drawn.part.reading, 0.0) + error
         return found
@@ -155,7 +155,7 @@ class Stage:
         """Return some runs' channels, filtered as the declared equations say.
 
         Raises:
-            UnstableError: A run hardly moves.
+            UnstableError: A run barely moves.
         """
         found = []
         for k in runs:
@@ -177,7 +177,7 @@ class Stage:
 
 
 def signature(place: str, plant: Plant) -> Mapping[str, float]:
-    """Return what an effect at a place of the plant adds to each equation's target, for one unit.
+    """Return the share of an effect at a place in each equation's target, for one unit.
 
     The torque constant's share is logged as a torque lost at the motor; the pulley's second part,
     a torque at the spindle, is the cable's.

@@ -1,6 +1,6 @@
 """How strong a hidden effect is, and the amplitude that makes it as strong as wanted.
 
-Strength is what the declared model leaves with the effect over what it leaves without, in the
+Strength is the residual of the declared model with the effect over that without, in the
 equation that shows it best.
 """
 
@@ -70,7 +70,7 @@ def amplitude_for(
         switched: The effect; its amplitude is a small one.
         wanted: Strength.
         runs: Places of the runs that are tried, some of which have the effect.
-        most: Largest amplitude that leaves a rig of it.
+        most: Largest amplitude at which it is still a rig.
 
     Returns:
         None where no trial comes near.

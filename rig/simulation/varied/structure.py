@@ -1,7 +1,7 @@
 """What a hidden effect is in the declared equations: its own columns, and the best possible error.
 
 A column is what the effect adds to an equation's target, worked out on what the plant did. Fitted
-beside the declared terms it shows what a perfect answer leaves: the oracle's error.
+with the declared terms it gives the residual of a perfect answer: the oracle's error.
 """
 
 from collections.abc import Mapping, Sequence
@@ -59,7 +59,7 @@ def columns(
 def _shown_by_fault(
     stage: Stage, index: int, effects: Sequence[Switched], k: int, clean: Mapping[str, Fitted]
 ) -> dict[str, FloatArray]:
-    """Return what one faulty sensor makes of every equation in one run, the plant moved alike."""
+    """Return every equation in one run with one faulty sensor, the plant moved alike."""
     sound = [e for j, e in enumerate(effects) if j != k]
     both = [
         residual.prepare(stage.record(index, chosen, silent=True), stage.plant.ratio)
@@ -75,7 +75,7 @@ def _shown_by_fault(
 def oracle(
     runs: Sequence[Prepared], added: Columns, declared: Mapping[str, Fitted]
 ) -> dict[str, Fitted]:
-    """Fit the equations with the true columns beside the declared ones.
+    """Fit the equations with the true columns and the declared ones.
 
     Args:
         runs: The runs.

@@ -38,14 +38,14 @@ class HiddenTruth:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is hidden in a case, and what a perfect answer leaves.
+    """What is hidden in a case, and the residual of a perfect answer.
 
     Attributes:
         effects: The hidden effects; none in a clean case.
-        clean_rms: Equation to what its declared structure leaves without any effect, root mean
+        clean_rms: Equation to the residual of its declared structure without any effect, root mean
             square over all runs, in the unit of its target.
         with_rms: The same with the effects.
-        oracle_rms: The same with the effects, the true structure fitted beside the declared one.
+        oracle_rms: The same with the effects, the true structure fitted with the declared one.
         columns: Equation to the true structure's own columns, one array (n, effects) a run, in the
             target's unit, filtered as the equation's channels are, at every sample.
         together: In a confounded case: the families that reproduce the effect to within noise on
@@ -67,5 +67,5 @@ class Truth:
         return tuple(tuple(dict.fromkeys((e.family, *e.synonyms))) for e in self.effects)
 
     def shown(self, equation: str) -> bool:
-        """Say whether an equation's columns hold anything."""
+        """Whether an equation's columns hold anything."""
         return any(np.any(c) for c in self.columns[equation])

@@ -11,7 +11,6 @@ import numpy as np
 from estimation.arm.balances import closed
 from estimation.arm.effects import on_joint
 from estimation.arm.motion import JointNames, Motion
-from estimation.arm.periodic import periodic_motion
 from estimation.arm.shared import laid_out
 from estimation.causes.verdict import answer
 from estimation.diagnosis.split import split
@@ -23,21 +22,12 @@ from rig.studies.delsol.hydraulic_arm import (
     RATE_HZ,
     SIGN_RAD_S,
     HydraulicArm,
+    free_motions,
     measured_torque,
 )
 
-RUNS, SECONDS = 18, 40.0
-HARMONICS = 5
-FUNDAMENTALS = (1, 2, 3)
-"""Periods of a run's lowest harmonic; the runs alternate, so that a spring, proportional to
-position, is not collinear with inertia, proportional to position times frequency squared."""
-
-HIGHEST_HZ = 5.0
 PULLS = ("spring.position", "friction.position")
 """What the catalogue calls the pull and the rub of hoses or wires."""
-
-MEMORY = ("hysteresis.presliding", "hysteresis.bouc_wen")
-"""What the catalogue calls friction with memory, which every joint has."""
 
 JOINTS = len(HYDRAULIC.reach)
 NAMES = tuple(JointNames(k + 1, prismatic=False) for k in range(JOINTS))
@@ -99,18 +89,8 @@ def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named,
 
 def free_runs(arm: HydraulicArm, rng: np.random.Generator) -> list[Recording]:
     """Return runs of all joints along finite Fourier series (equation 14), each about a pose."""
-    time = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
-    reach = np.array(HYDRAULIC.reach)
     runs = []
-    for number in range(RUNS):
-        slowest = FUNDAMENTALS[number % len(FUNDAMENTALS)] / SECONDS
-        phase = 2 * np.pi * slowest * np.outer(time, np.arange(1, HARMONICS + 1))
-        sine, cosine = rng.normal(size=(2, HARMONICS, JOINTS))
-        wave = np.sin(phase) @ sine + np.cos(phase) @ cosine
-        share = rng.uniform(0.5, 0.9, JOINTS)
-        pose = 0.9 * (1 - share) * rng.uniform(-1, 1, JOINTS)
-        position = reach * (pose + share * wave / np.abs(wave).max(axis=0))
-        motion = periodic_motion(position, 1 / RATE_HZ, HIGHEST_HZ)
+    for number, motion in enumerate(free_motions(rng)):
         torque = measured_torque(arm, motion, np.zeros((len(motion), 3)), rng)
         runs.append(recorded(f"free {number}", motion.position, torque, RATE_HZ))
     return runs

@@ -1,10 +1,11 @@
 """A simulated hydraulic arm with a tie bar, as del Sol et al. 2014 used; its geometry is assumed.
 
 The paper publishes no dimensions but the horizontal reach of 1.289 m. Hidden from every model: hose
-drag on joint 1, friction with memory (Dahl), pressure noise, errors of the pressure constants.
+drag on joint 1, friction with memory (Dahl) or a drawn family of the same size (`rig.arm.hidden`),
+pressure noise, errors of the pressure constants.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -16,11 +17,19 @@ from estimation.arm.closed_chain import (
     parameter_names,
 )
 from estimation.arm.motion import Motion
+from estimation.arm.periodic import periodic_motion
 from estimation.arm.tables import Body, DhRow
 from estimation.recording import FloatArray
-from rig.arm.simulated import dahl
+from rig.arm.hidden import OWN, HiddenTorque, bouc_wen, draw_hidden
 
 RATE_HZ = 50.0
+RUNS, SECONDS = 18, 40.0
+HARMONICS = 5
+FUNDAMENTALS = (1, 2, 3)
+"""Periods of a run's lowest harmonic; the runs alternate, so that a spring, proportional to
+position, is not collinear with inertia, proportional to position times frequency squared."""
+
+HIGHEST_HZ = 5.0
 SIGN_RAD_S = 0.01
 
 HYDRAULIC = ClosedChain(
@@ -66,16 +75,18 @@ class HydraulicArm:
         hidden: Amplitude of hidden friction of each actuated joint, N m.
         hose: Stiffness of the hoses on joint 1, N m/rad.
         constants: True over nominal pressure constant of each actuated joint.
+        form: Hidden torque of a drawn family, in place of the friction with memory.
     """
 
     values: FloatArray
     hidden: FloatArray
     hose: float
     constants: FloatArray
+    form: HiddenTorque | None = None
 
 
-def draw(rng: np.random.Generator) -> HydraulicArm:
-    """Draw an arm."""
+def draw(rng: np.random.Generator, family: str = OWN) -> HydraulicArm:
+    """Draw an arm, whose hidden friction is of a family of `rig.arm.hidden`."""
 
     def around(values: FloatArray) -> FloatArray:
         drawn: FloatArray = values * np.exp(SPREAD * rng.normal(size=values.shape))
@@ -89,9 +100,38 @@ def draw(rng: np.random.Generator) -> HydraulicArm:
     links = np.column_stack([mass, first, zero, zero, thin, zero, inertia, zero, zero, inertia])
     values = np.concatenate([links.ravel(), around(COULOMB_N_M), around(VISCOUS_N_M_S)])
     constants = 1 + CONSTANT_ERROR * rng.normal(size=5)
-    return HydraulicArm(
-        values, around(HIDDEN_N_M), float(around(np.array(HOSE_N_M_RAD))), constants
+    arm = HydraulicArm(values, around(HIDDEN_N_M), float(around(np.array(HOSE_N_M_RAD))), constants)
+    if family == OWN:
+        return arm
+    motion = free_motions(rng)[0]
+    return replace(
+        arm, form=draw_hidden(family, rng, motion, np.std(friction(arm, motion), axis=0))
     )
+
+
+def free_motions(rng: np.random.Generator) -> list[Motion]:
+    """Return motions of all joints along finite Fourier series (equation 14), about poses."""
+    time = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    reach = np.array(HYDRAULIC.reach)
+    motions = []
+    for number in range(RUNS):
+        slowest = FUNDAMENTALS[number % len(FUNDAMENTALS)] / SECONDS
+        phase = 2 * np.pi * slowest * np.outer(time, np.arange(1, HARMONICS + 1))
+        sine, cosine = rng.normal(size=(2, HARMONICS, len(reach)))
+        wave = np.sin(phase) @ sine + np.cos(phase) @ cosine
+        share = rng.uniform(0.5, 0.9, len(reach))
+        pose = 0.9 * (1 - share) * rng.uniform(-1, 1, len(reach))
+        position = reach * (pose + share * wave / np.abs(wave).max(axis=0))
+        motions.append(periodic_motion(position, 1 / RATE_HZ, HIGHEST_HZ))
+    return motions
+
+
+def friction(arm: HydraulicArm, motion: Motion) -> FloatArray:
+    """Return the hidden friction along a motion, shape (n, joints)."""
+    if arm.form is not None:
+        return arm.form(motion)
+    torque: FloatArray = arm.hidden * bouc_wen(motion.position, np.full(5, SLIP_RAD))
+    return torque
 
 
 def measured_torque(
@@ -101,7 +141,7 @@ def measured_torque(
     inner = closed_regressor(HYDRAULIC, motion, SIGN_RAD_S) @ arm.values
     jacobians = closed_jacobians(HYDRAULIC, motion.position)[:, :3]
     outer = np.einsum("nij,ni->nj", jacobians, force)
-    hidden = arm.hidden * dahl(motion.position, np.full(5, SLIP_RAD))
+    hidden = friction(arm, motion)
     hidden[:, 0] += hose_drag(motion, arm.hose)
     noise = PRESSURE_NOISE_N_M * rng.normal(size=inner.shape)
     shown: FloatArray = (inner + outer + hidden) / arm.constants + noise

@@ -1,9 +1,10 @@
 """External forces of a hydraulic arm from its pressures: del Sol et al. 2014, on simulated arms.
 
-Each seed draws an arm; its joints swing one after another by single sinusoids within the paper's
-frequencies (table 1); its closed-chain model is fitted by damped least squares to motion
-differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our method
-fits the same points with the effects that the diagnosis identified on further runs of the same arm.
+Each arm has a hidden friction of one family; its joints swing one after another by single sinusoids
+within the paper's frequencies (table 1); its closed-chain model is fitted by damped least squares
+to motion differentiated in the frequency domain. Then an elastic impact and a sliding effort. Our
+method fits the same points with the effects that the diagnosis identified on further runs of the
+same arm.
 """
 
 from collections.abc import Callable
@@ -19,9 +20,11 @@ from estimation.arm.motion import Motion
 from estimation.arm.periodic import periodic_motion
 from estimation.filters import LowPass, zero_phase
 from estimation.recording import FloatArray
+from rig.arm.hidden import FAMILIES
 from rig.output.provenance import Provenance
-from rig.studies.delsol.diagnosis import HIGHEST_HZ, JOINTS, Named, diagnosed, found_columns
+from rig.studies.delsol.diagnosis import JOINTS, Named, diagnosed, found_columns
 from rig.studies.delsol.hydraulic_arm import (
+    HIGHEST_HZ,
     HYDRAULIC,
     RATE_HZ,
     SIGN_RAD_S,
@@ -29,9 +32,10 @@ from rig.studies.delsol.hydraulic_arm import (
     draw,
     measured_torque,
 )
+from rig.studies.families import arm_of
 from rig.studies.seeds import kept_outcomes
 
-SCHEMA = "rig.study.delsol/3"
+SCHEMA = "rig.study.delsol/4"
 
 TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
 TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
@@ -78,14 +82,14 @@ class DelSolStudy:
 
     Attributes:
         schema: Name of this layout.
-        seeds: The seeds, all reported.
-        outcomes: By method, one a seed.
-        named: What the diagnosis named on each seed's arm.
+        seeds: Arms of each family.
+        outcomes: By method, one an arm, in the order of their numbers.
+        named: What the diagnosis named on each arm.
         provenance: When and from what this was made.
     """
 
     schema: str
-    seeds: tuple[int, ...]
+    seeds: int
     outcomes: dict[str, tuple[Outcome, ...]]
     named: tuple[tuple[Named, ...], ...]
     provenance: Provenance
@@ -102,22 +106,24 @@ class Seed:
 def run_delsol(
     seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
 ) -> DelSolStudy:
-    """Do the study on arms of several seeds, from 0.
+    """Do the study on arms of every family of hidden friction.
 
     Args:
-        seeds: Number of seeds.
-        state: Folder where the outcome of each seed is kept.
-        workers: Processes; each does one seed.
-        on_seed: Called after each seed, also after one that was kept.
+        seeds: Arms of each family, from seed 0.
+        state: Folder where the outcome of each arm is kept.
+        workers: Processes; each does one arm.
+        on_seed: Called after each arm, also after one that was kept.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
+    done = kept_outcomes(
+        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA, workers=workers, on_seed=on_seed
+    )
     methods = (PAPER, DISCARDED, OURS)
     by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in methods}
     named = tuple(seed.named for seed in done)
-    return DelSolStudy(SCHEMA, tuple(range(seeds)), by_method, named, Provenance.now(0))
+    return DelSolStudy(SCHEMA, seeds, by_method, named, Provenance.now(0))
 
 
 def _read(held: Any) -> Seed:
@@ -131,10 +137,11 @@ def _read(held: Any) -> Seed:
     return Seed(outcomes, tuple(named))
 
 
-def one_seed(seed: int) -> Seed:
+def one_arm(number: int) -> Seed:
     """Do one arm."""
+    seed, family = arm_of(number)
     rng = np.random.default_rng([seed, 2014])
-    arm = draw(rng)
+    arm = draw(rng, family)
     runs = [(m, measured_torque(arm, m, np.zeros((len(m), 3)), rng)) for m in swings(rng)]
     tests = {name: make(arm, rng) for name, make in (("impact", impact), ("sliding", sliding))}
     named, effects = diagnosed(arm, rng)

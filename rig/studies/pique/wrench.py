@@ -1,13 +1,15 @@
 """Tables 3.1 to 3.3 of Piqué 2018 on simulated arms: free space, a hand's motion, and contact.
 
-Each seed draws an arm with effects that no model declares, excites it, identifies it, and looks at
-other motions and at contact with a force sensor of its own faults. The thesis' own method first;
-then columns filtered as the torque, slip of the joints, and joints weighed by their errors; then
-the same with a window of past samples in place of the zero-phase filter.
+Each arm has a hidden torque of one family, which no model declares. It is excited, identified, and
+tested on other motions and in contact with a force sensor of its own faults. The thesis' own method
+first; then columns filtered as the torque, the effects found within the excitation, and joints
+weighed by their errors; then the same with a window of past samples in place of the zero-phase
+filter.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +18,7 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from estimation.arm.base import base_of
-from estimation.arm.effects import on_joint
-from estimation.arm.elements import slip
+from estimation.arm.effects import ArmEffect, of_joints
 from estimation.arm.identification import fit, nrmsd_percent, smoothed, thesis_weights
 from estimation.arm.kinematics import tip_pose
 from estimation.arm.motion import FINE, LOW_PASS, Motion, motion_of
@@ -31,6 +32,8 @@ from estimation.arm.wrench import (
 )
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray
+from rig.arm.hidden import FAMILIES
+from rig.arm.search import DAMPING, RATE_SHARE, Prepared, base_block, blocks_of, of_columns
 from rig.arm.simulated import (
     RATE_HZ,
     ArmRun,
@@ -40,16 +43,19 @@ from rig.arm.simulated import (
     excitation,
     passed_on,
     pin,
+    recorded,
     simulate,
     smooth_motion,
 )
+from rig.arm.within import chosen_within
 from rig.output.provenance import Provenance
+from rig.studies.families import arm_of
 from rig.studies.seeds import kept_outcomes
 
-SCHEMA = "rig.study.pique.wrench/2"
+SCHEMA = "rig.study.pique.wrench/3"
 
 THESIS = "thesis' method"
-OURS = "with slip and errors weighed"
+OURS = "with effects found and errors weighed"
 CAUSAL = "the same, causal"
 
 TABLES = {
@@ -72,24 +78,25 @@ meets its table 3.3."""
 CUT = slice(100, -100)
 WINDOW, ORDER = 25, 3
 """Samples and degree of the causal window: a quarter of a second, an eighth late."""
-SLIP_SHARE = (0.003, 0.01, 0.03, 0.1)
-DAMPING = 1e-4
 WITHIN = 0.25
+
+JOINTS_ALONE = replace(PSM, wrist=None, wrist_coupling=())
+"""The arm by its joints: the simulated one has no cables between them, and none are searched."""
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One table's errors by one method over all seeds, %; shape (seeds, 6)."""
+class Arm:
+    """One arm's results.
 
-    table: str
-    method: str
-    nrmsd_percent: tuple[tuple[float, ...], ...]
+    Attributes:
+        family: Its hidden torque.
+        errors: NRMSD, %, by table and, in it, by method.
+        effects: Names of the effects found within its excitation.
+    """
 
-    @property
-    def median(self) -> FloatArray:
-        """Median over the seeds."""
-        middle: FloatArray = np.median(np.array(self.nrmsd_percent), axis=0)
-        return middle
+    family: str
+    errors: dict[str, dict[str, tuple[float, ...]]]
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -98,82 +105,71 @@ class WrenchStudy:
 
     Attributes:
         schema: Name of this layout.
-        seeds: The seeds, all reported.
-        cells: Errors by table and method.
-        fair: Of each table, whether the thesis' method lands within 25 % of it in every column.
+        seeds: Arms of each family.
+        arms: All arms, in the order of their numbers.
         provenance: When and from what this was made.
     """
 
     schema: str
-    seeds: tuple[int, ...]
-    cells: tuple[Cell, ...]
-    fair: dict[str, tuple[bool, ...]]
+    seeds: int
+    arms: tuple[Arm, ...]
     provenance: Provenance
 
-
-@dataclass(frozen=True)
-class Seed:
-    """Errors of one arm, %, by table and, in it, by method."""
-
-    errors: dict[str, dict[str, tuple[float, ...]]]
+    def errors(self, family: str, table: str, method: str) -> FloatArray:
+        """Return the errors of a family's arms, %, shape (arms, 6)."""
+        own = [arm for arm in self.arms if arm.family == family]
+        return np.array([arm.errors[table][method] for arm in own])
 
 
 def run_wrench_study(
     seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
 ) -> WrenchStudy:
-    """Do the study on arms of several seeds.
+    """Do the study on arms of every family of hidden torque.
 
     Args:
-        seeds: Number of seeds; from 0.
-        state: Folder where the outcome of each seed is kept.
+        seeds: Arms of each family, from seed 0.
+        state: Folder where the outcome of each arm is kept.
         workers: Processes at once.
-        on_seed: Called after each seed, also after one that was kept.
+        on_seed: Called after each arm, also after one that was kept.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    done = kept_outcomes(one_seed, _read, seeds, state, SCHEMA, workers=workers, on_seed=on_seed)
-    cells = tuple(
-        Cell(table, method, tuple(seed.errors[table][method] for seed in done))
-        for table in (*TABLES, BODY)
-        for method in (THESIS, OURS, CAUSAL)
+    arms = kept_outcomes(
+        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA, workers=workers, on_seed=on_seed
     )
-    fair = {
-        cell.table: tuple(
-            bool(near) for near in np.abs(cell.median / TABLES[cell.table] - 1) <= WITHIN
-        )
-        for cell in cells
-        if cell.method == THESIS and cell.table in TABLES
+    return WrenchStudy(SCHEMA, seeds, tuple(arms), Provenance.now(0))
+
+
+def _read(held: Any) -> Arm:
+    errors = {
+        table: {method: tuple(error) for method, error in methods.items()}
+        for table, methods in held["errors"].items()
     }
-    return WrenchStudy(SCHEMA, tuple(range(seeds)), cells, fair, Provenance.now(0))
+    return Arm(held["family"], errors, tuple(held["effects"]))
 
 
-def _read(held: Any) -> Seed:
-    return Seed(
-        {
-            table: {method: tuple(error) for method, error in methods.items()}
-            for table, methods in held["errors"].items()
-        }
-    )
-
-
-def one_seed(seed: int) -> Seed:
+def one_arm(number: int) -> Arm:
     """Do one arm."""
+    seed, family = arm_of(number)
     rng = np.random.default_rng([seed, 20180])
-    arm = draw_arm(rng)
+    arm = draw_arm(rng, family)
     learnt = simulate(arm, excitation(rng), rng)
     motions = {HAND: smooth_motion(rng, 40.0), SERIES: excitation(rng, 40.0)}
     free = {table: simulate(arm, motion, rng) for table, motion in motions.items()}
     touches = [_touched(arm, rng, *sizes) for sizes in (PUSHED, TWISTED)]
     errors: dict[str, dict[str, tuple[float, ...]]] = {table: {} for table in (*TABLES, BODY)}
+    effects = found_effects(learnt)
     for method, columns_of, filtered in (
         (THESIS, _thesis_columns, _filtered),
-        (OURS, _our_columns, _filtered),
-        (CAUSAL, _causal_columns, _smoothed),
+        (OURS, partial(_our_columns, effects), _filtered),
+        (CAUSAL, partial(_causal_columns, effects), _smoothed),
     ):
         own, torque = columns_of(learnt), filtered(learnt.torque)
-        damping = 0.0 if method == THESIS else DAMPING
-        values = fit(own, torque, thesis_weights(torque), damping).values
+        if method == THESIS:
+            values = fit(own, torque, thesis_weights(torque)).values
+        else:
+            values = _path(own, torque, effects).values([effect.name for effect in effects])
         left = np.std(torque - own @ values, axis=0)
         for table, run in free.items():
             error = nrmsd_percent(columns_of(run) @ values, filtered(run.torque))
@@ -190,7 +186,25 @@ def one_seed(seed: int) -> Seed:
                 seen = sensor if table == CONTACT else in_tip_frame(sensor, touch.position)
                 both.append(nrmsd_percent(wrench, filtered(seen)))
             errors[table][method] = tuple(map(float, [*both[0][:3], *both[1][3:]]))
-    return Seed(errors)
+    return Arm(family, errors, tuple(effect.name for effect in effects))
+
+
+def found_effects(run: ArmRun) -> list[ArmEffect]:
+    """Return the effects that help from some segments of an excitation to the others and back."""
+    tried = of_joints(JOINTS_ALONE)
+    path = _path(_our_columns(tried, run), _filtered(run.torque), tried)
+    whole = recorded("excitation", run.position, run.torque, RATE_HZ)
+    kept = chosen_within(path, whole, tried)
+    return [effect for effect in tried if effect.name in kept]
+
+
+def _path(table: FloatArray, torque: FloatArray, effects: Sequence[ArmEffect]) -> Prepared:
+    """Return columns of the base and of effects, thinned, ready to be fitted or searched."""
+    every = round(RATE_HZ / (RATE_SHARE * LOW_PASS.cutoff_hz))
+    still = motion_of(np.zeros((50, len(PSM.joints))), 1 / RATE_HZ, FINE)
+    widths = [effect.columns(still).shape[2] for effect in effects]
+    blocks = blocks_of(base_block(DAMPING), effects, widths)
+    return of_columns("excitation", torque[::every], table[::every], blocks, len(PSM.joints))
 
 
 def _touched(
@@ -228,8 +242,8 @@ def _thesis_columns(run: ArmRun) -> FloatArray:
     return regressor(PSM, motion)[CUT][:, :, base_of(PSM).columns]
 
 
-def _our_columns(run: ArmRun) -> FloatArray:
-    columns = _with_slip(motion_of(run.position, 1 / RATE_HZ, FINE))
+def _our_columns(effects: Sequence[ArmEffect], run: ArmRun) -> FloatArray:
+    columns = _with(effects, motion_of(run.position, 1 / RATE_HZ, FINE))
     return smoothed(columns, RATE_HZ, LOW_PASS)[CUT]
 
 
@@ -241,18 +255,14 @@ def _smoothed(values: FloatArray, derivative: int = 0) -> FloatArray:
     return late
 
 
-def _causal_columns(run: ArmRun) -> FloatArray:
+def _causal_columns(effects: Sequence[ArmEffect], run: ArmRun) -> FloatArray:
     position, velocity, acceleration = (_smoothed(run.position, k) for k in range(3))
-    return _with_slip(Motion(position, velocity, acceleration, 1 / RATE_HZ))
+    return _with(effects, Motion(position, velocity, acceleration, 1 / RATE_HZ))
 
 
-def _with_slip(motion: Motion) -> FloatArray:
-    parts = [regressor(PSM, motion)[:, :, base_of(PSM).columns]]
-    for k, joint in enumerate(PSM.joints):
-        half = (joint.upper - joint.lower) / 2
-        slips = [slip(motion.position[:, [k]], share * half) for share in SLIP_SHARE]
-        parts.append(on_joint(np.hstack(slips), k, len(PSM.joints)))
-    return np.concatenate(parts, axis=2)
+def _with(effects: Sequence[ArmEffect], motion: Motion) -> FloatArray:
+    own = regressor(PSM, motion)[:, :, base_of(PSM).columns]
+    return np.concatenate([own, *(effect.columns(motion) for effect in effects)], axis=2)
 
 
 def ati(wrench: FloatArray, rng: np.random.Generator) -> FloatArray:

@@ -1,16 +1,24 @@
 """Torque in free space: Figure 3 and Tables I and II of Zhang et al. 2022 on one simulated arm."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arm.identification import nrmsd_percent
 from estimation.recording import FloatArray
-from rig.arm.simulated import SimulatedArm
+from rig.arm.hidden import FAMILIES, OWN, draw_hidden
 from rig.studies.zhang.networks import JointNetwork, trained, transferred
 from rig.studies.zhang.physics import Physics, find_effects, fitted
-from rig.studies.zhang.psm import GRIPPER, RATE_HZ, Psm, PsmRun, simulate, with_instrument
+from rig.studies.zhang.psm import (
+    GRIPPER,
+    RATE_HZ,
+    Psm,
+    PsmRun,
+    memory,
+    simulate,
+    with_instrument,
+)
 from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 
@@ -49,6 +57,17 @@ def free_runs(psm: Psm, rng: np.random.Generator, moving: bool) -> Split:
     """Return the runs in free space of one condition: gripper moving, or closed."""
     seconds = [60 * MINUTES * share / 7 for share in (5, 1, 1)]
     return Split(*(_free(psm, rng, s, moving) for s in seconds))
+
+
+def of_family(psm: Psm, family: str, seed: int) -> Psm:
+    """Return an arm whose hidden torque is of a family, as large as its friction with memory."""
+    if family == OWN:
+        return psm
+    rng = np.random.default_rng([seed, FAMILIES.index(family)])
+    path, open_rad = random_path(rng, 60.0), psm.kind.open_rad
+    motion = with_gripper(path, moving_gripper(rng, 60.0, open_rad), open_rad)
+    form = draw_hidden(family, rng, motion, np.std(memory(psm, motion), axis=0))
+    return replace(psm, form=form)
 
 
 def _free(psm: Psm, rng: np.random.Generator, seconds: float, moving: bool) -> PsmRun:
@@ -155,10 +174,14 @@ def figure_3(psm: Psm, rng: np.random.Generator) -> Cells:
 
 
 def table_2(
-    arm: SimulatedArm, forceps: Psm, rng: np.random.Generator, seed: int
+    forceps: Psm, rng: np.random.Generator, seed: int, family: str
 ) -> tuple[JointNetwork, Cells]:
     """Return the forceps' gripper network after transfer, and the errors on each instrument."""
-    driver = with_instrument(rng, arm, "LND")
+
+    def mounted(name: str) -> Psm:
+        return of_family(with_instrument(rng, forceps.arm, name), family, seed)
+
+    driver = mounted("LND")
     known = free_runs(driver, rng, moving=True)
     source = trained(GRIPPER, [known.train], [known.validation], True, seed)
     fit = round(OUR_MINUTES / 2 * 60 * RATE_HZ)
@@ -169,7 +192,7 @@ def table_2(
     for name in KINDS:
         if name == "LND":
             continue
-        psm = forceps if name == "CF" else with_instrument(rng, arm, name)
+        psm = forceps if name == "CF" else mounted(name)
         train, validation, test = (_free(psm, rng, 60 * m, True) for m in OTHER_MINUTES)
         adapted = transferred(source, [train], [validation])
         if name == "CF":

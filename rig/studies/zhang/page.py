@@ -1,10 +1,14 @@
 """The study of Zhang et al. 2022 as tables for any medium, and as Markdown."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimation.recording import FloatArray
+from rig.arm.hidden import FAMILIES
 from rig.output.table import TextTable, to_markdown
+from rig.studies.coverage import coverage
+from rig.studies.families import ratios, verdict
 from rig.studies.zhang.free import (
     BARE,
     FLOOR,
@@ -44,18 +48,27 @@ SIMULATED = {
 OTHERS = [name for name in KINDS if name != "LND"]
 
 
+ADJUSTED = TextTable(
+    "Set so that the paper's networks land near the paper",
+    ["what", "first value", "value here"],
+    [
+        ["friction with memory of joints 1, 2, 3, share", "0.85, 1.5, 0.72", "0.9, 1.45, 0.72"],
+        ["friction of the wrist's cables, N m", "0.0138", "0.0132"],
+        ["pull of the gripper's cables on joint 4", "0.006", "0.004"],
+        ["noise, other pulls, rub, vibration, coupling error", "not recorded", "decision 55"],
+    ],
+    "So a landing within 25 % is no evidence for the simulation.",
+)
+
+
 def lead(study: ZhangStudy) -> str:
     """Return the study's result in a few sentences."""
     near = [word for condition in PAPER for word in study.near(condition) if word is not None]
     near += study.near_in_contact()
-    better, cells = _better(study)
     return (
-        f"On {len(study.seeds)} simulated arms the paper's networks land within {WITHIN:.0%} of the"
-        f" paper in {sum(near)} of {len(near)} numbers (median over arms){_missed(study)}. Of those"
-        " that are errors"
-        " after training on both conditions, after transfer, in grasps and in contact, arm by arm,"
-        f" the physical model with the effects found and a small network has the smaller one in"
-        f" {better} of {cells}."
+        f"{verdict(_ratios(study))} On the arms that were matched to it the paper's networks land"
+        f" within {WITHIN:.0%} of the paper in {sum(near)} of {len(near)} numbers (median over"
+        f" arms){_missed(study)}."
     )
 
 
@@ -64,8 +77,8 @@ def notes(study: ZhangStudy) -> list[str]:
     return [
         "The simulated arms are not measured ones: strengths of friction, noise and vibration, the"
         " coupling's error, and how instruments differ, were chosen over several rounds on other"
-        " arms so that the paper's networks meet its tables (decision 55). This is not"
-        " evidence. Arms are drawn around those strengths by seed; all are reported.",
+        " arms so that the paper's networks meet its tables (decision 55). Friction with memory is"
+        " replaced by a drawn family of the same size on the other arms; the rest is the same.",
         f"Paper's networks: {MINUTES:g} minutes a condition, split 5:1:1; an instrument's transfer"
         f" {OTHER_MINUTES[0]:g} + {OTHER_MINUTES[1]:g} + {OTHER_MINUTES[2]:g} minutes. Ours: the"
         f" first {OUR_MINUTES:g} minutes of the same, half with the gripper moving; an instrument"
@@ -76,7 +89,8 @@ def notes(study: ZhangStudy) -> list[str]:
         "Two rows of Table I are cut off in our copy of the paper: only J3 is known.",
         "Ours uses each joint's travel since its last reversal, however long ago, and the gripper"
         " torque measured as an input of joints 3 to 6. The candidates are the arm catalogue, slips"
-        " over longer travel and drag of the moving gripper, not the simulated friction (Dahl).",
+        " over longer travel and drag of the moving gripper. The last two were added with this"
+        " simulation in view.",
         "The small network's inputs are its joint's motion and deflections of presliding springs."
         " It is kept where it removes 10 % of the squared residual on held-out segments.",
     ]
@@ -84,7 +98,10 @@ def notes(study: ZhangStudy) -> list[str]:
 
 def tables(study: ZhangStudy) -> list[TextTable]:
     """Return the study's tables."""
+    columns = [*(f"{joint}, M" for joint in JOINTS), "instruments", "grasp", "force", "moment"]
+    title = f"Ours over the paper's networks, {study.seeds} arms a family"
     return [
+        ratios(title, [*columns, "held grasp"], _ratios(study)),
         _figure_3(study),
         _table_1(study),
         _table_1_ours(study),
@@ -93,7 +110,8 @@ def tables(study: ZhangStudy) -> list[TextTable]:
         _grasp(study),
         _configurations(study),
         _contact(study),
-        _every(study),
+        ADJUSTED,
+        coverage("zhang"),
     ]
 
 
@@ -118,24 +136,22 @@ def _missed(study: ZhangStudy) -> str:
     return f"; not in: {'; '.join(names)}" if names else ""
 
 
-def _better(study: ZhangStudy) -> tuple[int, int]:
-    """Return in how many numbers ours is smaller than the networks', and of how many.
+def _ratios(study: ZhangStudy) -> Mapping[str, FloatArray]:
+    """Return ours over the networks by family: joints, instruments, grasps and contact."""
 
-    Only those count in which the networks land near the paper's.
-    """
-    compared = ["I | M+C on C", "I | M+C on M", *(f"II after | {name}" for name in OTHERS)]
-    wins = []
-    for cell in (*compared, "grasp | RMSE, NRMSE, scale"):
-        near = np.array([word is True for word in study.near(cell)])
-        near[2 if cell.startswith("grasp") else len(near) :] = False  # a scale is not an error
-        ours, theirs = (study.values(f"{cell} | {method}") for method in (OURS, NETWORKS))
-        wins.append((ours < theirs)[:, near])
-    ours, theirs = (
-        np.array([worst_axes(row) for row in study.values(f"contact | wrench, grasp | {method}")])
-        for method in (OURS, NETWORKS)
-    )
-    wins.append((ours < theirs)[:, np.array(study.near_in_contact())])
-    return sum(int(won.sum()) for won in wins), sum(won.size for won in wins)
+    def errors(family: str, who: str) -> FloatArray:
+        instruments = [study.values(f"II after | {name} | {who}", family) for name in OTHERS]
+        contact = study.values(f"contact | wrench, grasp | {who}", family)
+        return np.hstack(
+            [
+                study.values(f"I | M+C on M | {who}", family),
+                np.mean(instruments, axis=0),
+                study.values(f"grasp | RMSE, NRMSE, scale | {who}", family)[:, :1],
+                np.array([worst_axes(row) for row in contact]),
+            ]
+        )
+
+    return {family: errors(family, OURS) / errors(family, NETWORKS) for family in FAMILIES}
 
 
 def _range(study: ZhangStudy, cell: str, digits: int = 2) -> list[str]:
@@ -275,21 +291,3 @@ def _contact(study: ZhangStudy) -> TextTable:
         " medians."
     )
     return TextTable("Figure 10: wrench and grasp together", columns, rows, note)
-
-
-def _every(study: ZhangStudy) -> TextTable:
-    rows = []
-    for seed, outcome in zip(study.seeds, study.outcomes, strict=True):
-        for who in (NETWORKS, OURS):
-            free = outcome[f"I | M+C on M | {who}"]
-            grip = np.mean([outcome[f"II after | {name} | {who}"][0] for name in OTHERS])
-            grasp = outcome[f"grasp | RMSE, NRMSE, scale | {who}"][0]
-            contact = worst_axes(np.array(outcome[f"contact | wrench, grasp | {who}"]))
-            numbers = [*(f"{x:.2f}" for x in free), f"{grip:.2f}", f"{grasp:.3f}"]
-            rows.append([f"{seed}, {who}", *numbers, *(f"{x:.3f}" for x in contact)])
-    columns = ["arm", *JOINTS, "instruments", "grasp", "force", "moment", "held grasp"]
-    note = (
-        "Free-space NRMSE with the gripper moving, %; mean of the instruments after transfer, %;"
-        " RMSE of the grasps, N, and in contact, N, N m, N."
-    )
-    return TextTable("Every arm", columns, rows, note)

@@ -22,7 +22,7 @@ from estimation.arm.tables import PSM, Arm
 from estimation.arm.wrist import candidates, gripper
 from estimation.networks.network import Network
 from estimation.recording import FloatArray
-from rig.arm.search import DAMPING, Prepared, search
+from rig.arm.search import DAMPING, Prepared, blocks_of, of_columns, search
 from rig.studies.zhang.psm import GRIPPER, JOINTS, RATE_HZ, PsmRun
 from rig.studies.zhang.rest import rest_network, rest_rows
 
@@ -160,18 +160,6 @@ def columns_of(arm: Arm, effects: Sequence[ArmEffect], run: PsmRun) -> FloatArra
     return np.concatenate(parts, axis=2)
 
 
-def blocks_of(effects: Sequence[ArmEffect], widths: Sequence[int]) -> tuple[Block, ...]:
-    """Return the blocks of declared columns and effects, of so many columns each."""
-    blocks = [base_block()]
-    start = len(blocks[0].at)
-    for effect, width in zip(effects, widths, strict=True):
-        signs = np.full(width, effect.dissipative)
-        at = np.arange(start, start + width)
-        blocks.append(Block(effect.name, at, signs, DAMPING * effect.damping))
-        start += width
-    return tuple(blocks)
-
-
 def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmEffect]) -> Prepared:
     """Return runs ready for fits and for the search."""
     tables, torques, widths = [], [], []
@@ -183,17 +171,8 @@ def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmE
         widths = [part.shape[2] for part in parts[1:]]
         tables.append(np.concatenate(parts, axis=2))
         torques.append(run.torque[kept])
-    torque, table = np.concatenate(torques), np.concatenate(tables)
-    return Prepared(
-        name=name,
-        position=np.zeros((len(torque), GRIPPER)),
-        torque=torque,
-        thesis=table[:, :, :0],
-        closed=table[:, :, :0],
-        table=table,
-        blocks=blocks_of(effects, widths),
-        independent_share=1.0,
-    )
+    blocks = blocks_of(base_block(), effects, widths)
+    return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, JOINTS)
 
 
 def find_effects(arm: Arm, first: Sequence[PsmRun], second: Sequence[PsmRun]) -> list[ArmEffect]:

@@ -17,7 +17,8 @@ from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM, Arm
 from estimation.arm.wrench import spatial_jacobians
 from estimation.recording import FloatArray
-from rig.arm.simulated import HIDDEN_SHARE, SimulatedArm, dahl
+from rig.arm.hidden import HiddenTorque, bouc_wen
+from rig.arm.simulated import HIDDEN_SHARE, SimulatedArm
 from rig.grasper.dvrk import dvrk_coupling
 from rig.studies.zhang.psm_instruments import KINDS, Kind
 
@@ -80,6 +81,7 @@ class Psm:
         noise: Standard deviation of the noise of each joint, N m or N.
         true_coupling: From motors to roll, pitch, yaw and gripper, shape (4, 4).
         leak: A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4).
+        form: Hidden torque of a drawn family, in place of friction with memory.
     """
 
     arm: SimulatedArm
@@ -89,6 +91,7 @@ class Psm:
     noise: FloatArray
     true_coupling: FloatArray
     leak: FloatArray
+    form: HiddenTorque | None = None
 
     @property
     def nominal_coupling(self) -> FloatArray:
@@ -170,14 +173,14 @@ def simulate(
     """
     joints = np.zeros((len(motion), JOINTS))
     joints[:, :GRIPPER] = _declared(psm.arm.values, motion)
-    joints[:, :GRIPPER] += psm.memory * dahl(motion.position[:, :GRIPPER], _slips())
     if wrench is not None:
         jacobians = spatial_jacobians(PSM, motion.position[:, :GRIPPER])
         joints[:, :GRIPPER] += np.einsum("nij,ni->nj", jacobians, wrench)
     own = gripper_torque(psm.kind, motion.position[:, GRIPPER], motion.velocity[:, GRIPPER])
     joints[:, GRIPPER] = own if grip_n_m is None else own + grip_n_m
     shown = joints.copy()
-    shown[:, WRIST] = joints[:, WRIST] @ psm.leak.T + _cables(psm, motion.position[:, WRIST])
+    shown[:, WRIST] = joints[:, WRIST] @ psm.leak.T
+    shown += psm.form(motion) if psm.form is not None else memory(psm, motion)
     shown[:, :4] += np.outer(joints[:, GRIPPER], PULL)
     shown[:, :4] += np.outer(np.tanh(motion.velocity[:, GRIPPER] / RUB_RAD_S), RUB)
     shown[:, :4] += np.outer(ringing(motion.velocity[:, GRIPPER], rng), VIBRATION)
@@ -196,7 +199,7 @@ def gripper_torque(kind: Kind, position: FloatArray, velocity: FloatArray) -> Fl
         kind.offset_n_m
         + kind.spring_n_m_rad * position
         + kind.friction_n_m * np.tanh(velocity / RUB_RAD_S)
-        + kind.memory_n_m * dahl(position[:, None], np.array([GRIPPER_SLIP_RAD]))[:, 0]
+        + kind.memory_n_m * bouc_wen(position[:, None], np.array([GRIPPER_SLIP_RAD]))[:, 0]
         - PRESS_N_M * np.clip(1 - position / CLOSED_RAD, 0, 1)
     )
     return torque
@@ -212,11 +215,13 @@ def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
     return rung
 
 
-def _cables(psm: Psm, wrist: FloatArray) -> FloatArray:
-    """Return the joint torque by the friction of the instrument's motors, shape (n, 4)."""
-    motors = wrist @ np.linalg.inv(psm.true_coupling).T
-    friction = psm.cable_n_m * dahl(motors, np.full(4, CABLE_SLIP_RAD))
-    shown: FloatArray = friction @ np.linalg.inv(psm.nominal_coupling)
+def memory(psm: Psm, motion: Motion) -> FloatArray:
+    """Return the torque of friction with memory, of joints and of the motors' cables, (n, 7)."""
+    shown = np.zeros((len(motion), JOINTS))
+    shown[:, :GRIPPER] = psm.memory * bouc_wen(motion.position[:, :GRIPPER], _slips())
+    motors = motion.position[:, WRIST] @ np.linalg.inv(psm.true_coupling).T
+    friction = psm.cable_n_m * bouc_wen(motors, np.full(4, CABLE_SLIP_RAD))
+    shown[:, WRIST] += friction @ np.linalg.inv(psm.nominal_coupling)
     return shown
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from estimation.arm.motion import Motion
 from estimation.arm.tables import PSM
 from estimation.recording import FloatArray
-from rig.arm.simulated import dahl
+from rig.arm.hidden import bouc_wen
 from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, Psm
 from rig.studies.zhang.psm_motion import moving_gripper, random_path, with_gripper
 
@@ -68,7 +68,7 @@ class Grasp:
     def sensed(self, force: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return the reading of a force-sensing resistor for a force, N."""
         gain = 1 + SENSOR_GAIN * rng.normal()
-        late = SENSOR_HYSTERESIS_N * dahl(force[:, None], np.array([0.5]))[:, 0]
+        late = SENSOR_HYSTERESIS_N * bouc_wen(force[:, None], np.array([0.5]))[:, 0]
         told: FloatArray = gain * force + late + SENSOR_NOISE_N * rng.normal(size=len(force))
         return told
 

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.arm.simulated import draw_arm
+from rig.studies.families import arm_of
 from rig.studies.zhang.forces import Learnt, grasps, in_contact, turning
 from rig.studies.zhang.free import (
     Cells,
     figure_3,
     fitted_physics,
     free_runs,
+    of_family,
     short_networks,
     table_1,
     table_2,
@@ -36,17 +38,17 @@ class Outcome:
     effects: tuple[str, ...]
 
 
-def one_seed(seed: int) -> Outcome:
-    """Do all experiments on the arm of one seed."""
+def one_arm(number: int) -> Outcome:
+    """Do all experiments on one arm."""
+    seed, family = arm_of(number)
     rng = np.random.default_rng([seed, STREAM])
-    arm = draw_arm(rng)
-    forceps = with_instrument(rng, arm, "CF")
+    forceps = of_family(with_instrument(rng, draw_arm(rng), "CF"), family, seed)
     splits = {name: free_runs(forceps, rng, name == "M") for name in ("C", "M")}
     networks, cells = table_1(splits, seed)
     physics, ours = fitted_physics(forceps, splits)
     cells |= ours | short_networks(splits, seed)
     cells |= figure_3(forceps, rng)
-    gripper, other = table_2(arm, forceps, rng, seed)
+    gripper, other = table_2(forceps, rng, seed, family)
     cells |= other
     learnt = Learnt(forceps, networks, gripper, physics)
     cells |= turning(learnt, rng)

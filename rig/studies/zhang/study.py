@@ -11,12 +11,13 @@ import numpy as np
 from estimation.arm.kinematics import pinocchio
 from estimation.networks.training import require_torch
 from estimation.recording import FloatArray
+from rig.arm.hidden import FAMILIES, OWN
 from rig.output.provenance import Provenance
 from rig.studies.seeds import kept_outcomes
 from rig.studies.zhang.free import NETWORKS, Cells
-from rig.studies.zhang.seed import Outcome, one_seed
+from rig.studies.zhang.seed import Outcome, one_arm
 
-SCHEMA = "rig.study.zhang/1"
+SCHEMA = "rig.study.zhang/2"
 
 PAPER: dict[str, tuple[float | None, ...]] = {
     "I | C on C": (5.29, 5.73, 7.72, 3.50, 3.69, 3.69),
@@ -55,33 +56,35 @@ class ZhangStudy:
 
     Attributes:
         schema: Name of this layout.
-        seeds: The seeds, all reported.
-        outcomes: Of each seed, its errors by `experiment | condition | method`.
-        traces: Forces over time of the first seed, by `experiment | what`.
+        seeds: Arms of each family of hidden torque.
+        outcomes: Of each arm, in the order of their numbers, its errors by
+            `experiment | condition | method`.
+        traces: Forces over time of the first arm, by `experiment | what`.
         effects: Of each effect found, on how many arms.
         provenance: When and from what this was made.
     """
 
     schema: str
-    seeds: tuple[int, ...]
+    seeds: int
     outcomes: tuple[Cells, ...]
     traces: Cells
     effects: dict[str, int]
     provenance: Provenance
 
-    def values(self, cell: str) -> FloatArray:
-        """Return one cell's numbers over the seeds, shape (seeds, numbers)."""
-        return np.array([outcome[cell] for outcome in self.outcomes])
+    def values(self, cell: str, family: str = OWN) -> FloatArray:
+        """Return one cell's numbers over a family's arms, shape (arms, numbers)."""
+        first = FAMILIES.index(family)
+        return np.array([outcome[cell] for outcome in self.outcomes[first :: len(FAMILIES)]])
 
     def median(self, cell: str) -> FloatArray:
-        """Return the medians over the seeds, shape (numbers,)."""
+        """Return the medians over the arms with the simulation's own torque, shape (numbers,)."""
         middle: FloatArray = np.median(self.values(cell), axis=0)
         return middle
 
     def near(self, condition: str) -> list[bool | None]:
         """Return for each of the paper's numbers whether its method comes near it here.
 
-        The median over the seeds counts; None where the paper's number is not known.
+        The median over the arms that were matched counts; None where the paper's is not known.
         """
         found = self.median(f"{condition} | {NETWORKS}")
         return [
@@ -110,13 +113,13 @@ def run_zhang(
     workers: int = 1,
     on_seed: Callable[[], None] = lambda: None,
 ) -> ZhangStudy:
-    """Do the study on arms of several seeds, from 0.
+    """Do the study on arms of every family of hidden torque.
 
     Args:
-        seeds: Number of seeds.
-        state: Folder where the outcome of each seed is kept.
-        workers: Processes; each does one seed on one core.
-        on_seed: Called after each seed, also after one that was kept.
+        seeds: Arms of each family, from seed 0.
+        state: Folder where the outcome of each arm is kept.
+        workers: Processes; each does one arm on one core.
+        on_seed: Called after each arm, also after one that was kept.
 
     Raises:
         MissingExtraError: torch or Pinocchio is missing.
@@ -125,14 +128,14 @@ def run_zhang(
     require_torch()
     pinocchio()
     outcomes = kept_outcomes(
-        one_seed, _read, seeds, state, SCHEMA, workers=workers, start=_one_thread, on_seed=on_seed
-    )
-    numbers = tuple(range(seeds))
-    found = Counter(name for seed in numbers for name in outcomes[seed].effects)
+        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA,
+        workers=workers, start=_one_thread, on_seed=on_seed,
+    )  # fmt: skip
+    found = Counter(name for outcome in outcomes for name in outcome.effects)
     return ZhangStudy(
         schema=SCHEMA,
-        seeds=numbers,
-        outcomes=tuple(outcomes[seed].cells for seed in numbers),
+        seeds=seeds,
+        outcomes=tuple(outcome.cells for outcome in outcomes),
         traces=outcomes[0].traces,
         effects=dict(found.most_common()),
         provenance=Provenance.now(0),

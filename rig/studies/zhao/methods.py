@@ -20,6 +20,7 @@ from estimation.model import Model, Term, predict
 from estimation.recording import FloatArray, Recording
 from rig.grasper.angle_led import angle_led
 from rig.grasper.current_force import CurrentForce
+from rig.grasper.hidden import OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold, periodic
 from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, vary
 from rig.studies.zhao.paper import INPUTS, LEVELS_N, LONG_S, SHORT_S
@@ -59,13 +60,14 @@ class Outcome:
     delay_ms: float
 
 
-def axes_of(prototype: Prototype, dof: str, seed: int, spread: float) -> Axes:
-    """Return the axes of a degree of freedom of the grasper of this seed.
+def axes_of(prototype: Prototype, dof: str, seed: int, spread: float, family: str = OWN) -> Axes:
+    """Return the axes of a degree of freedom of the grasper of this seed and hidden friction.
 
     Pitch and grasp share the first jaw.
     """
     first = 10 * seed + (5 if dof == "yaw" else 0)
-    return tuple(vary(axis, first + k, spread) for k, axis in enumerate(prototype.axes[dof]))
+    axes = (vary(axis, first + k, spread) for k, axis in enumerate(prototype.axes[dof]))
+    return tuple(with_family(axis, family, first + k) for k, axis in enumerate(axes))
 
 
 def record(

@@ -1,20 +1,25 @@
 """Zhao and Nelson 2016 on simulated graspers: their method, and ours, in their three experiments.
 
-The diagnosis looks at one grasper that is not reported; what it names is added on all the others.
+The diagnosis looks at one grasper of each family of hidden friction, which is not reported; what it
+names is added on all the others of that family.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from estimation.effects import effect
 from estimation.model import Estimate, Term
 from rig.grasper.current_force import CurrentForce
+from rig.grasper.hidden import FAMILIES
 from rig.grasper.plant import PROTOTYPES
+from rig.studies.families import arm_of
 from rig.studies.seeds import kept_outcomes
 from rig.studies.zhao.methods import (
+    Axes,
     Lacking,
     Outcome,
     axes_of,
@@ -28,10 +33,12 @@ from rig.studies.zhao.methods import (
 )
 from rig.studies.zhao.paper import DOFS
 
-SCHEMA = "rig.study.zhao/1"
+SCHEMA = "rig.study.zhao/2"
+
+Added = Mapping[tuple[str, str], Lacking]
 
 LOOKED_AT = 1000
-"""Seed of the grasper that the diagnosis looks at; it is not reported."""
+"""Seed of the graspers that the diagnosis looks at, one a family; they are not reported."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +67,15 @@ class Study:
     Attributes:
         prototype: Name of the prototype.
         spread: Spread of the hidden parameters.
-        cells: Degree of freedom to its cells, one a seed.
-        lacking: Degree of freedom to what the diagnosis found on the grasper it looked at, and what
-            was therefore added to ours.
+        cells: Degree of freedom to its cells, one a grasper, in the order of their numbers.
+        lacking: Family and degree of freedom to what the diagnosis found on the grasper it looked
+            at, and what was therefore added to ours.
     """
 
     prototype: str
     spread: float
     cells: Mapping[str, Sequence[Cell]]
-    lacking: Mapping[str, Lacking] = field(default_factory=dict)
+    lacking: Mapping[tuple[str, str], Lacking] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -87,23 +94,22 @@ class Looked:
 
 
 def look(prototype: str, spread: float, number: int) -> Looked:
-    """Ask the diagnosis what a degree of freedom's model lacks, on the grasper for that."""
-    dof = DOFS[number]
-    axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread)
+    """Diagnose a degree of freedom's model on a grasper of one family that is not reported."""
+    family, dof = FAMILIES[number // len(DOFS)], DOFS[number % len(DOFS)]
+    axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread, family)
     found = lacking(dof, axes, LOOKED_AT)
     return Looked(found.findings, tuple(_plain(term) for term in found.terms))
 
 
-def one_grasper(
-    prototype: str, spread: float, added: Mapping[str, Sequence[Term]], seed: int
-) -> Grasper:
+def one_grasper(prototype: str, spread: float, added: Added, number: int) -> Grasper:
     """Measure all degrees of freedom of one grasper."""
-    return Grasper(tuple(measure(prototype, dof, seed, spread, added[dof]) for dof in DOFS))
+    seed, family = arm_of(number, FAMILIES)
+    axes = {dof: axes_of(PROTOTYPES[prototype], dof, seed, spread, family) for dof in DOFS}
+    return Grasper(tuple(measure(dof, axes[dof], seed, added[family, dof].terms) for dof in DOFS))
 
 
-def measure(prototype: str, dof: str, seed: int, spread: float, added: Sequence[Term]) -> Cell:
+def measure(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Cell:
     """Calibrate both methods on some runs of a grasper and report them on others."""
-    axes = axes_of(PROTOTYPES[prototype], dof, seed, spread)
     arm_m = axes[0].arm_m
     method = CurrentForce(arm_m)
     steep = slope(dof, axes, method, seed * 1000 + 500)
@@ -129,25 +135,24 @@ def run_study(
 
     Args:
         prototype: `third`, `journal` or `ball`.
-        seeds: Number of graspers, from seed 0.
+        seeds: Graspers of each family of hidden friction, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
         state: Folder where each is kept as it is done.
         workers: Processes at once.
-        on_step: Called after each of three diagnoses and each grasper.
+        on_step: Called after each of three diagnoses a family and each grasper.
     """
     name = f"{SCHEMA} {prototype} {spread:g}"
     looked = kept_outcomes(
-        partial(look, prototype, spread), _looked, len(DOFS), state, f"{name} diagnosis",
-        workers=workers, on_seed=on_step,
+        partial(look, prototype, spread), _looked, len(FAMILIES) * len(DOFS), state,
+        f"{name} diagnosis", workers=workers, on_seed=on_step,
     )  # fmt: skip
     lacked = {
-        dof: Lacking(found.findings, tuple(_term(term) for term in found.terms))
-        for dof, found in zip(DOFS, looked, strict=True)
+        (family, dof): Lacking(found.findings, tuple(_term(term) for term in found.terms))
+        for (family, dof), found in zip(product(FAMILIES, DOFS), looked, strict=True)
     }
-    added = {dof: found.terms for dof, found in lacked.items()}
     graspers = kept_outcomes(
-        partial(one_grasper, prototype, spread, added), _grasper, seeds, state, name,
-        workers=workers, on_seed=on_step,
+        partial(one_grasper, prototype, spread, lacked), _grasper, seeds * len(FAMILIES), state,
+        name, workers=workers, on_seed=on_step,
     )  # fmt: skip
     cells = {dof: [g.cells[k] for g in graspers] for k, dof in enumerate(DOFS)}
     return Study(PROTOTYPES[prototype].name, spread, cells, lacked)

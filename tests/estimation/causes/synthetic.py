@@ -19,12 +19,10 @@ def motor() -> Model:
     return model_file.read(Path("motor"))
 
 
-def recordings(
-    lost: Effect | None = None, runs: int = 12, acts_from: int = 0, seed: int = 0
-) -> list[Recording]:
+def recordings(lost: Effect | None = None, runs: int = 12, seed: int = 0) -> list[Recording]:
     """Return runs of several speeds against several loads."""
     random = np.random.default_rng(seed)
-    return [_run(k, lost if k >= acts_from else None, random) for k in range(runs)]
+    return [_run(k, lost, random) for k in range(runs)]
 
 
 def _run(k: int, lost: Effect | None, random: np.random.Generator) -> Recording:

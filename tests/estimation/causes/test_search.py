@@ -12,7 +12,7 @@ from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.places import places_of
-from estimation.causes.search import search
+from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
 from estimation.causes.verdict import diagnose, family_probabilities
 from estimation.diagnosis.split import split
@@ -28,12 +28,16 @@ def _rippled(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArr
     return 0.01 * np.sin(3 * angle)
 
 
-def _found(runs: list[Recording]) -> list[tuple[str, str, tuple[str, ...]]]:
+def _searched(runs: list[Recording]) -> Found:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
     add_instruments(layout, sealed.discover)
-    found = search(layout.select(sealed.discover))
-    return [c.candidate.name for c in found.causes]
+    return search(layout.select(sealed.discover))
+
+
+@pytest.fixture(scope="module")
+def found() -> Found:
+    return _searched(recordings(_rippled))
 
 
 def test_an_asymmetric_loss_is_identified_and_lowers_the_error_on_test_runs() -> None:
@@ -51,16 +55,7 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
 
 
-def test_an_effect_of_the_later_runs_is_found_with_its_runs() -> None:
-    runs = recordings(_rippled, acts_from=6)
-    answer = diagnose(runs, [motor()], split(runs))
-    assert answer.findings[0].family == "ripple.motor"
-    affected = set(answer.findings[0].runs_affected)
-    assert affected <= {f"{k:02d}" for k in range(5, 12)}
-    assert {f"{k:02d}" for k in range(8, 12)} <= affected
-
-
-def test_the_test_runs_do_not_reach_the_choice() -> None:
+def test_the_test_runs_do_not_reach_the_choice(found: Found) -> None:
     runs = recordings(_rippled)
     held_out = set(split(runs).confirm)
     random = np.random.default_rng(5)
@@ -73,10 +68,11 @@ def test_the_test_runs_do_not_reach_the_choice() -> None:
         else r
         for r in runs
     ]
-    assert _found(spoilt) == _found(runs)
+    again = _searched(spoilt)
+    assert [c.candidate.name for c in again.causes] == [c.candidate.name for c in found.causes]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     name=st.sampled_from(
         ["bearing_angle_rad", "hidden_n_m", "other_a", "room_k", "extra_position_m"]
@@ -135,11 +131,6 @@ def test_each_family_of_folds_leaves_every_run_out_once() -> None:
         assert sorted(k for fold in family for k in fold) == list(range(9))
 
 
-def test_probabilities_of_families_sum_to_one() -> None:
-    runs = recordings(_rippled)
-    sealed = split(runs)
-    layout = lay_out([motor()], runs, sealed.discover)
-    add_instruments(layout, sealed.discover)
-    found = search(layout.select(sealed.discover))
+def test_probabilities_of_families_sum_to_one(found: Found) -> None:
     for ranked in found.conditional:
         assert sum(p.share for p in family_probabilities(ranked, DEFAULT)) == pytest.approx(1.0)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from rig.grasper.coupling import Coupling, GrasperError, JointLimitError, Limits
+from rig.grasper.coupling import Coupling, GrasperError, Limits
 from rig.grasper.dvrk import TOOLS, dvrk_coupling
 from rig.grasper.three_dof import (
     Drive,
@@ -121,15 +121,6 @@ def test_the_cadiere_forceps_torques_and_the_printed_equation_4():
     # the erratum: what is printed as joint to actuator torque maps the other way
     to_joints = grasper.joint_torque(np.eye(4)).T
     np.testing.assert_allclose(to_joints, printed, atol=1e-4)
-
-
-def test_limits_are_checked_by_name():
-    grasper = dvrk_coupling("400049")
-    grasper.check_limits(np.radians([[260, -80, 80, 80], [0, 0, 0, -20]]) * 0.999)
-    with pytest.raises(JointLimitError, match="wrist_yaw"):
-        grasper.check_limits(np.radians([0, 0, 81, 0]))
-    with pytest.raises(JointLimitError, match="jaw"):
-        grasper.check_limits([0, 0, 0, math.nan])
 
 
 def test_a_wrist_whose_cables_would_leave_their_pulleys_is_refused():

@@ -1,5 +1,10 @@
-"""Hold the simulated rig against a measured run of the same trajectory and load."""
+"""The simulated rig compared with a measured run of the same trajectory and load.
 
+python -m benchmarks.measured_run --data Tool_4_Maryland_L_4.tar.xz --run 24
+"""
+
+import argparse
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +14,7 @@ from numpy.typing import NDArray
 
 from estimation.recording import Recording
 from rig.errors import DataError
+from rig.importers.registry import open_campaign
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
@@ -116,22 +122,22 @@ def _level(values: FloatArray) -> Level:
     return Level(float(low), float(middle), float(high))
 
 
-def draw_figure(recording: Recording, path: Path) -> None:
-    """Write a figure of both runs, channel by channel over time; the file is replaced at once."""
-    from matplotlib.figure import Figure
+def main() -> None:
+    """Print the levels of a measured run and of its simulation."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.measured_run", description=__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="Recordings of the reference rig.")
+    parser.add_argument("--run", default="24", help="Name of the run.")
+    asked = parser.parse_args()
+    (run,) = open_campaign(asked.data).select([asked.run]).runs
+    sys.stdout.write(
+        f"{'channel':24s}{'measured 5 / 50 / 95 %':>30s}{'simulated 5 / 50 / 95 %':>30s}\n"
+    )
+    for row in compare(run.recording()):
+        levels = [
+            f"{s.low:9.4f} {s.middle:9.4f} {s.high:9.4f}" for s in (row.measured, row.simulated)
+        ]
+        sys.stdout.write(f"{row.channel:24s}{levels[0]:>30s}{levels[1]:>30s}\n")
 
-    ratio = SimulatedBench().parameters.gear_ratio
-    measured = channels_of(recording.columns, ratio)
-    simulated = channels_of(simulate_like(recording), ratio)
-    time_s = recording.time_s - recording.time_s[0]
-    figure = Figure(figsize=(10.0, 2.2 * len(CHANNELS)), layout="constrained")
-    for axis, name in zip(figure.subplots(len(CHANNELS), 1, sharex=True), CHANNELS, strict=True):
-        axis.plot(time_s, measured[name], label="measured", linewidth=0.8)
-        axis.plot(time_s, simulated[name], label="simulated", linewidth=0.8)
-        axis.set_ylabel(name)
-    figure.axes[0].legend(loc="upper right")
-    figure.axes[-1].set_xlabel("time_s")
-    beside = path.with_name(f".{path.name}.part")
-    with beside.open("wb") as file:
-        figure.savefig(file, format="png")
-    beside.replace(path)
+
+if __name__ == "__main__":
+    main()

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.measured_run import CHANNELS, compare
 from estimation.recording import Recording
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
 from rig.protocols import trajectory
 from rig.simulation.bench import SimulatedBench
-from rig.simulation.compare import CHANNELS, compare, draw_figure
 from rig.simulation.play import play
 
 pytestmark = pytest.mark.integration
@@ -35,13 +35,6 @@ def test_a_run_without_a_trajectory_is_refused() -> None:
     still = run.with_columns(target_angle_rad=np.zeros(len(run)))
     with pytest.raises(DataError, match="no trajectory"):
         compare(still)
-
-
-def test_the_figure_is_written_whole(tmp_path: Path) -> None:
-    path = tmp_path / "compare.png"
-    draw_figure(simulated_run(), path)
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert [item.name for item in tmp_path.iterdir()] == ["compare.png"]
 
 
 @pytest.mark.measured
