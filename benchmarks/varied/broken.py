@@ -4,9 +4,8 @@ import numpy as np
 
 from benchmarks.varied.drawn import Drawn, Ranges, Recipe, order_over
 from benchmarks.varied.faults import Fault
-from benchmarks.varied.forms import POINTS, Random, Table, course, grid, wave
-from benchmarks.varied.frictions import power
 from benchmarks.varied.plant import Plant, over
+from rig.simulation.forms import POINTS, Random, Table, course, grid, power, wave
 
 TURN = 2.0 * np.pi
 PLACES = {

@@ -8,7 +8,6 @@ import numpy as np
 from benchmarks.varied import equivalent, kernel, structure
 from benchmarks.varied.drawn import Drawn, Ranges, ranges_of
 from benchmarks.varied.faults import Fault
-from benchmarks.varied.forms import Random
 from benchmarks.varied.plant import draw_controller, draw_plant, over
 from benchmarks.varied.protocol import draw_protocol
 from benchmarks.varied.recipes import RECIPES, STRENGTHS, needs_rest
@@ -18,6 +17,7 @@ from benchmarks.varied.stage import EPOCH_NS, FIRST, Stage, Switched, UnstableEr
 from benchmarks.varied.strength import Fits, amplitude_for, fits_of, shown
 from benchmarks.varied.truth import HiddenTruth, Truth
 from estimation.campaign import with_campaign_time
+from rig.simulation.forms import Random
 
 TRIED_RUNS = 5
 DRAWS = 2

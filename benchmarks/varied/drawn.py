@@ -7,10 +7,10 @@ import numpy as np
 
 from benchmarks.varied import kernel
 from benchmarks.varied.faults import Fault
-from benchmarks.varied.forms import POINTS, Random, Table, grid
 from benchmarks.varied.hidden import Hidden
 from benchmarks.varied.plant import Plant
 from estimation.recording import FloatArray
+from rig.simulation.forms import POINTS, Random, Table, grid
 
 TICK_S = 1e-3
 MARGIN = 0.15

@@ -3,10 +3,10 @@
 import numpy as np
 
 from benchmarks.varied.drawn import Drawn, Ranges, Recipe, order_over
-from benchmarks.varied.forms import Random, Table, bend, grid, knee, rising, wave
-from benchmarks.varied.frictions import LOOPS, WORDS, bank, level, power
+from benchmarks.varied.frictions import LOOPS, WORDS, level
 from benchmarks.varied.hidden import Hidden
 from benchmarks.varied.plant import Plant, over
+from rig.simulation.forms import Random, Table, bank, bend, grid, knee, power, rising, wave
 
 TURN = 2.0 * np.pi
 BANK_OF_LAGS = 3

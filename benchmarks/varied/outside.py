@@ -3,10 +3,10 @@
 import numpy as np
 
 from benchmarks.varied.drawn import Drawn, Ranges, Recipe
-from benchmarks.varied.forms import Random, Table, falling, grid, smooth, spots
 from benchmarks.varied.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
 from benchmarks.varied.hidden import Hidden
 from benchmarks.varied.plant import Plant
+from rig.simulation.forms import Random, Table, falling, grid, smooth, spots
 
 UNKNOWN = "unknown"
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.varied.forms import Random
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
 
 USUAL_ACCELERATION_RAD_S2 = 12.0

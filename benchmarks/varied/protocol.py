@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.varied.forms import Random
 from benchmarks.varied.plant import Plant, over
 from estimation.recording import FloatArray
 from rig.protocols import trajectory
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
 
 LEAD_S = 0.8

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from benchmarks.varied.broken import BROKEN
 from benchmarks.varied.drawn import Recipe
 from benchmarks.varied.drives import DRIVES
-from benchmarks.varied.forms import Random
 from benchmarks.varied.frictions import FRICTIONS, WITHIN
 from benchmarks.varied.outside import OUTSIDE
+from rig.simulation.forms import Random
 
 KINDS = ("strong", "weak", "pair", "outside", "some_runs", "confounded", "clean")
 

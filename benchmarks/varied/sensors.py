@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
-from benchmarks.varied.forms import Random
 from benchmarks.varied.plant import Plant, over
 from estimation.recording import FloatArray
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
 
 READINGS = (
