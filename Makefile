@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo demo-real test test-unit test-long lint site bench measure mutants soak fuzz figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo demo-real test test-unit test-long lint site bench measure mutants mutants-core soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -85,6 +85,11 @@ FUZZ ?=
 fuzz: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.reliability.fuzz $(FUZZ)
 	$(BIN)/python -m benchmarks.reliability fuzz
+
+# searches on for what breaks a rule of the core's safety; HUNT="--hours 1000" for a night
+HUNT ?=
+hunt: $(VENV)/.developing firmware
+	$(BIN)/python -m benchmarks.hunt $(HUNT)
 
 # damages the drivers' wire formats in 200 places and runs their tests on each; a quarter of an hour.
 # MUTANTS="ati_net amt21" for some drivers

@@ -61,15 +61,14 @@ def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dic
     Raises:
         CalibrationError: Too few readings, or none of them differ although a real sensor has noise.
     """
-    if counts.size < MINIMUM_SAMPLES:
+    tared = {name: line for name, line in calibrations.channels.items() if line.tared}
+    if tared and counts.size < MINIMUM_SAMPLES:
         raise CalibrationError(
             f"{counts.size} readings are too few for a zero.",
             f"A zero is the mean of at least {MINIMUM_SAMPLES} readings at rest.",
         )
     zeros = {}
-    for name, line in calibrations.channels.items():
-        if not line.tared:
-            continue
+    for name, line in tared.items():
         readings = counts[line.counts].astype(np.float64)
         if np.ptp(readings) == 0:
             raise CalibrationError(

@@ -136,6 +136,61 @@ class Device(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What a drive measures of its motor.
+
+    Attributes:
+        position: Channel of its position.
+        step: Position of one count, in the channel's unit.
+        current: Channel of its current, A.
+    """
+
+    position: str
+    step: float
+    current: str
+
+
+@runtime_checkable
+class Drive(Device, Protocol):
+    """A device with a motor, commanded and read in one cycle.
+
+    A drive that is not read for a while takes its motor out of force by itself.
+    """
+
+    axis: Axis
+
+    @property
+    def now_s(self) -> float:
+        """The clock of its samples, s."""
+        ...
+
+    @property
+    def wait_s(self) -> float:
+        """Time until the next sample is due, 0 when it is."""
+        ...
+
+    def idle(self, wait_s: float) -> None:
+        """Let time pass without asking for a sample."""
+        ...
+
+    def arm(self) -> None:
+        """Put the motor in force, its command 0."""
+        ...
+
+    def command(self, ratio: float) -> None:
+        """Command a share of full scale, -1 to 1, from the next reading on."""
+        ...
+
+    def disarm(self) -> None:
+        """Take the motor out of force, and return when the drive has confirmed it.
+
+        Raises:
+            DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
+        """
+        ...
+
+
 def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> None:
     """End a device's stream where it can still be reached, and let go of its link in any case.
 

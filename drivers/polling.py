@@ -1,6 +1,13 @@
-"""The steady rate of a device that must be asked for every sample."""
+"""Devices that must be asked for every sample: their steady rate, and what their drivers share."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
 
 from drivers.counters import DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, stop_and_let_go
+from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkTimeoutError
 
 
 class PollSchedule:
@@ -42,3 +49,209 @@ class PollSchedule:
         self.lost += samples
         self._counters.gaps += 1
         self._counters.lost += samples
+
+
+class Clocked(Protocol):
+    """The way to a polled device: a transport or a CAN bus."""
+
+    @property
+    def now_s(self) -> float:
+        """Its clock, s."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class PolledDevice:
+    """A device that is asked for every sample, at a steady rate.
+
+    A driver gives `channels`, `identify`, `idle` and `sample`.
+
+    Args:
+        way: The way to the device, closed with it.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
+    """
+
+    def __init__(self, way: Clocked, rate_hz: float) -> None:
+        self._way = way
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._schedule = PollSchedule(rate_hz, self._counters)
+        self._schedule.restart(way.now_s)
+        self._identified = self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What a sample has."""
+        raise NotImplementedError
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the way."""
+        return self._counters.as_dict()
+
+    @property
+    def now_s(self) -> float:
+        """The clock of its samples, s."""
+        return self._way.now_s
+
+    @property
+    def wait_s(self) -> float:
+        """Time until the next sample is due, 0 when it is."""
+        return self._schedule.wait_s(self._way.now_s)
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there."""
+        raise NotImplementedError
+
+    def idle(self, wait_s: float) -> None:
+        """Let time pass; what comes unasked is late, and dropped."""
+        raise NotImplementedError
+
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Ask for a sample; return a value for each channel, and its `SampleFlag` bits.
+
+        Raises:
+            LinkTimeoutError: Nobody answers; the sample is lost.
+            FrameError: The answer is damaged; the sample is lost.
+        """
+        raise NotImplementedError
+
+    def start(self) -> None:
+        """Number the samples from 0, the first being due now."""
+        if not self._identified:
+            self.identify()
+        self.idle(0.0)
+        self._schedule.restart(self._way.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Ask when the next sample is due and return it, or nothing when it is not due in time.
+
+        Raises:
+            DriverError: The device reports a fault; or neither `identify` nor `start` was called.
+        """
+        if not self._identified:
+            raise DriverError("The device is not known.", fix="Call start first.")
+        self.idle(max(0.0, min(self.wait_s, timeout_s)))
+        now_s = self._way.now_s
+        if self._schedule.wait_s(now_s) > 0:
+            return self._batch(None)
+        self._schedule.skip_missed(now_s)
+        try:
+            sample = self.sample()
+        except (LinkTimeoutError, FrameError):
+            self._schedule.lose()
+            return self._batch(None)
+        self._schedule.asked += 1
+        self._counters.frames += 1
+        return self._batch(sample)
+
+    def stop(self) -> None:
+        """Do nothing: a device that is not asked is silent."""
+
+    def close(self) -> None:
+        """Stop, and let go of the way."""
+        if not self._closed:
+            self._closed = True
+            stop_and_let_go(self.stop, self._way.close)
+
+    def _batch(self, sample: tuple[Sequence[float], int] | None) -> Batch:
+        count = 0 if sample is None else 1
+        values, flags = sample or ([0.0] * len(self.channels), 0)
+        names = [channel.name for channel in self.channels]
+        return Batch(
+            {name: np.full(count, value) for name, value in zip(names, values, strict=True)},
+            np.full(count, self._way.now_s),
+            "host",
+            np.full(count, self._schedule.asked - 1, np.int64),
+            np.full(count, flags, np.uint8),
+            self._schedule.lost,
+        )
+
+
+class PolledDrive(PolledDevice):
+    """A motor controller that is commanded and asked in one cycle.
+
+    A driver gives `energise`, `release` and `zero` besides what every polled device gives.
+
+    Args:
+        way: The way to the drive, closed with it.
+        rate_hz: Polling rate.
+        title: The drive in messages, such as `moteus 1`.
+        own_watch: What a working drive does by itself when nobody asks, one sentence.
+    """
+
+    def __init__(self, way: Clocked, rate_hz: float, title: str, own_watch: str) -> None:
+        super().__init__(way, rate_hz)
+        self._title = title
+        self._own_watch = own_watch
+        self._armed = self._may_be_armed = False
+
+    def energise(self) -> None:
+        """Put the motor in force, without current."""
+        raise NotImplementedError
+
+    def release(self) -> None:
+        """Take the motor out of force, and return when the drive has confirmed it."""
+        raise NotImplementedError
+
+    def zero(self) -> None:
+        """Forget the command."""
+        raise NotImplementedError
+
+    def arm(self) -> None:
+        """Put the motor in force, its command 0, watched by the drive itself.
+
+        Raises:
+            DriverError: The drive has an error, or does not get into operation.
+        """
+        if not self._identified:
+            raise DriverError(f"The {self._title} is not started.", fix="Call start first.")
+        self.disarm()
+        self._may_be_armed = True
+        self.energise()
+        self._armed = True
+
+    def disarm(self) -> None:
+        """Take the motor out of force, and return when the drive has confirmed it.
+
+        Raises:
+            DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
+        """
+        self._armed = False
+        self.zero()
+        try:
+            self.release()
+        except DriverError as error:
+            raise DisarmUnconfirmedError(
+                f"The {self._title} has not confirmed that its motor is out of force.",
+                str(error),
+                f"Take the motor for live and cut its supply. {self._own_watch}",
+            ) from error
+        self._may_be_armed = False
+
+    def stop(self) -> None:
+        """Disarm where the drive may be armed; one that is not asked is silent.
+
+        Raises:
+            DisarmUnconfirmedError: The drive's state is unknown.
+        """
+        if self._may_be_armed:
+            self.disarm()
+
+    def require(self, value: float, limit: float, unit: str) -> None:
+        """Refuse a command that cannot be.
+
+        Raises:
+            DriverError: Not armed, not finite, or beyond the drive's limit.
+        """
+        if not self._armed:
+            raise DriverError(f"The {self._title} is not armed.", fix="Call arm first.")
+        if not abs(value) <= limit:  # what is not a number is beyond it
+            raise DriverError(
+                f"{value:g} {unit} cannot be commanded.",
+                f"The limit is {limit:g} {unit}.",
+                "Command less, or raise the limit if motor and rig allow.",
+            )

@@ -61,11 +61,20 @@ def unit_of(name: str) -> str:
     Raises:
         UnknownUnitError: The name has no known unit suffix.
     """
+    return UNIT_BY_SUFFIX[ending_of(name)]
+
+
+def ending_of(name: str) -> str:
+    """Return the suffix of a name that states its unit, such as `n_m`.
+
+    Raises:
+        UnknownUnitError: The name has no known unit suffix.
+    """
     parts = name.split("_")
     for start in range(1, len(parts)):
         suffix = "_".join(parts[start:])
         if suffix in UNIT_BY_SUFFIX:
-            return UNIT_BY_SUFFIX[suffix]
+            return suffix
     raise UnknownUnitError(
         f"The channel name {name!r} carries no unit.",
         "Every column is in SI units and its name ends in the unit.",

@@ -22,7 +22,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.channels import UNIT_BY_SUFFIX
+from estimation.channels import ending_of
 from estimation.filters import (
     PAPER,
     CausalFilter,
@@ -33,8 +33,8 @@ from estimation.filters import (
 )
 from estimation.kalman import tracker
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPINDLE_SPEED, Samples, closing, in_motion
-from estimation.signals import Combination, Signals, reference
+from estimation.rest import SPINDLE_SPEED, closing, in_motion
+from estimation.signals import Combination, Samples, Signals, reference
 from estimation.window import ALIKE, lowest, since_lowest
 
 CAMPAIGN_TIME = "campaign_time_s"
@@ -69,7 +69,7 @@ def measured_channels(names: Iterable[str], signals: Signals | None = None) -> t
     needed: set[str] = set()
     known = signals or reference()
     for name in names:
-        if (combination := known.combination(name)) is not None:
+        if (combination := known.combination(_source(name, known)[0])) is not None:
             needed |= {share.channel for share in combination.shares}
             if combination.direction is not None:
                 needed.add(origin_of(combination.direction.speed)[0])
@@ -104,7 +104,7 @@ def ago_of(channel: str, ms: int) -> str:
 
 
 def _parted(channel: str) -> tuple[str, str]:
-    suffix = next(s for s in UNIT_BY_SUFFIX if channel.endswith(f"_{s}"))
+    suffix = ending_of(channel)
     return channel.removesuffix(f"_{suffix}"), suffix
 
 
@@ -131,6 +131,11 @@ def origin_of(name: str) -> tuple[str, int]:
     return name, 0
 
 
+def _source(name: str, signals: Signals) -> tuple[str, int]:
+    """Return the channel or combination a channel is the derivative of, and how many times."""
+    return origin_of(name) if signals.combination(name) is None else (name, 0)
+
+
 def _derive(
     filtered: Mapping[str, FloatArray],
     names: Iterable[str],
@@ -153,19 +158,21 @@ def _derive(
 
     @cache
     def differentiated(name: str) -> FloatArray:
-        source, times = origin_of(name)
+        source, times = _source(name, signals)
         if times and tracked and source in tracked:
             return tracked[source][:, times]
-        values = filtered[source]
+        combination = signals.combination(source)
+        if combination is None:
+            values = filtered[source]
+        else:
+            values = _combined(combination, filtered, differentiated)
         for _ in range(times):
             values = derivative(values)
         return values
 
     channels: dict[str, FloatArray] = {}
     for name in names:
-        if (combination := signals.combination(name)) is not None:
-            channels[name] = _combined(combination, filtered, differentiated)
-        elif name.endswith(TRAVEL):
+        if name.endswith(TRAVEL):
             channels[name] = since_lowest(filtered[_turning(name)], window)
         elif name.endswith(TURNED):
             angle = filtered[_turning(name)]
@@ -257,7 +264,9 @@ def zero_phase_channels(
     period_s = 1.0 / recording.sample_rate_hz
     ticks = recording.ticks
     whole = {
-        name: np.asarray(fill_gaps(ticks, values[:, None])[:, 0])
+        name: _on_time(
+            np.asarray(fill_gaps(ticks, values[:, None])[:, 0]), name, recording, signals
+        )
         for name, values in filtered.columns.items()
     }
     derived = _derive(
@@ -271,6 +280,16 @@ def zero_phase_channels(
     if CAMPAIGN_TIME in names:
         columns[CAMPAIGN_TIME] = recording[CAMPAIGN_TIME]
     return replace(filtered, columns=columns)
+
+
+def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signals) -> FloatArray:
+    """Return a filtered channel as its sensor would have read it without delay."""
+    known = signals.readings.get(name)
+    late = 0.0 if known is None else known.age_s(recording.sample_rate_hz)
+    if late == 0.0:
+        return values
+    at = np.arange(len(values))
+    return np.asarray(np.interp(at + late * recording.sample_rate_hz, at, values))
 
 
 def looks_back(names: Iterable[str]) -> bool:

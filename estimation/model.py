@@ -18,12 +18,9 @@ from estimation.effects import Effect, Parameter
 from estimation.errors import EstimationError, nearest
 from estimation.filters import PAPER, LowPass
 from estimation.recording import FloatArray, Recording
-from estimation.rest import SPINDLE_SPEED, Samples
-from estimation.signals import Signals, reference
+from estimation.rest import SPINDLE_SPEED
+from estimation.signals import Samples, Signals, reference
 from estimation.units import evaluate
-
-BALANCES = ("motor", "gearbox", "cable", "stretch", "grasp", "pitch", "yaw", "jaw_1", "jaw_2")
-"""Balance ids of the grasper; besides these, `joint.N` of an arm and `calibration.NAME`."""
 
 
 class ModelError(EstimationError):
@@ -159,8 +156,8 @@ class Model:
 
     Attributes:
         name: Short name.
-        balance: Id of the equation: one of `BALANCES`, `joint.N`, `calibration.NAME`, or one of a
-            machine of one's own.
+        balance: Id of the equation: as the machine's file calls it, `joint.N` of an arm, or
+            `calibration.KIND`.
         target: Channel that is estimated.
         terms: The effects.
         description: Description and origin.

@@ -11,8 +11,8 @@ sign = -1
 channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
-A model of another machine than the reference rig states that machine's derived channels and its
-speeds of standstill under `[[signals.derived]]` and `[signals.rest]`.
+A model of another machine than the reference rig states that machine's derived channels, its speeds
+of standstill and its sensors under `[[signals.derived]]`, `[signals.rest]` and `[signals.sensors]`.
 
 A file of several equations contains each under `[[models]]`, with `[models.processing]`,
 `[[models.effects]]`, `[models.signals]` and `[models.fit]`, and has the schema `rig.models/1`.
@@ -21,21 +21,28 @@ A file of several equations contains each under `[[models]]`, with `[models.proc
 import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
 from typing import cast, get_args
 
 from estimation.effects import effect
-from estimation.errors import EstimationError, nearest
+from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
-from estimation.model import BALANCES, Estimate, Evidence, Model, ModelError, Term
+from estimation.model import Estimate, Evidence, Model, ModelError, Term
 from estimation.model_table import ModelFileError, NoModelError
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared
-from estimation.rest import Samples
-from estimation.signals import Signals, combination_lines, read_combinations, reference
+from estimation.signals import (
+    Reading,
+    Samples,
+    Signals,
+    combination_lines,
+    read_combinations,
+    reference,
+)
 from estimation.toml_table import Table
 from estimation.toml_table import value_text as _value
 
@@ -142,10 +149,9 @@ def _model(top: Table) -> Model:
     processing = top.table("processing")
     evidence = top.table("fit")
     target = top.take("target", str)
-    signals = _signals(top)
     model = Model(
         name=top.take("name", str),
-        balance=_balance(top, signals),
+        balance=top.take("balance", str),
         target=target,
         description=top.take("description", str, ""),
         terms=tuple(_term(entry, target) for entry in top.tables("effects")),
@@ -154,9 +160,11 @@ def _model(top: Table) -> Model:
             processing.take("order", int, LowPass().order),
         ),
         run_offsets=processing.take("run_offsets", bool, True),
-        counted=_counted(processing),
+        counted=cast(
+            Samples | None, processing.choice("samples", ("", *get_args(Samples))) or None
+        ),
         evidence=_evidence(evidence) if evidence.content else None,
-        signals=signals,
+        signals=_signals(top),
     )
     for table in (top, processing, evidence):
         table.finish()
@@ -164,29 +172,20 @@ def _model(top: Table) -> Model:
 
 
 def _signals(top: Table) -> Signals:
-    """Return a model's own derived channels and speeds of standstill, or the reference rig's."""
+    """Return a model's own signals, or the reference rig's."""
     if "signals" not in top.content:
         return reference()
     table = top.table("signals")
     rest = table.table("rest")
     slowest = {speed: rest.number(speed) for speed in rest.content}
-    found = Signals(read_combinations(table.tables("derived", [])), slowest)
+    sensors, readings = table.table("sensors"), {}
+    for channel in sensors.content:
+        one = sensors.table(channel)
+        readings[channel] = Reading(*(one.optional(key.name) for key in fields(Reading)))
+        one.finish()
+    found = Signals(read_combinations(table.tables("derived", [])), slowest, readings)
     table.finish()
     return found
-
-
-def _balance(top: Table, signals: Signals) -> str:
-    """Return the name of a model's equation; of the reference rig it is one of those known."""
-    name: str = top.take("balance", str)
-    kind = name.partition(".")[0]
-    if signals == reference() and kind not in (*BALANCES, "joint", "calibration"):
-        raise ModelFileError(
-            f"{top.where}: unknown equation {name!r}.",
-            f"Known are {', '.join(BALANCES)}, joint.N and calibration.NAME; a machine file has its"
-            " own.",
-            nearest(name, BALANCES),
-        )
-    return name
 
 
 def write(model: Model, path: Path) -> None:
@@ -234,6 +233,10 @@ def _lines(model: Model, within: str = "") -> list[str]:
     if model.signals != reference():
         lines += ["", f"[{within}signals.rest]"]
         lines += [f"{speed} = {_value(slow)}" for speed, slow in model.signals.rest.items()]
+        lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
+        for channel, stated in model.signals.readings.items():
+            about = {key: value for key, value in asdict(stated).items() if value is not None}
+            lines.append(f"{channel} = {_value(about)}")
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
     for term in model.terms:
         lines += [
@@ -305,20 +308,6 @@ def _two(table: Table, key: str) -> tuple[float, float]:
     if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
         raise ModelFileError(f"{table.where}: {key} = {values!r} is not two numbers.")
     return float(values[0]), float(values[1])
-
-
-def _counted(processing: Table) -> Samples | None:
-    """Return which samples count, or None where the effects decide."""
-    if "samples" not in processing.content:
-        return None
-    name = processing.take("samples", str)
-    for known in get_args(Samples):
-        if name == known:
-            return cast(Samples, known)
-    raise ModelFileError(
-        f"{processing.where}: samples = {name!r} is none of {', '.join(get_args(Samples))}.",
-        fix=nearest(name, get_args(Samples)),
-    )
 
 
 def _evidence(table: Table) -> Evidence:

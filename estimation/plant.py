@@ -11,10 +11,10 @@ from typing import Literal
 
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.errors import EstimationError, nearest
-from estimation.signals import Combination
+from estimation.signals import Combination, Samples
 from estimation.toml_table import Place
 
-Reads = Literal["position", "speed", "effort", "temperature", "reference", "other"]
+Reads = Literal["other", "position", "speed", "effort", "temperature", "reference"]
 
 POSITION = {"rad": "_angle_rad", "m": "_position_m"}
 SPEED = {"rad": "_velocity_rad_s", "m": "_velocity_m_s"}
@@ -102,7 +102,7 @@ class Sensor:
         name: Channel.
         axis: Axis it reads; empty where it is of none.
         reads: What it reads. An effort is what the axis passes on.
-        counts: Counts a radian or a metre; None where it is not known.
+        counts: Counts in one unit of the channel, such as a radian; None where it is not known.
         rate_hz: Samples a second; None where it is not known.
         noise: Standard deviation in the unit of the channel; None where it is not known.
         delay_s: Age of a value when it is recorded; None where it is not known.
@@ -117,6 +117,11 @@ class Sensor:
     noise: float | None = None
     delay_s: float | None = None
     description: str = ""
+
+    @property
+    def step(self) -> float | None:
+        """One count, in the unit of the channel."""
+        return None if self.counts is None else 1.0 / self.counts
 
 
 @dataclass(frozen=True)
@@ -158,12 +163,14 @@ class Written:
         target: Channel on the left-hand side.
         parts: Effects on the right-hand side.
         description: In words.
+        samples: Which samples count; None for what suits the effects.
     """
 
     name: str
     target: str
     parts: tuple[Part, ...]
     description: str = ""
+    samples: Samples | None = None
 
 
 @dataclass(frozen=True)
@@ -299,6 +306,12 @@ def _named_axes(plant: Plant) -> Iterable[tuple[Place, str]]:
 
 
 def _check_sensor(plant: Plant, sensor: Sensor, place: Place) -> None:
+    for key in ("counts", "rate_hz", "noise", "delay_s"):
+        value = getattr(sensor, key)
+        if value is not None and (value < 0.0 or (value == 0.0 and key in ("counts", "rate_hz"))):
+            raise PlantError(
+                (*place[:2], key), f"The sensor {sensor.name!r} has {key} = {value:g}."
+            )
     if sensor.reads not in ("position", "speed", "effort"):
         return
     axis = plant.axis(sensor.axis)
@@ -314,10 +327,6 @@ def _check_sensor(plant: Plant, sensor: Sensor, place: Place) -> None:
             f"The channel {sensor.name!r} cannot be the {sensor.reads} of the axis {axis.name!r}.",
             f"The axis is in {axis.unit}: the name of its {sensor.reads} {wanted}.",
             "Rename the channel, or change the axis, its unit or `reads`.",
-        )
-    if sensor.counts is not None and sensor.counts <= 0.0:
-        raise PlantError(
-            (*place[:2], "counts"), f"The sensor {sensor.name!r} has {sensor.counts:g} counts."
         )
 
 

@@ -8,17 +8,23 @@ from pathlib import Path
 import numpy as np
 
 from estimation.campaign import Campaign
+from estimation.channels import unit_of
 from estimation.derived import measured_channels
 from estimation.errors import EstimationError, nearest
 from estimation.fitting import fit
 from estimation.model import Model, balance_channels, settled
+from estimation.noise import noise_width
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, unused
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.signals import Reading
 
 FOLLOWS = 0.02
 """Share by which two readings of one travel may differ."""
+
+ALIKE = 3.0
+"""Factor between a noise that is stated and that of the recordings."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +187,19 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
                     f" changes {slope:.4g} times as much. Correct its unit, gain or sign, or its"
                     f" axis, in {file}."
                 )
+    for sensor in plant.sensors:
+        shown = [
+            noise_width(r[sensor.name], Reading(step=sensor.step))
+            for r in recordings
+            if sensor.name in r and (sensor.rate_hz or r.sample_rate_hz) > 0.5 * r.sample_rate_hz
+        ]
+        stated = sensor.noise
+        if stated and shown and not 1.0 / ALIKE < float(np.median(shown)) / stated < ALIKE:
+            yield (
+                f"{file} states a noise of {stated:.3g} {unit_of(sensor.name)} for {sensor.name},"
+                f" but the recordings show {float(np.median(shown)):.3g}. Correct it, or delete"
+                " it: the noise is then taken from the recordings."
+            )
     for joint in plant.transmissions:
         driving, driven = plant.position(joint.input), plant.position(joint.output)
         if joint.ratio is None or driving is None or driven is None:

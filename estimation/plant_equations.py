@@ -16,7 +16,6 @@ turns fastest.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import pi
 
 from estimation.channels import unit_of
 from estimation.plant import (
@@ -30,7 +29,7 @@ from estimation.plant import (
     Transmission,
     Written,
 )
-from estimation.signals import Combination, Share, Signals
+from estimation.signals import Combination, Reading, Share, Signals
 
 OFFSET = Part("sensor.offset")
 RATE = {"N m": "_rate_n_m_s"}
@@ -123,11 +122,11 @@ def signals(plant: Plant) -> Signals:
         sensor, speed = plant.position(axis.name), plant.moved(axis.name, SPEED)
         if sensor is None or speed not in speeds:
             continue
-        count = 0.0
-        if sensor.counts is not None:
-            count = (2.0 * pi if axis.unit == "rad" else 1.0) / sensor.counts
+        count = sensor.step or 0.0
         rest[speed] = count * plant.cutoff_hz if axis.rest_speed is None else axis.rest_speed
-    return Signals((*bends, *plant.derived), rest)
+    stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
+    readings = {name: one for name, one in stated.items() if one != Reading()}
+    return Signals((*bends, *plant.derived), rest, readings)
 
 
 def chains(plant: Plant) -> Iterator[Chain]:

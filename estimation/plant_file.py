@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 from estimation.channels import unit_of
-from estimation.errors import EstimationError, UnknownNameError, nearest
+from estimation.errors import EstimationError, UnknownNameError
 from estimation.files import write_text_atomic
 from estimation.plant import (
     Actuator,
@@ -46,7 +46,7 @@ from estimation.plant import (
     Written,
 )
 from estimation.plant_equations import equations
-from estimation.signals import combination_lines, read_combinations
+from estimation.signals import Samples, combination_lines, read_combinations
 from estimation.toml_table import Lines, Table, value_text
 
 SCHEMA = "rig.machine/1"
@@ -178,16 +178,10 @@ def _actuator(table: Table) -> Actuator:
 
 
 def _sensor(table: Table) -> Sensor:
-    reads = table.take("reads", str, "other")
-    if reads not in get_args(Reads):
-        raise PlantFileError(
-            f"{table.at('reads')}: reads = {reads!r} is none of {', '.join(get_args(Reads))}.",
-            fix=nearest(reads, get_args(Reads)),
-        )
     made = Sensor(
         name=table.take("name", str),
         axis=table.take("axis", str, ""),
-        reads=cast(Reads, reads),
+        reads=cast(Reads, table.choice("reads", get_args(Reads))),
         counts=table.optional("counts"),
         rate_hz=table.optional("rate_hz"),
         noise=table.optional("noise"),
@@ -237,6 +231,7 @@ def _equation(table: Table) -> Written:
         table.take("target", str),
         tuple(parts),
         table.take("description", str, ""),
+        cast(Samples | None, table.choice("samples", ("", *get_args(Samples))) or None),
     )
     table.finish()
     return made
@@ -272,7 +267,8 @@ def to_toml(plant: Plant) -> str:
             lines += ["", f"[[{header}]]", *_entries(asdict(part))]
     lines += combination_lines(plant.derived, "derived")
     for equation in plant.equations:
-        about = {key: getattr(equation, key) for key in ("name", "target", "description")}
+        keys = ("name", "target", "samples", "description")
+        about = {key: getattr(equation, key) for key in keys}
         lines += ["", "[[equation]]", *_entries(about)]
         for part in equation.parts:
             lines += ["", "[[equation.effects]]", f"id = {value_text(part.id)}"]

@@ -47,6 +47,7 @@ def declared(plant: Plant) -> list[Model]:
                     description=equation.description or in_words(equation, terms),
                     low_pass=LowPass(plant.cutoff_hz, plant.order),
                     run_offsets=plant.run_offsets,
+                    counted=equation.samples,
                     signals=known,
                 )
             )

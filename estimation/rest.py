@@ -6,8 +6,6 @@ error, and pulled the torque constant 15 % from its true value. They are left ou
 residuals.
 """
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -18,9 +16,6 @@ SPEED = "motor_velocity_rad_s"
 """The cleanest speed there is."""
 
 SPINDLE_SPEED = "spindle_velocity_rad_s"
-
-Samples = Literal["all", "motion", "closing"]
-"""Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
 
 CLOSING_RAD_S, TRIM_S = 0.25, 1.0
 """Filtered spindle speed from which a sample counts as closing, and the part omitted at the start

@@ -3,9 +3,12 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from estimation.toml_table import Table, value_text
+
+Samples = Literal["all", "motion", "closing"]
+"""Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,30 @@ class Combination:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """What is stated of a sensor; None where nothing is.
+
+    Attributes:
+        noise: Standard deviation of its white noise, in the unit of the channel.
+        step: One count, in the unit of the channel.
+        rate_hz: New values a second.
+        delay_s: Age of a value when it is recorded.
+    """
+
+    noise: float | None = None
+    step: float | None = None
+    rate_hz: float | None = None
+    delay_s: float | None = None
+
+    def age_s(self, sample_rate_hz: float) -> float:
+        """Return the mean age of a recorded value, s; a slower sensor's is held until the next."""
+        held_s = 0.0 if self.rate_hz is None else 0.5 / self.rate_hz - 0.5 / sample_rate_hz
+        return (self.delay_s or 0.0) + max(held_s, 0.0)
+
+
+@dataclass(frozen=True)
 class Signals:
-    """The derived channels of a machine, and when its parts are at rest.
+    """The derived channels of a machine, when its parts are at rest, and its sensors.
 
     Attributes:
         combinations: Derived channels.
@@ -73,10 +98,12 @@ class Signals:
             spindle stands still: an equation is static when the speed of its own friction is below
             the threshold. Slower than a share of the usual speed is at rest too, see
             `estimation.rest`, so 0 is a threshold that follows the data.
+        readings: What is stated of the sensors of some channels.
     """
 
     combinations: tuple[Combination, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
+    readings: Mapping[str, Reading] = field(default_factory=dict)
 
     def combination(self, name: str) -> Combination | None:
         """Return the combination of that name, or None where there is none."""

@@ -4,7 +4,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -108,6 +108,17 @@ class Table:
     def optional(self, key: str) -> float | None:
         """Return a finite number, or None where the key is not there."""
         return self.number(key) if key in self.content else None
+
+    def choice(self, key: str, allowed: Sequence[str]) -> str:
+        """Return one of a few words, the first of them where the key is not there."""
+        word: str = self.take(key, str, allowed[0])
+        if word not in allowed:
+            known = [one for one in allowed if one]
+            raise self.error(
+                f"{self.at(key)}: {key} = {word!r} is none of {', '.join(known)}.",
+                fix=nearest(word, known),
+            )
+        return word
 
     def table(self, key: str) -> "Table":
         """Return a table within this one; an empty one where there is none."""

@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.asking import commit
-from benchmarks.varied import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.equations import lay_out, on_one_clock
@@ -28,6 +27,7 @@ from estimation.causes.search import search
 from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model
+from rig.simulation.varied import CALIBRATE, draw
 
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 GEAR_RATIO = 35.0

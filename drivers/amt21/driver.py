@@ -1,17 +1,16 @@
 """The driver of an AMT21: it is polled for every sample, at a steady rate."""
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from drivers.amt21 import protocol
 from drivers.amt21.turning import TOP_SPEED_RAD_S, RateGate, turns_at
-from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity
+from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
-from drivers.polling import PollSchedule
+from drivers.polling import PolledDevice
 from drivers.registry import BaudOption, Driver, RateOption
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -19,7 +18,7 @@ from drivers.transport.transport import Transport
 TRIES = 3
 
 
-class Amt21:
+class Amt21(PolledDevice):
     """One encoder on an RS-485 line. Nothing else on the line may be asked at the same time.
 
     Args:
@@ -42,14 +41,13 @@ class Amt21:
         reply_timeout_s: float = 0.01,
         top_speed_rad_s: float = TOP_SPEED_RAD_S,
     ) -> None:
+        super().__init__(transport, rate_hz)
         self._transport = transport
         self._requests = [protocol.request(address, turns) for turns in (False, True)]
         self._address = address
         self._multi_turn = multi_turn
         self._reply_timeout_s = reply_timeout_s
-        self._counters = DeviceCounters()
-        self._schedule = PollSchedule(rate_hz, self._counters)
-        self._schedule.restart(transport.now_s)
+        self._identified = True  # it has nothing to be identified by but an answer
         self._gate = RateGate(top_speed_rad_s, multi_turn)
         angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
         half = protocol.FULL_TURN // 2
@@ -60,11 +58,6 @@ class Amt21:
     def channels(self) -> tuple[Channel, ...]:
         """The angle, and the turns of a multi-turn encoder."""
         return self._channels
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the line."""
-        return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
         """Request one position: the encoder has no other identification.
@@ -82,33 +75,26 @@ class Amt21:
 
     def start(self) -> None:
         """Number the samples from 0, the first being due now."""
-        self._discard(self._transport.read(0.0))
-        self._schedule.restart(self._transport.now_s)
+        super().start()
         self._gate.restart()
 
-    def read(self, timeout_s: float) -> Batch:
-        """Ask when the next sample is due and return it, or nothing when it is not due in time."""
-        wait_s = self._schedule.wait_s(self._transport.now_s)
-        self._discard(self._transport.read(max(0.0, min(wait_s, timeout_s))))
-        now_s = self._transport.now_s
-        if self._schedule.wait_s(now_s) > 0:
-            return self._batch(None)
-        self._schedule.skip_missed(now_s)
+    def idle(self, wait_s: float) -> None:
+        """Let time pass; what comes unasked is late, and dropped."""
+        self._discard(self._transport.read(wait_s))
+
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Ask for the position.
+
+        Raises:
+            LinkTimeoutError: There is no position that the shaft can have.
+        """
         position = self._plausible()
         if position is None:
-            self._schedule.lose()
-            return self._batch(None)
+            raise LinkTimeoutError("The AMT21 gives no good position.")
         self._gate.accept(position, self._transport.now_s)
-        self._schedule.asked += 1
-        self._counters.frames += 1
-        return self._batch(position)
-
-    def stop(self) -> None:
-        """Do nothing: an encoder that is not asked is silent."""
-
-    def close(self) -> None:
-        """Let go of the line."""
-        self._transport.close()
+        turns, angle = divmod(position, protocol.FULL_TURN)
+        values = (angle * protocol.RAD_PER_COUNT, float(protocol.signed(turns)))
+        return values[: len(self._channels)], 0
 
     def _plausible(self) -> int | None:
         """Return a position that the shaft can have, None without a good one.
@@ -143,21 +129,6 @@ class Amt21:
             self._counters.crc_errors += 1
             return None
         return turns * protocol.FULL_TURN + angle
-
-    def _batch(self, position: int | None) -> Batch:
-        count = 0 if position is None else 1
-        turns, angle = divmod(position or 0, protocol.FULL_TURN)
-        values = {"angle_rad": angle * protocol.RAD_PER_COUNT}
-        if self._multi_turn:
-            values["turns"] = float(protocol.signed(turns))
-        return Batch(
-            {name: np.full(count, value) for name, value in values.items()},
-            np.full(count, self._transport.now_s),
-            "host",
-            np.full(count, self._schedule.asked - 1, np.int64),
-            np.zeros(count, np.uint8),
-            self._schedule.lost,
-        )
 
     def _ask(self, turns: bool) -> int | None:
         """Return the answer's value, None when no good one comes in `TRIES` questions."""

@@ -1,6 +1,6 @@
 """The driver of a NETCANOEM: it is polled for every sample, at a steady rate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,10 +10,9 @@ from pydantic import Field
 from drivers.ati_can import protocol
 from drivers.ati_can.wrench import wrench_of
 from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
-from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.device import Channel, DeviceIdentity, SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
-from drivers.polling import PollSchedule
+from drivers.polling import PolledDevice
 from drivers.registry import CanUse, Driver, RateOption
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
@@ -27,7 +26,7 @@ AFTER_RESTART = 0
 """The calibration a sensor uses after a restart."""
 
 
-class AtiCan:
+class AtiCan(PolledDevice):
     """One force/torque sensor on a CAN bus.
 
     Args:
@@ -52,12 +51,10 @@ class AtiCan:
             raise ValueError(f"a calibration has a number 0..15, not {calibration}")
         if not rate_hz > 0:
             raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
+        super().__init__(bus, rate_hz)
         self._bus = bus
         self._base = base
         self._calibration = calibration
-        self._rate_hz = rate_hz
-        self._counters = DeviceCounters()
-        self._schedule = PollSchedule(rate_hz, self._counters)
         self._matrix: NDArray[np.float64] | None = None
         self._unit_per_count = np.ones(6)
         self._check_at_s = -np.inf
@@ -86,7 +83,7 @@ class AtiCan:
         """Counters of this sensor's frames, and of the bus."""
         bus = self._bus.counters
         trouble = {"error_frames": bus.error_frames, "overruns": bus.overruns}
-        return self._counters.as_dict() | trouble
+        return super().counters | trouble
 
     def identify(self) -> DeviceIdentity:
         """Ask for serial number and firmware, and read the calibration.
@@ -104,46 +101,37 @@ class AtiCan:
             for axis in range(6)
         ]
         self._matrix = np.array(rows)
+        self._identified = True
         major, minor, build = version
         return DeviceIdentity("ATI NETCANOEM", serial, f"{major}.{minor}.{build}")
 
     def start(self) -> None:
         """Number the samples from 0, the first being due now."""
-        if self._matrix is None:
-            self.identify()
-        elif self._calibration != AFTER_RESTART:
+        if self._matrix is not None and self._calibration != AFTER_RESTART:
             self._choose_calibration()
+        super().start()
         self._check_at_s = self._bus.now_s + CHECK_S
-        self._schedule.restart(self._bus.now_s)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Ask when the next sample is due and return it, or nothing when it is not due in time.
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Ask for the wrench.
 
         A saturated gauge makes the whole wrench wrong: it is flagged `SATURATED` and `SUSPECT`.
 
         Raises:
+            LinkTimeoutError: Nobody answers.
             DriverError: The sensor has restarted and does not use the calibration that was chosen;
-                every reading says so until `start`. Or neither `identify` nor `start` was called.
+                every reading says so until `start`.
         """
-        if self._matrix is None:
-            raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
-        self._idle(min(self._schedule.wait_s(self._bus.now_s), timeout_s))
-        now_s = self._bus.now_s
-        if self._schedule.wait_s(now_s) > 0:
-            return self._batch(np.empty((0, 6)), 0)
-        self._schedule.skip_missed(now_s)
+        assert self._matrix is not None  # noqa: S101 - read by `identify`
         try:
-            if self._calibration != AFTER_RESTART and now_s >= self._check_at_s:
+            if self._calibration != AFTER_RESTART and self._bus.now_s >= self._check_at_s:
                 self._require_calibration(self._matrix)
             gauges = self._read_gauges()
         except LinkTimeoutError:
-            self._schedule.lose()
             self._check_at_s = -np.inf  # it may be silent because it restarts
-            return self._batch(np.empty((0, 6)), 0)
-        self._schedule.asked += 1
-        self._counters.frames += 1
+            raise
         wrench = wrench_of(gauges, self.bias, self._matrix, self._unit_per_count)
-        return self._batch(wrench[np.newaxis], self._flag(gauges))
+        return wrench.tolist(), self._flag(gauges)
 
     def set_bias(self, readings: int = 16) -> None:
         """Take the present load for zero: the mean of some readings, kept in this program.
@@ -164,13 +152,6 @@ class AtiCan:
                 )
             taken.append(gauges)
         self.bias = np.mean(taken, axis=0, dtype=np.float64)
-
-    def stop(self) -> None:
-        """Do nothing: a sensor that is not asked is silent."""
-
-    def close(self) -> None:
-        """Let go of the bus."""
-        self._bus.close()
 
     def _choose_calibration(self) -> None:
         """Let the sensor use the calibration; it forgets it at a restart.
@@ -233,18 +214,7 @@ class AtiCan:
             return int(SampleFlag.SUSPECT)
         return 0
 
-    def _batch(self, wrenches: NDArray[np.float64], flag: int) -> Batch:
-        count = len(wrenches)
-        return Batch(
-            {name: wrenches[:, axis] for axis, name in enumerate(protocol.AXES)},
-            np.full(count, self._bus.now_s),
-            "host",
-            np.full(count, self._schedule.asked - 1, np.int64),
-            np.full(count, flag, np.uint8),
-            self._schedule.lost,
-        )
-
-    def _idle(self, wait_s: float) -> None:
+    def idle(self, wait_s: float) -> None:
         """Let time pass; a frame of this sensor that comes unasked is late, and dropped."""
         end_s = self._bus.now_s + wait_s
         while True:
@@ -264,7 +234,7 @@ class AtiCan:
         for attempt in range(TRIES):
             if attempt:
                 self._counters.retries += 1
-            self._idle(0.0)
+            self.idle(0.0)
             self._bus.send(question)
             answer = self._receive(operation, frames)
             if answer is not None:

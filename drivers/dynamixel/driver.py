@@ -5,24 +5,16 @@ when they stop, the device takes its motor out of force by itself.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
-from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
+from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
 from drivers.dynamixel import protocol
 from drivers.dynamixel.line import InstructionRefusedError, Line
-from drivers.dynamixel.protocol import Present
-from drivers.errors import (
-    DisarmUnconfirmedError,
-    DriverError,
-    FrameError,
-    LinkError,
-    LinkTimeoutError,
-)
-from drivers.polling import PollSchedule
+from drivers.errors import DriverError, LinkError
+from drivers.polling import PolledDrive
 from drivers.registry import BaudOption, Driver, RateOption
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -30,7 +22,7 @@ from drivers.transport.transport import Transport
 LONGEST_WATCHDOG_MS = 127 * protocol.WATCHDOG_UNIT_MS
 
 
-class Dynamixel:
+class Dynamixel(PolledDrive):
     """One drive on a serial line. Nothing else on the line may be asked at the same time.
 
     Args:
@@ -42,6 +34,7 @@ class Dynamixel:
     """
 
     name = "dynamixel"
+    axis = Axis("angle_rad", 1e-4, "current_a")
 
     def __init__(
         self,
@@ -55,17 +48,20 @@ class Dynamixel:
             raise ValueError(f"an identifier lies in 0..{protocol.HIGHEST_ID}, not {device_id}")
         if not protocol.WATCHDOG_UNIT_MS <= watchdog_ms <= LONGEST_WATCHDOG_MS:
             raise ValueError(f"a watchdog has 20 to {LONGEST_WATCHDOG_MS} ms, not {watchdog_ms}")
+        watchdog = watchdog_ms // protocol.WATCHDOG_UNIT_MS
+        super().__init__(
+            transport,
+            rate_hz,
+            f"Dynamixel {device_id} at {transport.url}",
+            f"A working drive stops by itself {watchdog * protocol.WATCHDOG_UNIT_MS} ms after the"
+            " last question.",
+        )
         self._transport = transport
         self._id = device_id
-        self._rate_hz = rate_hz
-        self._watchdog = watchdog_ms // protocol.WATCHDOG_UNIT_MS
+        self._watchdog = watchdog
         self._unit_a = current_unit_a
-        self._counters = DeviceCounters()
         self._line = Line(transport, device_id, self._counters)
-        self._schedule = PollSchedule(rate_hz, self._counters)
-        self._schedule.restart(transport.now_s)
         self._limit_a = math.inf
-        self._identified = self._armed = self._may_be_armed = self._closed = False
         self._goal = 0
 
     @property
@@ -82,11 +78,6 @@ class Dynamixel:
             Channel("supply_v", "V", rate, 0.0, 6553.5, "supply"),
             Channel("temperature_k", "K", rate, _ZERO_K, _ZERO_K + 255.0, "inside the drive"),
         )
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """What happened on the line."""
-        return self._counters.as_dict()
 
     @property
     def current_limit_a(self) -> float:
@@ -109,31 +100,30 @@ class Dynamixel:
         self._identified = True
         return DeviceIdentity(f"Dynamixel {name}", "", str(firmware))
 
-    def start(self) -> None:
-        """Number the samples from 0, the first being due now."""
-        if not self._identified:
-            self.identify()
-        self._line.discard()
-        self._schedule.restart(self._transport.now_s)
-
-    def arm(self) -> None:
+    def energise(self) -> None:
         """Put the motor in force in current control, its goal 0, watched by the drive.
 
         Raises:
             DriverError: The drive has a hardware error, or does not hold what was written.
         """
-        if not self._identified:
-            raise DriverError("The drive is not started.", fix="Call start first.")
-        self.disarm()
         self._require_no_error()
         self._write_and_check(protocol.BUS_WATCHDOG, 0)  # what it tripped over is over
         self._write_and_check(protocol.OPERATING_MODE, protocol.CURRENT_MODE)
-        self._goal = 0
         self._write_and_check(protocol.GOAL_CURRENT, 0)
-        self._may_be_armed = True
         self._write_and_check(protocol.TORQUE_ENABLE, 1)
         self._write_and_check(protocol.BUS_WATCHDOG, self._watchdog)
-        self._armed = True
+
+    def release(self) -> None:
+        """Take the motor out of force, and read it back."""
+        self._write_and_check(protocol.TORQUE_ENABLE, 0)
+
+    def zero(self) -> None:
+        """Set the goal to 0."""
+        self._goal = 0
+
+    def command(self, ratio: float) -> None:
+        """Command a share of the drive's current limit, as `set_current`."""
+        self.set_current(ratio * self._limit_a)
 
     def set_current(self, current_a: float) -> float:
         """Command a motor current, sent before the next reading and every one from then on.
@@ -144,98 +134,45 @@ class Dynamixel:
         Raises:
             DriverError: Not armed, not finite, or beyond the drive's current limit.
         """
-        if not self._armed:
-            raise DriverError("The drive is not armed.", fix="Call arm first.")
-        if not math.isfinite(current_a) or abs(current_a) > self._limit_a:
-            raise DriverError(
-                f"A current of {current_a:g} A cannot be commanded.",
-                f"The drive's limit is {self._limit_a:g} A.",
-                "Command less, or raise the limit (register 38) if motor and rig allow.",
-            )
+        self.require(current_a, self._limit_a, "A")
         self._goal = round(current_a / self._unit_a)
         return self._goal * self._unit_a
 
-    def read(self, timeout_s: float) -> Batch:
-        """Command and ask when the next sample is due, and return it if the drive answers.
+    def idle(self, wait_s: float) -> None:
+        """Let time pass; what comes unasked is late, and dropped."""
+        self._line.discard(wait_s)
+
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Command an armed drive, and ask for what it measures.
 
         Raises:
             DriverError: An armed drive has a hardware error, or its watchdog has tripped; said
-                once. Or neither `identify` nor `start` has been called.
+                once.
         """
-        if not self._identified:
-            raise DriverError("The drive is not known.", fix="Call start first.")
-        wait_s = self._schedule.wait_s(self._transport.now_s)
-        late = self._transport.read(max(0.0, min(wait_s, timeout_s)))
-        self._counters.discarded_bytes += len(late)
-        now_s = self._transport.now_s
-        if self._schedule.wait_s(now_s) > 0:
-            return self._batch(None)
-        self._schedule.skip_missed(now_s)
-        try:
-            if self._armed:
-                self._command()
-            present = protocol.decode_present(self._line.read(protocol.PRESENT))
-        except (LinkTimeoutError, FrameError):
-            self._schedule.lose()
-            return self._batch(None)
-        self._schedule.asked += 1
-        self._counters.frames += 1
+        if self._armed:
+            self._send_goal()
+        present = protocol.decode_present(self._line.read(protocol.PRESENT))
         if self._line.alert:
             self._counters.device_errors += 1
             if self._armed:
                 self._armed = False
                 self._require_no_error()
-        return self._batch(present)
+        values = (
+            present.position * protocol.RAD_PER_COUNT,
+            present.velocity * _SPEED,
+            present.current * self._unit_a,
+            self._goal * self._unit_a,
+            0.1 * present.voltage,
+            present.temperature + _ZERO_K,
+        )
+        return values, SampleFlag.SUSPECT if self._line.alert else 0
 
     def clear_fault(self) -> None:
         """Restart the drive, which is the way out of a hardware error; it is out of force then."""
         self.disarm()
         self._line.ask(protocol.REBOOT)
 
-    def disarm(self) -> None:
-        """Take the motor out of force, and return when the drive has said that it is.
-
-        Raises:
-            DisarmUnconfirmedError: It has not said so; its state is unknown.
-        """
-        self._armed = False
-        self._goal = 0
-        try:
-            self._write_and_check(protocol.TORQUE_ENABLE, 0)
-        except DriverError as error:
-            raise DisarmUnconfirmedError(
-                f"The Dynamixel {self._id} at {self._transport.url} has not confirmed that its"
-                " motor is out of force.",
-                str(error),
-                "Take the motor for live and cut its supply. A working drive stops by itself"
-                f" {self._watchdog * protocol.WATCHDOG_UNIT_MS} ms after the last question.",
-            ) from error
-        self._may_be_armed = False
-
-    def stop(self) -> None:
-        """Disarm where the drive may be armed; one that is not asked is silent.
-
-        Raises:
-            DisarmUnconfirmedError: The drive's state is unknown.
-        """
-        if self._may_be_armed:
-            self.disarm()
-
-    def close(self) -> None:
-        """Disarm where the drive may be armed, and let go of the line.
-
-        Raises:
-            DisarmUnconfirmedError: The line is closed, but the drive's state is unknown.
-        """
-        if self._closed:
-            return
-        self._closed = True
-        try:
-            self.stop()
-        finally:
-            self._transport.close()
-
-    def _command(self) -> None:
+    def _send_goal(self) -> None:
         try:
             self._line.write(protocol.GOAL_CURRENT, self._goal)
         except InstructionRefusedError as error:
@@ -267,28 +204,6 @@ class Dynamixel:
                 f" {value} that was written.",
                 fix="Check its firmware and its hardware error.",
             )
-
-    def _batch(self, present: Present | None) -> Batch:
-        count = 0 if present is None else 1
-        p = present or Present(0, 0, 0, 0, 0)
-        values = (
-            p.position * protocol.RAD_PER_COUNT,
-            p.velocity * _SPEED,
-            p.current * self._unit_a,
-            self._goal * self._unit_a,
-            0.1 * p.voltage,
-            p.temperature + _ZERO_K,
-        )
-        names = (channel.name for channel in self.channels)
-        flag = SampleFlag.SUSPECT if self._line.alert else 0
-        return Batch(
-            {name: np.full(count, value) for name, value in zip(names, values, strict=True)},
-            np.full(count, self._transport.now_s),
-            "host",
-            np.full(count, self._schedule.asked - 1, np.int64),
-            np.full(count, flag, np.uint8),
-            self._schedule.lost,
-        )
 
 
 _SPEED = protocol.RAD_S_PER_COUNT

@@ -74,9 +74,9 @@ class Line:
             "Check its supply, the identifier and the bit rate (57600 from the factory).",
         )
 
-    def discard(self) -> None:
-        """Drop what has come unasked: it is late."""
-        self._counters.discarded_bytes += len(self._transport.read(0.0))
+    def discard(self, wait_s: float = 0.0) -> None:
+        """Drop what comes unasked in a time: it is late."""
+        self._counters.discarded_bytes += len(self._transport.read(wait_s))
 
     def _receive(self) -> bytes | None:
         """Return error and parameters of the next status packet, None when none comes in time."""

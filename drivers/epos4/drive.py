@@ -7,7 +7,7 @@ drive notices and takes its power stage out of force by itself.
 from typing import TYPE_CHECKING
 
 from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity
+from drivers.device import Axis, Batch, Channel, DeviceIdentity
 from drivers.epos4 import protocol
 from drivers.epos4.cycle import Cycle
 from drivers.epos4.faults import DriveFaultError, fault
@@ -42,6 +42,7 @@ class Epos4:
     """
 
     name = "epos4"
+    axis = Axis("position_count", 1.0, "motor_current_a")
 
     def __init__(
         self,
@@ -160,6 +161,10 @@ class Epos4:
         self._target = per_mille
         return self.ratings.torque_n_m(per_mille)
 
+    def command(self, ratio: float) -> None:
+        """Command a share of the rated torque, as `set_torque`."""
+        self.set_torque(ratio * self.ratings.rated_torque_n_m)
+
     def read(self, timeout_s: float) -> Batch:
         """Send command and SYNC when due and return what the drive answers, if it does.
 
@@ -191,6 +196,11 @@ class Epos4:
         else:
             self._require_operation(feedback)
         return self._batch(ratings, feedback)
+
+    @property
+    def now_s(self) -> float:
+        """The bus's clock, s."""
+        return self._bus.now_s
 
     @property
     def wait_s(self) -> float:

@@ -5,24 +5,17 @@ controller enters its timeout mode by itself.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
-from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import (
-    DisarmUnconfirmedError,
-    DriverError,
-    FrameError,
-    LinkError,
-    LinkTimeoutError,
-)
+from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
+from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.moteus import protocol
 from drivers.moteus.link import FdcanusbLink
 from drivers.moteus.protocol import State
-from drivers.polling import PollSchedule
+from drivers.polling import PolledDrive
 from drivers.registry import Driver, RateOption
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
@@ -32,7 +25,7 @@ STARTS_S = 1.0
 _ZERO_K = 273.15
 
 
-class Moteus:
+class Moteus(PolledDrive):
     """One controller behind an fdcanusb. Nothing else on the bus may be asked at the same time.
 
     Args:
@@ -44,6 +37,7 @@ class Moteus:
     """
 
     name = "moteus"
+    axis = Axis("angle_rad", 1e-4, "current_a")
 
     def __init__(
         self,
@@ -57,17 +51,19 @@ class Moteus:
             raise ValueError(f"an identifier lies in 1..{protocol.HIGHEST_ID}, not {device_id}")
         if not (0 < torque_limit_n_m < math.inf and 0 < watchdog_s < math.inf):
             raise ValueError("torque limit and watchdog are above 0")
+        super().__init__(
+            transport,
+            rate_hz,
+            f"moteus {device_id} at {transport.url}",
+            "A working controller enters its timeout mode"
+            f" {watchdog_s:g} s after the last command.",
+        )
         self._transport = transport
         self._id = device_id
-        self._rate_hz = rate_hz
         self._limit_n_m = torque_limit_n_m
         self._watchdog_s = watchdog_s
-        self._counters = DeviceCounters()
         self._link = FdcanusbLink(transport, device_id, self._counters)
-        self._schedule = PollSchedule(rate_hz, self._counters)
-        self._schedule.restart(transport.now_s)
         self._torque_n_m = 0.0
-        self._identified = self._armed = self._may_be_armed = self._closed = False
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -78,15 +74,11 @@ class Moteus:
             Channel("angle_rad", "rad", rate, *every, "output, over all turns"),
             Channel("speed_rad_s", "rad/s", rate, *every, "output"),
             Channel("torque_n_m", "N m", rate, *every, "output, by the motor's current"),
+            Channel("current_a", "A", rate, *every, "motor, in quadrature"),
             Channel("command_torque_n_m", "N m", rate, -limit, limit, "torque commanded"),
             Channel("supply_v", "V", rate, -64.0, 63.5, "supply"),
             Channel("temperature_k", "K", rate, _ZERO_K - 128, _ZERO_K + 127, "board"),
         )
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """What happened on the way."""
-        return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
         """Ask for model, firmware and serial number.
@@ -106,28 +98,17 @@ class Moteus:
         text = "".join(f"{part:08x}" for part in reversed(serial))
         return DeviceIdentity(f"moteus {model:#06x}", text, f"{firmware:#08x}")
 
-    def start(self) -> None:
-        """Number the samples from 0, the first being due now."""
-        if not self._identified:
-            self.identify()
-        self._link.discard()
-        self._schedule.restart(self._transport.now_s)
-
-    def arm(self) -> None:
-        """Stop the controller, which clears a fault, and put the motor in force with no torque.
+    def energise(self) -> None:
+        """Put the motor in force with no torque; it measures its current sensors first.
 
         Raises:
             DriverError: It does not get into operation.
         """
-        if not self._identified:
-            raise DriverError("The controller is not started.", fix="Call start first.")
-        self.disarm()
-        self._may_be_armed = True
         give_up_s = self._transport.now_s + STARTS_S
         while True:
-            state = self._exchange(self._command())
+            state = self._exchange(self._position_command())
             if state.mode == protocol.POSITION_MODE:
-                break
+                return
             if state.mode not in protocol.PREPARING:
                 raise self._out_of_operation(state)
             if self._transport.now_s > give_up_s:
@@ -136,7 +117,24 @@ class Moteus:
                     f"It is still in mode {state.mode} after {STARTS_S:g} s.",
                 )
             self._transport.read(1e-3)
-        self._armed = True
+
+    def release(self) -> None:
+        """Stop the controller, which clears a fault.
+
+        Raises:
+            DriverError: It is not stopped.
+        """
+        state = self._exchange(protocol.stop_command())
+        if state.mode != protocol.STOPPED:
+            raise DriverError(f"It is in mode {state.mode}.")
+
+    def zero(self) -> None:
+        """Set the torque to 0."""
+        self._torque_n_m = 0.0
+
+    def command(self, ratio: float) -> None:
+        """Command a share of the torque limit, as `set_torque`."""
+        self.set_torque(ratio * self._limit_n_m)
 
     def set_torque(self, torque_n_m: float) -> float:
         """Command a torque at the output, sent with every question from the next one on.
@@ -147,93 +145,38 @@ class Moteus:
         Raises:
             DriverError: Not armed, not finite, or beyond the limit.
         """
-        if not self._armed:
-            raise DriverError("The controller is not armed.", fix="Call arm first.")
-        if not math.isfinite(torque_n_m) or abs(torque_n_m) > self._limit_n_m:
-            raise DriverError(
-                f"A torque of {torque_n_m:g} N m cannot be commanded.",
-                f"The limit is {self._limit_n_m:g} N m.",
-                "Command less, or raise torque_limit_n_m if motor and rig allow.",
-            )
+        self.require(torque_n_m, self._limit_n_m, "N m")
         self._torque_n_m = torque_n_m
         return torque_n_m
 
-    def read(self, timeout_s: float) -> Batch:
-        """Command and ask when the next sample is due, and return it if the controller answers.
+    def idle(self, wait_s: float) -> None:
+        """Let time pass; what comes unasked is late, and dropped."""
+        self._link.discard(wait_s)
+
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Command an armed controller, and ask for what it measures.
 
         Raises:
             DriverError: An armed controller has a fault, has timed out or was stopped; said once.
-                Or neither `identify` nor `start` has been called.
         """
-        if not self._identified:
-            raise DriverError("The controller is not known.", fix="Call start first.")
-        wait_s = self._schedule.wait_s(self._transport.now_s)
-        late = self._transport.read(max(0.0, min(wait_s, timeout_s)))
-        self._counters.discarded_bytes += len(late)
-        now_s = self._transport.now_s
-        if self._schedule.wait_s(now_s) > 0:
-            return self._batch(None)
-        self._schedule.skip_missed(now_s)
-        try:
-            state = self._exchange(self._command() if self._armed else b"")
-        except LinkTimeoutError:
-            self._schedule.lose()
-            return self._batch(None)
-        self._schedule.asked += 1
-        self._counters.frames += 1
+        state = self._exchange(self._position_command() if self._armed else b"")
         if state.mode == protocol.FAULT:
             self._counters.device_errors += 1
         if self._armed and state.mode != protocol.POSITION_MODE:
             self._armed = False
             raise self._out_of_operation(state)
-        return self._batch(state)
+        values = (
+            2 * math.pi * state.position_rev,
+            2 * math.pi * state.velocity_rev_s,
+            state.torque_n_m,
+            state.current_a,
+            self._torque_n_m,
+            protocol.VOLTS_A_UNIT * state.voltage,
+            state.temperature + _ZERO_K,
+        )
+        return values, SampleFlag.SUSPECT if state.mode == protocol.FAULT else 0
 
-    def disarm(self) -> None:
-        """Take the motor out of force, and return when the controller has said that it is.
-
-        Raises:
-            DisarmUnconfirmedError: It has not said so; its state is unknown.
-        """
-        self._armed = False
-        self._torque_n_m = 0.0
-        try:
-            state = self._exchange(protocol.stop_command())
-            if state.mode != protocol.STOPPED:
-                raise DriverError(f"It is in mode {state.mode}.")
-        except DriverError as error:
-            raise DisarmUnconfirmedError(
-                f"The moteus {self._id} at {self._transport.url} has not confirmed that it is"
-                " stopped.",
-                str(error),
-                "Take the motor for live and cut its supply. A working controller enters its"
-                f" timeout mode {self._watchdog_s:g} s after the last command.",
-            ) from error
-        self._may_be_armed = False
-
-    def stop(self) -> None:
-        """Disarm where the controller may be armed; one that is not asked is silent.
-
-        Raises:
-            DisarmUnconfirmedError: The controller's state is unknown.
-        """
-        if self._may_be_armed:
-            self.disarm()
-
-    def close(self) -> None:
-        """Disarm where the controller may be armed, and let go of the fdcanusb.
-
-        Raises:
-            DisarmUnconfirmedError: The link is closed, but the controller's state is unknown.
-        """
-        if self._closed:
-            return
-        self._closed = True
-        try:
-            self.stop()
-        finally:
-            self._transport.close()
-
-    def _command(self) -> bytes:
+    def _position_command(self) -> bytes:
         return protocol.torque_command(self._torque_n_m, self._limit_n_m, self._watchdog_s)
 
     def _exchange(self, command: bytes) -> State:
@@ -258,28 +201,6 @@ class Moteus:
             f"The moteus {self._id} has left operation and is in mode {state.mode}.",
             "Another program commands it, or it was restarted. It is commanded no more from here.",
             "Find out why, then arm again.",
-        )
-
-    def _batch(self, state: State | None) -> Batch:
-        count = 0 if state is None else 1
-        s = state or State(0, 0.0, 0.0, 0.0, 0, 0, 0)
-        values = (
-            2 * math.pi * s.position_rev,
-            2 * math.pi * s.velocity_rev_s,
-            s.torque_n_m,
-            self._torque_n_m,
-            protocol.VOLTS_A_UNIT * s.voltage,
-            s.temperature + _ZERO_K,
-        )
-        names = (channel.name for channel in self.channels)
-        flag = SampleFlag.SUSPECT if s.mode == protocol.FAULT else 0
-        return Batch(
-            {name: np.full(count, value) for name, value in zip(names, values, strict=True)},
-            np.full(count, self._transport.now_s),
-            "host",
-            np.full(count, self._schedule.asked - 1, np.int64),
-            np.full(count, flag, np.uint8),
-            self._schedule.lost,
         )
 
 

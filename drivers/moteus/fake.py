@@ -16,6 +16,7 @@ from drivers.transport.simulated import SimulatedTransport
 PREPARES_MS = 20
 """Time between stopped and position mode, in which it measures its current sensors."""
 _INERTIA_KG_M2, _FRICTION_N_M_S = 1e-5, 2e-4
+_TORQUE_CONSTANT_N_M_A = 0.03
 _MEASURED = 4
 
 
@@ -108,8 +109,8 @@ class MoteusFake:
     def _register(self, number: int) -> float:
         turn = 2 * math.pi
         state = State(
-            self.mode, self._angle_rad / turn, self._speed_rad_s / turn, self.torque_n_m, 48, 29,
-            self.fault,
+            self.mode, self._angle_rad / turn, self._speed_rad_s / turn, self.torque_n_m,
+            self.torque_n_m / _TORQUE_CONSTANT_N_M_A, 48, 29, self.fault,
         )  # fmt: skip
         values = protocol.registers(protocol.encode_state(state))
         values |= {protocol.MODEL: 0x0700, protocol.MODEL + 1: 0x010D}

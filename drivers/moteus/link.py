@@ -55,9 +55,9 @@ class FdcanusbLink:
             "Check its supply, the identifier, and both terminators of the bus.",
         )
 
-    def discard(self) -> None:
-        """Drop what has come unasked: it is late."""
-        late = self._held + self._transport.read(0.0)
+    def discard(self, wait_s: float = 0.0) -> None:
+        """Drop what comes unasked in a time: it is late."""
+        late = self._held + self._transport.read(wait_s)
         self._counters.discarded_bytes += len(late)
         self._held = b""
 

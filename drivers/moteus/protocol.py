@@ -23,9 +23,9 @@ _FRAME_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 LONGEST_LINE = 256
 """Bytes; a reply has less than 180. More without a line feed is noise."""
 
-MODE, POSITION, VOLTAGE, COMMAND = 0x000, 0x001, 0x00D, 0x020
-"""First registers of what is read and written: mode; position, velocity, torque; voltage,
-temperature, fault; and the position command's eight."""
+MODE, POSITION, CURRENT, VOLTAGE, COMMAND = 0x000, 0x001, 0x004, 0x00D, 0x020
+"""First registers of what is read and written: mode; position, velocity, torque; current in
+quadrature; voltage, temperature, fault; and the position command's eight."""
 MODEL, SERIAL = 0x100, 0x120
 STOPPED, FAULT, POSITION_MODE, TIMEOUT = 0, 1, 10, 11
 PREPARING = (2, 3, 4)
@@ -59,6 +59,7 @@ class State:
         position_rev: Angle of the output, turns.
         velocity_rev_s: Speed of the output, turns a second.
         torque_n_m: Torque at the output.
+        current_a: Motor current in quadrature.
         voltage: Supply, 0.5 V.
         temperature: Board, degrees Celsius.
         fault: Its fault code.
@@ -68,13 +69,15 @@ class State:
     position_rev: float
     velocity_rev_s: float
     torque_n_m: float
+    current_a: float
     voltage: int
     temperature: int
     fault: int
 
 
-STATE_QUESTION = bytes([0x11, MODE, 0x1F, POSITION, 0x13, VOLTAGE])
-"""Read one int8 from the mode on, three floats from the position, three int8 from the voltage."""
+STATE_QUESTION = bytes([0x11, MODE, 0x1F, POSITION, 0x13, VOLTAGE, 0x1D, CURRENT])
+"""Read one int8 from the mode on, three floats from the position, three int8 from the voltage, and
+the current in quadrature."""
 
 
 def stop_command() -> bytes:
@@ -158,13 +161,13 @@ def decode_state(data: bytes) -> State:
         FrameError: A register is missing, or a value is not finite.
     """
     found = registers(data)
-    names = (MODE, POSITION, POSITION + 1, POSITION + 2, VOLTAGE, VOLTAGE + 1, VOLTAGE + 2)
+    names = (MODE, *range(POSITION, POSITION + 4), *range(VOLTAGE, VOLTAGE + 3))
     values = [found.get(name, math.nan) for name in names]
     if not all(map(math.isfinite, values)):
         raise FrameError("An answer of a moteus lacks a register, or holds no number.")
-    mode, position, velocity, torque, voltage, temperature, fault = values
-    last = (int(voltage), int(temperature), int(fault))
-    return State(int(mode), position, velocity, torque, *last)
+    mode, position, velocity, torque, current, *last = values
+    voltage, temperature, fault = map(int, last)
+    return State(int(mode), position, velocity, torque, current, voltage, temperature, fault)
 
 
 def encode_state(state: State) -> bytes:
@@ -174,6 +177,7 @@ def encode_state(state: State) -> bytes:
         reply(INT8, MODE, [state.mode])
         + reply(FLOAT, POSITION, motion)
         + reply(INT8, VOLTAGE, [state.voltage, state.temperature, state.fault])
+        + reply(FLOAT, CURRENT, [state.current_a])
     )
 
 

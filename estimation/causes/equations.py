@@ -5,7 +5,6 @@ its cutoff. Effects with memory are worked out on that series; everything is reg
 grid that all equations of a run share.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -26,6 +25,8 @@ from estimation.errors import EstimationError
 from estimation.filters import LowPass
 from estimation.fitting import OFFSET, fit
 from estimation.model import Model, Term, balance_channels
+from estimation.noise import white_noise
+from estimation.predicted import with_prediction
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
 from estimation.signals import Signals
@@ -311,7 +312,7 @@ def _equation(model: Model) -> Equation:
             channels[channel] = channels.get(channel, 0.0) + float(term.weights[0])
         if term.effect.id == "friction.coulomb":
             speed, width = term.channels["speed"], term.values["width"].value
-    return Equation(model.balance, model, channels, speed, width)
+    return Equation(model.balance, with_prediction(model), channels, speed, width)
 
 
 def _signals(
@@ -331,7 +332,9 @@ def _signals(
     valid, step, grid = _places(filtered, low_pass)
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}
     reading = measured_channels((n for n in wanted if n != CAMPAIGN_TIME), signals)
-    random = zero_phase_channels(_white_noise(recording, reading), wanted, low_pass, signals)
+    random = zero_phase_channels(
+        white_noise(recording, reading, signals), wanted, low_pass, signals
+    )
     noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
@@ -395,25 +398,3 @@ def _used(
 def _friction_speed(model: Model) -> str:
     """Return the channel of the speed that declared friction depends on; empty without."""
     return next((t.channels["speed"] for t in model.terms if t.effect.id == COULOMB), "")
-
-
-def _white_noise(recording: Recording, measured: Sequence[str]) -> Recording:
-    """Return a recording of white noise, as wide in each channel as that channel's own."""
-    random = np.random.default_rng(0)
-    return recording.with_columns(
-        **{n: _noise_width(recording[n]) * random.standard_normal(len(recording)) for n in measured}
-    )
-
-
-def _noise_width(values: FloatArray) -> float:
-    """Return the standard deviation of a reading's white noise, the steps of its counts included.
-
-    Third differences hold noise and nearly no motion; a tenth of the blocks, in which a contact or
-    a reversal may show, is left out. At rest counts stand still, in motion they are noise.
-    """
-    squared = np.diff(values, 3) ** 2 / 20.0
-    blocks = [float(np.mean(b)) for b in np.array_split(squared, max(1, len(squared) // 50))]
-    usual = float(np.nanmean(np.sort(blocks)[: max(1, round(0.9 * len(blocks)))]))
-    steps = np.abs(np.diff(values))
-    count = float(steps[steps > 0.0].min(initial=np.inf))
-    return math.sqrt(max(usual, count**2 / 12.0 if math.isfinite(count) else 0.0))

@@ -37,6 +37,8 @@ class Place:
         home: Equation it is reported under.
         enters: How it enters the equations.
         roles: Role of an effect to the channels that can play it there.
+        like: Equation of the reference rig with the same signs: `stretch` where an output's travel
+            is the target, `gearbox` where the bend itself is.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Place:
     home: str
     enters: tuple[Entry, ...]
     roles: Mapping[str, tuple[str, ...]]
+    like: str = ""
 
 
 def places_of(layout: Layout) -> list[Place]:
@@ -150,9 +153,10 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
     if equation.of_angle:
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
         roles |= {"other_angle": _unrelated(layout, equation, angles)}
-        return Place(
-            equation.name, "deflection", equation.name, (Entry(equation.name, 1.0),), roles
-        )
+        bends = [t.sign for t in equation.terms if t.effect.id == "compliance.link"]
+        like = "stretch" if -1 in bends else "gearbox"
+        enters = (Entry(equation.name, 1.0),)
+        return Place(equation.name, "deflection", equation.name, enters, roles, like)
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
     return Place(equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles)
 

@@ -18,8 +18,9 @@ from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
 from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
 from estimation.model import Estimate, Model, Term
+from estimation.predicted import without_unused
 from estimation.recording import FloatArray, Recording
-from estimation.rest import Samples
+from estimation.signals import Samples
 from estimation.within_bounds import solve_within
 
 Unwritten = Callable[[str, FloatArray], FloatArray]
@@ -170,7 +171,7 @@ class Refit:
         while True:
             model = replace(self.model, terms=(*self.model.terms, *terms), evidence=None)
             try:
-                return fit(model, campaign, bootstrap=bootstrap, shapes="keep")
+                return without_unused(fit(model, campaign, bootstrap=bootstrap, shapes="keep"))
             except FitError:
                 if not terms:
                     raise

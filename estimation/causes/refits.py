@@ -96,7 +96,7 @@ class Refits:
         cause, equation = candidate.cause, self.layout.equations[name]
         acts = None if candidate.acts is None else frozenset(runs)
         if isinstance(cause, Source):
-            term = term_of(cause, equation, self.layout.measured)
+            term = term_of(cause, equation)
             if term is not None:
                 if set(term.channels.values()) - {channel for _, channel in cause.channels}:
                     term = self.of[name].refined(self.parts[name], term)

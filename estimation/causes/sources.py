@@ -15,8 +15,6 @@ from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, catalogue
-from estimation.effects.roles import entries
-from estimation.model import BALANCES
 from estimation.recording import FloatArray
 
 DECLARED_ONLY = (
@@ -62,6 +60,8 @@ LOOPS = ("hysteresis.", "transmission.backlash")
 
 TURNING = ("motor_angle", "output_angle", "encoder")
 CLOCKS = ("clock", "elapsed", "campaign_clock")
+KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
+"""Equations of the reference rig that effects name."""
 
 NARROW = 0.02
 """Speed over which friction changes its sign where none is declared, share of the usual most."""
@@ -114,11 +114,10 @@ class Source:
     @property
     def side(self) -> int:
         """Sign of a loss that its amplitudes are bounded for: an actuator's, and lost motion."""
-        kind = self.place.home.partition(".")[0]
         if self.place.kind == "actuator":
             return next(iter(self.effect.balances.values()), 1)
         if self.place.kind == "deflection" and self.effect.id.startswith(LOOPS):
-            return self.effect.balances.get(kind, 1)
+            return self.effect.balances.get(self.place.like, 1)
         return 1
 
     @property
@@ -214,9 +213,9 @@ def _acts(effect: Effect, place: Place) -> bool:
     if not set(effect.roles) <= set(place.roles):
         return False
     kind = place.home.partition(".")[0]
-    if kind == "calibration" and not entries(effect, place.home):
-        return False  # its equation is of one sensor or part
-    if effect.family == "friction.capstan" and kind in BALANCES and kind not in effect.balances:
+    if (place.home, place.kind) == ("calibration.encoder", "deflection"):
+        return False  # slower than a count a sample, the pattern of the counts passes for a bend
+    if effect.family == "friction.capstan" and kind in KNOWN and kind not in effect.balances:
         return False  # a cable that is wrapped, not a shaft in its bearings
     match place.kind:
         case "actuator":

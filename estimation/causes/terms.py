@@ -1,16 +1,15 @@
 """A named cause as a term of an equation's model, to be saved in a file and run live."""
 
 import math
-from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from estimation.causes.equations import Equation
 from estimation.causes.functions import Function
 from estimation.causes.places import Entry
 from estimation.causes.sources import Source
-from estimation.derived import CLOCKS, measured_channels, origin_of
-from estimation.effects.roles import entries
+from estimation.derived import origin_of
 from estimation.model import Estimate, Term
+from estimation.predicted import predicted_of
 
 
 def plain(cause: Source | Function) -> Source | Function:
@@ -18,31 +17,27 @@ def plain(cause: Source | Function) -> Source | Function:
     return replace(cause, bend=None, odd=False) if isinstance(cause, Source) else cause
 
 
-def term_of(source: Source, equation: Equation, measured: Collection[str]) -> Term | None:
+def term_of(source: Source, equation: Equation) -> Term | None:
     """Return a cause as a term of one equation, its shape set and its amplitudes not.
 
-    A term never reads the equation's own target: the channel that `estimation.effects.roles` has
-    for that role takes its place.
+    A term never reads the equation's own target: its prediction by the fitted equation takes its
+    place, see `estimation.predicted`.
 
     Args:
         source: The cause.
         equation: The equation.
-        measured: Channels that every run has.
 
     Returns:
-        None where it does not enter the equation undifferentiated, or no other channel can take the
-        target's place.
+        None where it does not enter the equation undifferentiated, or nothing predicts the target.
     """
     entry = _entry(source, equation.name)
     if entry is None:
         return None
-    instead = _instead(source, equation, measured)
-    channels = {}
-    for role, channel in source.channels:
-        name = instead.get(role, "") if _reads_target(channel, equation) else channel
-        if not name:
-            return None
-        channels[role] = name
+    target = equation.target
+    own = {c for _, c in source.channels if target in (c, origin_of(c)[0])}
+    channels = {r: predicted_of(c, target) if c in own else c for r, c in source.channels}
+    if own and equation.model.signals.combination(predicted_of(target, target)) is None:
+        return None
     shape = {
         p.name: Estimate(float(x)) for p, x in zip(source.effect.shape, source.shape, strict=True)
     }
@@ -54,19 +49,3 @@ def _entry(source: Source, name: str) -> Entry | None:
     """Return how it enters an equation, if undifferentiated and with an effect."""
     own = [e for e in source.place.enters if e.equation == name and e.order == 0 and e.gain]
     return own[0] if own else None
-
-
-def _reads_target(channel: str, equation: Equation) -> bool:
-    return equation.target in (channel, origin_of(channel)[0])
-
-
-def _instead(source: Source, equation: Equation, measured: Collection[str]) -> Mapping[str, str]:
-    """Return role to a channel other than the target, where the equation has one."""
-    there = {*measured, *CLOCKS}
-    found: dict[str, str] = {}
-    for entry in entries(source.effect, equation.name):
-        for role, channel in entry.channels.items():
-            known = set(measured_channels([channel], equation.model.signals)) <= there
-            if known and not _reads_target(channel, equation):
-                found.setdefault(role, channel)
-    return found

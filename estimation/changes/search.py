@@ -233,6 +233,7 @@ def _resampled(
     best = ranked[0][0]
     near = _best_of_each(ranked, best.gain)
     laid = [(one, regression.products(held.laid)) for one, held in near]
+    prior = _prior([one.candidate for one, _ in ranked], [one.candidate for one, _ in near])
     wins: dict[str, float] = {}
     spread = []
     groups = [np.flatnonzero(is_b == side) for side in (0, 1)]
@@ -245,13 +246,22 @@ def _resampled(
         gram = regression.gram(counts)
         found = [_one(gram, products, one, is_b, counts) for one, products in laid]
         gained = np.array([f[0] - one.usual for f, (one, _) in zip(found, laid, strict=True)])
-        weights = np.exp((gained - gained.max()) / max(FORM * gained.max(), TINY))
+        weights = prior * np.exp((gained - gained.max()) / max(FORM * gained.max(), TINY))
         for (one, _), weight in zip(laid, weights / weights.sum(), strict=True):
             wins[one.family] = wins.get(one.family, 0.0) + float(weight)
         spread.append(found[0][1])
     total = sum(wins.values()) or 1.0
     shares = dict(sorted(((n, w / total) for n, w in wins.items()), key=lambda pair: -pair[1]))
     return Step(best, p, shares, np.array(spread), {one.family: one for one, _ in near})
+
+
+def _prior(pool: Sequence[Candidate], near: Sequence[Candidate]) -> FloatArray:
+    """Return the prior weights of some candidates, shape (n,).
+
+    A parameter that moved and an effect that came are as likely; names of one kind share evenly.
+    """
+    names = {kind: {c.key for c in pool if isinstance(c, Came) is kind} for kind in (True, False)}
+    return np.array([1.0 / len(names[isinstance(c, Came)]) for c in near])
 
 
 def _one(

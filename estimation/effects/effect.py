@@ -61,8 +61,7 @@ class Effect(ABC):
         balances: Equations that a search may add it to, and its side there: 1 adds to the target,
             -1 subtracts from it, so that a bound on an amplitude has the same meaning in all of
             them. `joint` stands for every `joint.N`. Empty for an effect that is only declared,
-            such as the torque constant. `estimation.effects.roles` assigns channels to the roles in
-            each equation.
+            such as the torque constant.
         roles: Role of each input, and its default channel.
         amplitudes: Linear parameters, one per column.
         shape: Non-linear parameters, searched between their bounds; positive unless `linear`.

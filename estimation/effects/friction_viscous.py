@@ -26,5 +26,5 @@ class ViscousFriction(Proportional):
         "joint": 1,
     }
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
-    amplitudes = (Parameter("damping", "target / speed", "loss per rad/s", lower=0.0),)
+    amplitudes = (Parameter("damping", "target / speed", "loss per unit of speed", lower=0.0),)
     told_apart_by = "a staircase of constant speeds in both directions"

@@ -25,5 +25,5 @@ class Inertia(Proportional):
         "joint": 1,
     }
     roles: ClassVar = {"acceleration": "motor_acceleration_rad_s2"}
-    amplitudes = (Parameter("inertia", "target / acceleration", "moment of inertia", lower=0.0),)
+    amplitudes = (Parameter("inertia", "target / acceleration", "inertia", lower=0.0),)
     told_apart_by = "the same motion at twice the frequency"

@@ -175,11 +175,14 @@ def _channel(k: int, channel: str, row: _Row) -> str:
         return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
     combination = row.signals.combination(channel)
-    if combination is not None and combination.direction is None:
-        value = " + ".join(
+    if combination is not None:
+        parts = [
             f"{share.times!r} * value[{place(share.channel)}] / {share.over!r}"
             for share in combination.shares
-        )
+        ]
+        if (turn := combination.direction) is not None:
+            parts.append(f"{turn.size!r} * tanh({_value(turn.speed, measured)} / {turn.width!r})")
+        value = " + ".join(parts)
     elif channel in windows:
         rises = channel.endswith(TRAVEL)
         source = channel.replace(TRAVEL, "_angle_rad") if rises else channel.replace(FALL, "_")

@@ -1,7 +1,9 @@
 """A board that is restarted during a session: its counts have lost their zeros."""
 
+from typing import Protocol
+
 from drivers.errors import DriverError
-from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Identity
 from rig.errors import ExitCode, RigError
 
 
@@ -11,7 +13,15 @@ class BoardResetError(RigError):
     exit_code = ExitCode.DEVICE
 
 
-def require_same_start(logger: TeensyLogger, boot: int) -> None:
+class Identified(Protocol):
+    """What can be asked who it is."""
+
+    def identify(self) -> Identity:
+        """Ask who is there."""
+        ...
+
+
+def require_same_start(logger: Identified, boot: int) -> None:
     """Compare the board's present start number with the session's.
 
     Args:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import ClockLine, arrival_fit
 from drivers.device import Batch, Device
+from drivers.errors import DriverError
 from rig.bench.devices import open_section
 from rig.configuration.config import Config, is_simulated
+from rig.configuration.sections import DeviceSection
 from rig.log.schema import Field, Stream
 
 REFIT_S = 0.5
@@ -160,13 +162,22 @@ def open_companions(config: Config) -> list[Companion]:
     opened: list[Companion] = []
     try:
         for name, section in config.devices.items():
-            device = open_section(section)
+            device = _open_named(name, section)
             opened.append(Companion(name, device, in_step=is_simulated(section.url)))
     except BaseException:
         for companion in opened:
             companion.device.close()
         raise
     return opened
+
+
+def _open_named(name: str, section: DeviceSection) -> Device:
+    try:
+        return open_section(section)
+    except DriverError as error:
+        error.what = f"Device {name!r}: {error.what}"
+        error.fix = error.fix or f"Check its supply, its cable, and the url of [devices.{name}]."
+        raise
 
 
 def _joined(parts: list[NDArray], dtype: type) -> NDArray:  # type: ignore[type-arg]

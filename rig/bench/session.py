@@ -7,6 +7,7 @@ logger is disarmed first, and the disarming is confirmed by the logger itself.
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from time import sleep
 from types import TracebackType
 from typing import Any, Self
@@ -15,21 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from calibration.zero import SensorZero, measure_zeros
+from calibration.zero import MINIMUM_SAMPLES, SensorZero, measure_zeros
 from drivers.clock import ClockFit
 from drivers.errors import CommandRefusedError, DriverError
-from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
 from drivers.transport.transport import Transport
 from rig.bench.board_start import require_same_start
 from rig.bench.companions import Companion, open_companions
+from rig.bench.device_logger import logger_on, raw_stream, with_channels
+from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
 from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
+from rig.bench.sensor_logger import SensorWay
 from rig.bench.trips import HostWatch, trip_error, tripped
 from rig.configuration.config import Config
 from rig.errors import ExitCode, RigError, SafetyTripError, UsageError
+from rig.log.schema import Stream
+from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
 from rig.machines.reading import Reading, reading_of, with_setpoints
 from rig.machines.safety import check_samples
@@ -76,8 +81,17 @@ class Session:
         self.calibrations: CalibrationSet = config.calibration_set()
         self.zeros: dict[str, float] = {}
         self.identity: Identity
+        self.raw: Stream
+        """Stream of the samples as they came, in a log."""
         self.machine = machine_of(config)
-        self._logger = TeensyLogger(transport, self.machine.profile)
+        self.flight: FlightRecorder | None = None
+        """What was sent to the board, where there is one."""
+        self.newest_tick_us = 0
+        self.newest: Reading | None = None
+        """The newest reading, also the one in which a limit was crossed."""
+        if not isinstance(transport, LogicLink | SensorWay):
+            transport = self.flight = FlightRecorder(transport, self._tick_us)
+        self._logger = logger_on(transport, self.machine.profile)
         self._transport = transport
         self._ways_out = ExitStack()
         self._first_tick_us: int | None = None
@@ -86,7 +100,6 @@ class Session:
         self._watch: HostWatch | None = None
         self._gathers = is_real_time(config)
         self._read_s = self._clock_due_s = -np.inf
-        self.newest_tick_us = 0
         self.companions: list[Companion] = []
         self.clock = ClockFit()
         """The logger's clock against this computer's; its line states the residual of the fit."""
@@ -97,6 +110,7 @@ class Session:
             ways_out.enter_context(holding(self.config.logger.url))
             ways_out.callback(self._close)
             self.identity = self._logger.identify()
+            self._take_channels()
             self.companions = open_companions(self.config)
             for companion in self.companions:
                 ways_out.callback(companion.device.close)
@@ -114,6 +128,17 @@ class Session:
         trace: TracebackType | None,
     ) -> None:
         self._ways_out.__exit__(kind, error, trace)
+
+    def _take_channels(self) -> None:
+        """Add what a device measures besides a logger's counts."""
+        channels = getattr(self._logger, "channels", ())
+        self.raw = self.machine.counts
+        if not channels:
+            return
+        has_logger = bool(self.machine.setpoint_channels)
+        self.calibrations = with_channels(self.calibrations, channels, has_logger)
+        self.raw = raw_stream(channels, self.machine.counts, has_logger)
+        self.machine = self.machine.at(channels[0].rate_hz)
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -156,9 +181,13 @@ class Session:
     def take_zeros(self, duration_s: float) -> dict[str, SensorZero]:
         """Measure the zeros of the disarmed rig and use them from now on.
 
+        A slow device is read for longer, until it has given readings enough.
+
         Raises:
             CalibrationError: Too few samples came.
         """
+        if any(line.tared for line in self.calibrations.channels.values()):
+            duration_s = max(duration_s, MINIMUM_SAMPLES / self.machine.profile.rate_hz)
         counts = np.concatenate([reading.counts for reading in self.rest(duration_s)])
         zeros = measure_zeros(counts, self.calibrations)
         self.zeros = {name: zero.mean_counts for name, zero in zeros.items()}
@@ -182,6 +211,9 @@ class Session:
             SafetyTripError: A limit was crossed; the rig is disarmed.
             LoggerStalledError: The logger fell silent; the rig's own watchdog makes it safe.
         """
+        if not self.machine.setpoint_channels:
+            yield from self._observe(setpoints[0].size)
+            return
         if len(setpoints) != len(self.machine.setpoint_channels):
             raise UsageError(
                 f"{self.config.name} takes {', '.join(self.machine.setpoint_channels)}.",
@@ -192,6 +224,18 @@ class Session:
         most = self.machine.profile.max_setpoints
         blocks = [slice(cut, cut + most) for cut in range(0, setpoints[0].size, most)]
         yield from self.follow(tuple(column[b] for column in setpoints) for b in blocks)
+
+    def _observe(self, samples: int) -> Iterator[Reading]:
+        """Read so many samples of a device without motors; their setpoints are their numbers."""
+        first: int | None = None
+        while samples > 0:
+            reading = self._read()
+            number = reading.counts["sequence"].astype(np.int64)
+            first = int(number[0]) if first is None else first
+            setpoint = np.where(number < first + samples, number - first, -1)
+            yield replace(reading, setpoint=setpoint)
+            if number[-1] >= first + samples - 1:
+                return
 
     def follow(
         self, setpoints: Iterator[tuple[NDArray[np.float64], ...]], lead_s: float = LEAD_S
@@ -263,6 +307,11 @@ class Session:
         for _ in self.play(*self.machine.settling(self.here).setpoints):
             pass
 
+    def _tick_us(self) -> int:
+        """Return the board's clock now; exact where time is virtual."""
+        virtual = self.config.is_simulated and not self._gathers
+        return round(self._transport.now_s * 1e6) if virtual else self.newest_tick_us
+
     def _gather(self) -> None:
         """Let samples gather where time is real and the board runs by itself."""
         now_s = self._transport.now_s
@@ -295,6 +344,7 @@ class Session:
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
         self.newest_tick_us = int(reading.tick_us[-1])
         self.here = self.machine.here(reading.columns)
+        self.newest = reading
         try:
             self._require_no_trip(reading)
             check_samples(self.config.limits, reading)

@@ -18,7 +18,6 @@ from estimation.recording import Recording
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.machines.reading import Reading
-from rig.protocols.motion import motion_of
 from rig.protocols.protocol import RunPlan
 
 ZERO_S = 0.5
@@ -91,8 +90,8 @@ class RigBench:
             # one zero for all steps: at rest the sensor shows what friction happens to hold, and
             # that differs from step to step by more than the sensor's own zero does
             session.zeros = dict(self._zeros)
-            motion = motion_of(plan, session.spindle_angle_rad)
-            readings = list(session.play(motion.target_angle_rad, motion.load_command_a))
+            motion = session.machine.motion(plan, session.here)
+            readings = list(session.play(*motion.setpoints))
             of_run = [
                 r.where((r.setpoint >= motion.first) & (r.setpoint < motion.last)) for r in readings
             ]

@@ -215,7 +215,7 @@ def fsr_of(result: Result) -> tuple[FsrCurve, FsrMemory]:
 def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
     """Return a line from one to the other, whose gain and zero a fit may still move."""
     terms = (
-        Term(effect("motor.torque_constant"), 1, {"source": source}),
+        Term(effect("transmission.ratio"), 1, {"load": source}),
         Term(effect("sensor.offset"), 1),
     )
     about = "The calibrated reading of the sensor against its reference."

@@ -12,8 +12,8 @@ from drivers.transport.can_bus import CanBus
 from drivers.transport.live_can import LiveCanBus
 from drivers.transport.python_can import open_can
 from drivers.transport.simulated_can import SimulatedCanBus
-from rig.canopen.logger import CanopenLogger
 from rig.configuration.config import Config
+from rig.logic.link import LogicLink
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.logger import plant_and_sensors
 
@@ -51,11 +51,11 @@ class PlantMotor:
         outputs[1] = 0
 
 
-def open_simulated_canopen(config: Config) -> CanopenLogger:
+def open_simulated_canopen(config: Config) -> LogicLink:
     """Return the link to the logic of a simulated CANopen rig, in virtual time."""
     options = {"node_id": 1, **config.logger.options}
     bus = open_simulated_bus(config)
-    return CanopenLogger(Epos4(bus, **options), bus)
+    return LogicLink(Epos4(bus, **options), bus.url)
 
 
 def open_simulated_bus(config: Config) -> CanBus:

@@ -18,8 +18,8 @@ from types import FrameType
 from drivers.epos4.drive import Epos4
 from drivers.errors import DriverError
 from drivers.transport.python_can import open_can
-from rig.canopen.logger import CanopenLogger
 from rig.configuration.config import Config
+from rig.logic.link import LogicLink
 
 PERIOD_S = 0.002
 """Ticks between two polls of the host."""
@@ -55,7 +55,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 @contextmanager
-def _opened(config: Config) -> Iterator[CanopenLogger]:
+def _opened(config: Config) -> Iterator[LogicLink]:
     """Open the bus and what is on it; the drive is disarmed and the bus closed on the way out."""
     options = {"node_id": 1, **config.logger.options}
     late_s = 0.0
@@ -72,12 +72,12 @@ def _opened(config: Config) -> Iterator[CanopenLogger]:
         bus.close()
         raise
     try:
-        yield CanopenLogger(device, bus, late_s, is_cold=config.is_simulated)
+        yield LogicLink(device, bus.url, late_s=late_s, is_cold=config.is_simulated)
     finally:
         device.close()
 
 
-def _serve(logger: CanopenLogger, host: socket.socket) -> None:
+def _serve(logger: LogicLink, host: socket.socket) -> None:
     """Tick, and carry bytes to and fro, until the host has closed its end."""
     waiting = b""
     last, said_s = "", 0.0

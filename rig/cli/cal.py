@@ -7,7 +7,7 @@ import typer
 
 from rig.cli.help import GroupedHelp
 from rig.cli.rig_options import ConfigOption, SimFlag
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, results, stages
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
@@ -98,9 +98,13 @@ def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     for r in records:  # lines, not a table: a terminal would cut the hashes off
         mark = "*" if r.content_hash in active else " "
         whom = f", instrument {r.instrument}" if r.instrument else ""
-        made = f"{r.kind}, {r.made:%Y-%m-%d} by {r.operator}{whom}"
+        made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
         screen.print(f"{mark} {r.content_hash}  {r.channel}  {made}", markup=False)
-    screen.print("* active" if records else "No records yet: rig cal add.")
+    screen.print(
+        "* active"
+        if records
+        else "No records yet. `rig calibrate` makes one, `rig cal add` takes a certificate."
+    )
     if json:
         emit_json(
             {
@@ -230,16 +234,10 @@ def diagnose(
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
-    screen = remarks()
     asked = of_calibration(declared_by_record(_store(store).get(record)))
     looks = Ledger(ledger or default_ledger())
-    done = run_diagnosis(
-        asked.campaign,
-        asked.models,
-        looks,
-        seed=seed,
-        on_stage=lambda what: screen.print(f"{what} ..."),
-    )
+    with stages() as on_stage:
+        done = run_diagnosis(asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage)
     remember(done, looks)
     screen = results(json)
     for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:

@@ -28,6 +28,8 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
     """
     from datetime import datetime
 
+    from calibration.sessions.current import CurrentSession
+    from calibration.sessions.drive import DriveCurrentSession
     from calibration.store import CalibrationStore
     from rig.calibrate.raw import read_raw
     from rig.calibrate.run import Signature, keep
@@ -38,7 +40,13 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         raise UsageError("Who calibrates is not known.", fix="Give --operator NAME.")
     settings = chosen_rig(how.config, how.sim)
     _refuse_idle_force_sensor(procedure, settings, how)
-    _ = settings.reference_limits  # the procedures are of its sensors and its motor
+    limits = settings.reference_limits  # the procedures are of its sensors and its motor
+    if isinstance(procedure, CurrentSession) and not limits.load_command_a:
+        procedure = DriveCurrentSession(
+            speeds_rad_s=procedure.speeds_rad_s,
+            repeats=procedure.repeats,
+            motor_constant_n_m_a=procedure.motor_constant_n_m_a,
+        )
     if how.seed is not None:
         settings = settings.changed(simulation={"seed": how.seed})
     if how.raw is not None:
@@ -99,7 +107,7 @@ def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list
     operator: Operator
     lines = settings.calibration_set()
     measured = _begun(procedure, how.resume)
-    if settings.is_simulated:
+    if settings.is_simulated and settings.logger.profile == "reference":
         from rig.calibrate.hands import SimulatedHands
 
         hands = SimulatedHands(settings)

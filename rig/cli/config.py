@@ -120,5 +120,6 @@ def list_(json: JsonFlag = False) -> None:
     if json:
         emit_json({"folder": SHIPPED, "configs": found})
         return
+    width = max(map(len, found))
     for name, rig in found.items():
-        results(json).print(f"{name:12} {rig}", markup=False)
+        results(json).print(f"{name:{width}}  {rig}", markup=False)

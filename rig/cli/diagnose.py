@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.left_out import say_left_out
+from rig.cli.left_out import SkipBad, say_left_out
 from rig.cli.machine_option import MachineOption, ModelOption
 from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, plain, remarks, results
+from rig.output.console import JsonFlag, emit_json, plain, results, stages
 
 
 def diagnose(
@@ -42,6 +42,7 @@ def diagnose(
     ledger: Annotated[
         Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
+    skip_bad: SkipBad = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
@@ -68,20 +69,20 @@ def diagnose(
     outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}
     for output, kind in outputs.items():
         check_output(output, kind)
-    working = remarks()
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
-        asked = subject(path, model, balance, format_, machine)
+        asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        done = run_diagnosis(
-            asked.campaign,
-            asked.models,
-            looks,
-            seed=seed,
-            executor=executor,
-            quick=quick,
-            on_stage=lambda what: working.print(f"{what} ..."),
-        )
+        with stages() as on_stage:
+            done = run_diagnosis(
+                asked.campaign,
+                asked.models,
+                looks,
+                seed=seed,
+                executor=executor,
+                quick=quick,
+                on_stage=on_stage,
+            )
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []

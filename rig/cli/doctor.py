@@ -77,8 +77,9 @@ def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
         screen.print("No serial port and no CAN interface is present.")
     for name, section in configured.items():
         screen.print(f"configured  {name}: {section.driver} at {section.url}", markup=False)
+    width = max(map(len, texts))
     for name, text in texts.items():
-        screen.print(f"driver      {name:12}{text}", markup=False)
+        screen.print(f"driver      {name:{width}}  {text}", markup=False)
 
 
 def udev(json: JsonFlag = False) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.left_out import say_left_out
+from rig.cli.left_out import SkipBad, say_left_out
 from rig.cli.machine_option import MachineOption
 from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
@@ -146,6 +146,7 @@ def fit(
     live: Annotated[
         bool, typer.Option("--live", help="Fit for use live; with --model states.")
     ] = False,
+    skip_bad: SkipBad = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
@@ -160,10 +161,10 @@ def fit(
     from estimation.fitting import fit as fit_model
     from rig.machines.recordings import open_recordings
     from rig.output.table import to_rich
-    from rig.reports.first_look import parameter_table
+    from rig.reports.first_look import held_out_sentence, parameter_table
 
     screen = results(json_)
-    campaign = open_recordings(path, machine, format_)
+    campaign = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, campaign)
     if model == "states":
         fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
@@ -184,11 +185,7 @@ def fit(
             bar.advance(task)
     for fitted, error in done:
         screen.print(to_rich(parameter_table(fitted)))
-        screen.print(
-            f"{fitted.target} on {error.runs} runs not fitted on:"
-            f" rmse {error.rmse:.4g} {fitted.unit},"
-            f" {error.rmse_with_means:.4g} with each run's mean left in."
-        )
+        screen.print(held_out_sentence(fitted, error))
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
         screen.print(f"Model: {out}", markup=False)

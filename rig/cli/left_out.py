@@ -1,12 +1,18 @@
 """Report of the recordings that a command excludes."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from rig.output.console import remarks
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
+
+SkipBad = Annotated[
+    bool, typer.Option("--skip-bad", help="Leave out runs that cannot be read, and name them.")
+]
 
 
 def say_left_out(path: Path, campaign: "Campaign") -> None:

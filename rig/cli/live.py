@@ -1,12 +1,15 @@
 """`rig live`: grip torque, or the forces of a grasper, in the terminal."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, remarks, results
+
+if TYPE_CHECKING:
+    from rig.live.web_server import PageServer
 
 
 def live(
@@ -39,6 +42,16 @@ def live(
     foxglove_port: Annotated[
         int, typer.Option(min=1, max=65535, help="Port of the Foxglove server.")
     ] = 8765,
+    web: Annotated[
+        bool, typer.Option("--web", help="Also serve a page for a browser on this computer.")
+    ] = False,
+    host: Annotated[
+        str | None,
+        typer.Option(help="With --web: this computer's address in a network, for a tablet."),
+    ] = None,
+    web_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
+    ] = 8766,
     json_: JsonFlag = False,
 ) -> int:
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
@@ -46,11 +59,11 @@ def live(
     A simulated rig plays a default protocol; a real rig is never moved without
     --protocol. Ctrl-C quits, with the rig in its safe state and exit code 130. With --json, one
     object per line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m
-    marks it, q quits.
+    marks it, s stops the rig, q quits.
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
-    from rig.errors import ExitCode
+    from rig.errors import ExitCode, UsageError
     from rig.live.estimator import estimators_of, half_widths_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
@@ -63,6 +76,8 @@ def live(
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 
+    if host and not web:
+        raise UsageError("--host is an address of the page.", fix="Add --web.")
     settings = chosen_rig(config, sim)
     refuse_problems(settings)
     remarks().print(f"{settings.name}: starting ...")
@@ -73,13 +88,14 @@ def live(
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     models = [estimator.model for estimator in estimators if estimator.model is not None]
+    page = _page(host, web_port) if web else None
     with pressed_keys() as keys:
         blocks = session_blocks(
             settings,
             lambda: open_logger(settings, pace=pace or None),
             plans,
             estimators,
-            keys or no_keys,
+            lambda: (keys or no_keys)() + (page.pressed() if page else ""),
             out,
         )
         blocks = with_joint_forces(blocks)
@@ -88,9 +104,10 @@ def live(
         if len(models) == 1:
             blocks = watched(blocks, models[0])
         if foxglove:
-            from rig.live.foxglove import published
+            from rig.live.foxglove import LAYOUT, published
 
             blocks = published(blocks, foxglove_port)
+            remarks().print(f"Foxglove: ws://localhost:{foxglove_port}, layout {LAYOUT}")
         options = ShowOptions(
             title=f"rig live: {settings.name}",
             channels=shown_channels(estimators, machine.shown),
@@ -100,5 +117,22 @@ def live(
             half_widths=half_widths_of(estimators),
             footer=HELP if keys else "Ctrl-C quits",
         )
+        if page:
+            from rig.live.web import shown_on
+
+            blocks = shown_on(page, blocks, options)
         summary = show(until(blocks, duration), options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
+
+
+def _page(host: str | None, port: int) -> "PageServer":
+    """Return the server of the page; its address is written for the user."""
+    from rig.live.web import HOST, open_page
+
+    page = open_page(host or HOST, port)
+    remarks().print(f"Page: {page.url}", soft_wrap=True)
+    if host:
+        remarks().print(
+            "Whoever has this address can stop the rig, tare and record. It is not encrypted."
+        )
+    return page

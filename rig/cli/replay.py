@@ -1,6 +1,7 @@
 """`rig replay LOG`: the live display on a recording, with any model."""
 
 import math
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -36,18 +37,31 @@ def replay(
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of LOG; detected by default.")
     ] = None,
+    core: Annotated[
+        bool,
+        typer.Option("--core", help="Run the firmware's core again on a simulated log; compare."),
+    ] = False,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="With --core: configuration in place of the log's."),
+    ] = None,
 ) -> int:
     """Play back a recording in the live display, with the estimate of any model.
 
     Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
-    a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130.
+    a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130. In a terminal, keys:
+    space pauses, + and - change the speed, f skips 5 s, q quits. With --core nothing is
+    shown: the exit code is 1 when a sample is not the same, bit for bit.
     """
+    if core:
+        return _core(log, config, json_)
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import half_widths_of, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
+    from rig.live.keys import pressed_keys
     from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
-    from rig.live.replay import replay_blocks
+    from rig.live.replay import HELP, Pace, replay_blocks
     from rig.live.run import show
     from rig.live.watching import watched
     from rig.machines.recordings import open_recordings
@@ -68,14 +82,41 @@ def replay(
         plain=plain,
         json=json_,
     )
-    blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None))
     models = [estimator.model for estimator in estimators if estimator.model is not None]
-    if estimators:
-        blocks = with_model_status(blocks, estimators)
-    if len(models) == 1:
-        blocks = watched(blocks, models[0])
-    summary = show(blocks, options, results(json_))
+    with pressed_keys() as keys:
+        pace = Pace(speed or None, keys) if keys else None
+        blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None, pace=pace))
+        if estimators:
+            blocks = with_model_status(blocks, estimators)
+        if len(models) == 1:
+            blocks = watched(blocks, models[0])
+        options = replace(options, footer=HELP if keys else options.footer)
+        summary = show(blocks, options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
+
+
+def _core(log: Path, config: Path | None, json: bool) -> int:
+    """Run the core again with a log's commands."""
+    from rig.configuration.config import load_config
+    from rig.output.console import emit_json
+    from rig.recording.core_replay import replay_core
+
+    found = replay_core(log, load_config(config) if config else None)
+    screen = results(json)
+    if not found.is_same_core:
+        remarks().print(f"The log is of core {found.core}; the one in use is another build.")
+    screen.print(
+        f"{found.same} of {found.samples} samples are the same, bit for bit,"
+        f" from {found.commands} bytes of commands.",
+        markup=False,
+    )
+    if found.trips:
+        screen.print(f"The board tripped: {', '.join(found.trips)}.", markup=False)
+    if found.first_difference:
+        screen.print(f"First difference: {found.first_difference}.", markup=False)
+    if json:
+        emit_json({"passed": found.passed, **asdict(found)})
+    return 0 if found.passed else 1
 
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":

@@ -46,7 +46,7 @@ def problems(config: Config) -> list[Problem]:
         p for name, section in sections.items() for p in _driver_problems(name, section, known)
     ]
     carried_by = settings_of(config.logger.profile).drivers
-    if config.logger.driver not in carried_by:
+    if carried_by is not None and config.logger.driver not in carried_by:
         what = f"The driver {config.logger.driver} cannot run a {config.logger.profile}."
         fix = " or ".join(f'driver = "{name}"' for name in carried_by)
         found.append(Problem(LOGGER, what, f"Write {fix}."))

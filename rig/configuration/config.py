@@ -13,6 +13,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
@@ -60,8 +61,8 @@ class Config(Section):
 
     name: str
     logger: LoggerSection
-    controller: ControllerSection
-    limits: SerializeAsAny[LimitsSection]
+    controller: ControllerSection = ControllerSection(kp=0, ki=0, kd=0, velocity_filter=1)
+    limits: SerializeAsAny[LimitsSection] = Field(default=LimitsSection(), validate_default=True)
     safety: SafetySection = SafetySection()
     plausibility: PlausibilitySection = PlausibilitySection()
     drift: SerializeAsAny[DriftSection] = Field(default=DriftSection(), validate_default=True)
@@ -87,12 +88,21 @@ class Config(Section):
         settings = settings_of(profile)
         kinds = {"limits": settings.limits, "drift": settings.drift, "machine": settings.own}
         kind = kinds[str(info.field_name)]
-        if isinstance(value, dict) and value and not set(value) & set(kind.model_fields):
+        takes_any = kind.model_config.get("extra") == "allow"
+        known = set(kind.model_fields)
+        if isinstance(value, dict) and value and not takes_any and not set(value) & known:
             raise ValueError(
                 f"[{info.field_name}] are not those of [logger] profile = {profile!r}, which has "
                 + (", ".join(kind.model_fields) or "none")
             )
         return kind.model_validate(value.model_dump() if isinstance(value, Section) else value)
+
+    @model_validator(mode="after")
+    def _has_a_controller(self) -> "Config":
+        moves = settings_of(self.logger.profile).moves
+        if moves and "controller" not in self.model_fields_set:
+            raise ValueError(f"[controller] is missing: a {self.logger.profile} has motors")
+        return self
 
     @property
     def reference_limits(self) -> ReferenceLimits:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
-from rig.configuration.sections import MACHINE_SETTINGS, Angle, Current, Section, Torque
+from rig.configuration.sections import MACHINE_SETTINGS, Angle, Current, Positive, Section, Torque
 from rig.errors import UsageError
 
 
@@ -31,14 +31,16 @@ class MachineSettings:
     Attributes:
         limits: The table `[limits]`.
         drift: The table `[drift]`.
-        drivers: Values of `[logger] driver` that can move and sample it.
+        drivers: Values of `[logger] driver` that can move and sample it; None for any driver.
         own: The table `[machine]`.
+        moves: Whether it has motors, and so needs the table `[controller]`.
     """
 
     limits: type[LimitsSection]
     drift: type[DriftSection]
-    drivers: tuple[str, ...]
+    drivers: tuple[str, ...] | None
     own: type[OwnSection] = OwnSection
+    moves: bool = True
 
 
 def settings_of(profile: str) -> MachineSettings:
@@ -80,3 +82,25 @@ class ReferenceDrift(DriftSection):
 
 
 REFERENCE = MachineSettings(ReferenceLimits, ReferenceDrift, ("teensy", "teensy-can", "epos4"))
+
+
+class SensorLimits(LimitsSection):
+    """Limits of any channels of a device without motors."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Positive]
+
+
+class DriveLimits(ReferenceLimits):
+    """Limits of a drive, whose shaft counts as the spindle, and of any other of its channels."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Positive]
+
+    proximal_torque_n_m: Torque = 100.0
+    distal_torque_n_m: Torque = 100.0
+    load_command_a: float = Field(default=0.0, ge=0, le=0)
+
+
+DRIVE = MachineSettings(DriveLimits, ReferenceDrift, None)
+SENSOR = MachineSettings(SensorLimits, DriftSection, None, moves=False)

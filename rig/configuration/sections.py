@@ -45,7 +45,8 @@ class LoggerSection(Section):
 
     Attributes:
         driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
-            on CANopen whose position loop runs in this computer.
+            on CANopen whose position loop runs in this computer; with the profiles `drive` and
+            `sensor` any driver, such as `dynamixel`.
         url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
             `can:...`.
         options: The driver's own options.
@@ -55,7 +56,7 @@ class LoggerSection(Section):
             `rig.machine_settings`, such as the reference rig or the 3-DOF grasper.
     """
 
-    driver: Literal["teensy", "teensy-can", "epos4"] = "teensy"
+    driver: str = "teensy"
     url: str
     profile: Profile = "reference"
     options: dict[str, Any] = Field(default_factory=dict)

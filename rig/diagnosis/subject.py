@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimation import model_file
+from estimation import model_file, plant_file
 from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
+from estimation.derived import measured_channels
 from estimation.model import Model
 from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared
@@ -16,12 +17,6 @@ from rig.importers.registry import open_campaign
 from rig.machines.moving import with_motion
 from rig.machines.recordings import open_recordings
 from rig.machines.shipped import read_machine
-
-WRIST = ("wrist_grasp", "wrist_pitch", "wrist_yaw")
-"""Those that declare the kinematics of a grasper with three degrees of freedom."""
-
-GRASPER = Path("grasper")
-"""Shipped models of the force at each axis of such a grasper, from its motor's current."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +38,12 @@ def subject(
     balance: str | None = None,
     format_name: str | None = None,
     machine: Path | None = None,
+    skip_bad: bool = False,
 ) -> Subject:
     """Return the recordings at a path and their declared models.
 
     Without a model, raw logs of a calibration are declared by that calibration, an arm's by its
-    joints, and others by the shipped models of the rig that has their channels.
+    joints, and others by the rig of this project whose equations the channels allow.
 
     Args:
         path: File, folder or archive of recordings.
@@ -56,6 +52,7 @@ def subject(
         format_name: Importer to use; guessed when None.
         machine: A machine file or the name of a shipped machine: its equations are declared, and
             foreign tables are read as it states.
+        skip_bad: Exclude runs that cannot be read, with the reason.
 
     Raises:
         UsageError: The path does not exist, or no model of that equation is declared.
@@ -68,26 +65,25 @@ def subject(
             models = _of(declared_of(read_machine(machine)), balance)
         else:
             models = declared_models(model, balance)
-        return Subject(with_motion(open_recordings(path, machine, format_name), models), models)
+        return Subject(
+            with_motion(open_recordings(path, machine, format_name, skip_bad), models), models
+        )
     if model is not None:
         models = declared_models(model, balance)
-        return Subject(open_campaign(path, format_name), models)
+        return Subject(open_campaign(path, format_name, skip_bad), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
-    of_grasper = {m.balance for m in (*_shipped(WRIST), *model_file.read_all(GRASPER))}
-    if balance is not None and not balance.startswith("joint.") and balance not in of_grasper:
-        models = declared_models(None, balance)
-        return Subject(open_campaign(path, format_name), models)
-    campaign = open_campaign(path, format_name)
+    rigs = _rigs()
+    if balance is not None and not balance.startswith("joint."):
+        rigs = [_of(r, balance) for r in rigs if balance in {m.balance for m in r}]
+        rigs = rigs or [_of(model_file.reference_rig(), balance)]
+    campaign = open_campaign(path, format_name, skip_bad)
     first = next(iter(campaign.evidence), None)
     arm = None if first is None else balances_of(first)
     if arm is not None:
         return Subject(campaign, _of(arm.models, balance))
-    there = set() if first is None else set(first.columns)
-    for models in (_shipped(WRIST), model_file.read_all(GRASPER)):
-        if {model.target for model in models} <= there:
-            return Subject(campaign, _of(models, balance))
-    return Subject(campaign, _of(model_file.reference_rig(), balance))
+    there = set() if first is None else {"time_s", *first.columns}
+    return Subject(campaign, max(rigs, key=lambda rig: sum(_reads(m) <= there for m in rig)))
 
 
 def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
@@ -111,8 +107,14 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     return _of(models, balance)
 
 
-def _shipped(names: Sequence[str]) -> list[Model]:
-    return [model_file.read(Path(name)) for name in names]
+def _rigs() -> list[list[Model]]:
+    """Return the equations of the rigs of this project, those of the reference rig first."""
+    others = [name for name in plant_file.shipped() if name != "reference"]
+    return [declared_of(plant_file.shipped_plant(name)) for name in ("reference", *others)]
+
+
+def _reads(model: Model) -> set[str]:
+    return set(measured_channels([*model.channels, model.target], model.signals))
 
 
 def _of(models: Sequence[Model], balance: str | None) -> list[Model]:

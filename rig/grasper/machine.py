@@ -8,6 +8,7 @@ between them, so jaw 1 turns by pitch + grasp / 2 and jaw 2 closes by grasp / 2 
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,15 @@ class GrasperMachine:
     }
     here_channels = tuple(f"{axis}_angle_rad" for axis in AXES)
     shown = ("grasp_force_n", "pitch_force_n", "yaw_force_n")
+
+    @classmethod
+    def of(cls, config: Config) -> Self:
+        """Return the machine, the same for every configuration."""
+        return cls()
+
+    def at(self, rate_hz: float) -> Self:
+        """Return itself: its board has one rate."""
+        return self
 
     def first_look(self, config: Config) -> str:
         """Return the grasper's own protocol."""

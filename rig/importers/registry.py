@@ -5,6 +5,7 @@ path without reading the samples, and opens it as a campaign of run handles. Wha
 format, a run that is read is checked for channels that contradict their derivatives.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -12,11 +13,12 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, Run
+from estimation.errors import EstimationError
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
-from rig.importers.one_rig import of_one_rig
+from rig.importers.one_rig import MixedRunsError, of_one_rig
 
 
 @runtime_checkable
@@ -69,7 +71,7 @@ def _loaded(entry: EntryPoint) -> Importer:
     return importer
 
 
-def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
+def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = False) -> Campaign:
     """Open recordings of any known format.
 
     The runs are of one rig and one instrument: reading one that is not raises MixedRunsError.
@@ -77,6 +79,7 @@ def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
     Args:
         path: File, folder or archive.
         format_name: Importer to use; guessed from the path when None.
+        skip_bad: Read every run once, and exclude those that cannot be read, with the reason.
 
     Raises:
         UsageError: The path does not exist, or the format is not known.
@@ -84,9 +87,19 @@ def open_campaign(path: Path, format_name: str | None = None) -> Campaign:
             run raises it where a channel and its derivative differ by a factor, a sign or a shift.
     """
     campaign = _opened(path, format_name)
-    return replace(
-        campaign, runs=tuple(replace(run, load=partial(_read, run.load)) for run in campaign.runs)
-    )
+    runs = [replace(run, load=partial(_read, run.load)) for run in campaign.runs]
+    return Campaign(tuple(map(_or_excluded, runs) if skip_bad else runs))
+
+
+def _or_excluded(run: Run) -> Run:
+    """Return a run, excluded where reading it shows that it is damaged."""
+    try:
+        run.load()
+    except MixedRunsError:
+        raise  # which of the rigs is meant is for the user to say
+    except (DataError, EstimationError) as error:
+        return replace(run, excluded=run.excluded or f"{error.what} {error.why}".strip())
+    return run
 
 
 def _read(load: Callable[[], Recording]) -> Recording:
@@ -107,7 +120,17 @@ def _opened(path: Path, format_name: str | None) -> Campaign:
         if importer.recognises(path):
             return of_one_rig(importer.open(path))
     raise DataError(
-        f"No importer recognises {path}.",
-        f"Tried: {', '.join(known)}.",
-        "Name the format with --format if the file is one of these.",
+        f"{path} holds no recording that rig reads by itself.",
+        f"{_content(path)} Tried: {', '.join(known)}.",
+        "A table of another layout: rig import. One of these formats: name it with --format.",
     )
+
+
+def _content(path: Path) -> str:
+    """Describe the files at a path."""
+    if not path.is_dir():
+        return ""
+    endings = Counter(file.suffix or "no ending" for file in path.iterdir() if file.is_file())
+    if not endings:
+        return "The folder holds no file."
+    return f"Its files: {', '.join(f'{n} {ending}' for ending, n in endings.most_common(4))}."

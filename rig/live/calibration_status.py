@@ -8,6 +8,7 @@ from calibration.rules import judge_range
 from calibration.store import active_lines
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus
+from rig.live.text import counted
 from rig.machines.reading import Reading
 
 NAME = "calibration"
@@ -50,5 +51,5 @@ class CalibrationStatus:
             return f"{self._set_name}, no records of this rig"
         oldest = max(self._records, key=lambda record: self._now - record.made)
         days = (self._now - oldest.made) / timedelta(days=1)
-        count = len(self._records)
-        return f"{self._set_name}, {count} records, oldest {days:.0f} days ({oldest.channel})"
+        count, age = len(self._records), counted(round(days), "day")
+        return f"{self._set_name}, {counted(count, 'record')}, oldest {age} ({oldest.channel})"

@@ -107,7 +107,7 @@ def models_in_use(path: Path) -> list[Model]:
     """
     models = model_file.read_all(path)
     of_axes = [model for model in models if model.target in AXES]
-    if not of_axes and models[0].signals != reference():
+    if not of_axes and models[0].signals.rest != reference().rest:
         return list({model.target: model for model in reversed(models)}.values())[::-1]
     return of_axes or models[:1]
 

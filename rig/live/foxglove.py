@@ -5,6 +5,7 @@ Needs the extra `viz`. The server listens on the loopback address only, and only
 
 import time
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig.errors import MissingExtraError, UsageError
 from rig.live.block import SampleBlock
 
 HOST, PORT = "127.0.0.1", 8765
+LAYOUT = Path(__file__).with_name("foxglove.layout.json")
 RATE_HZ = 100.0
 """Samples a second that are sent: a display needs no more."""
 

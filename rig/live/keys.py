@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-TARE, MARK, RECORD, LEAVE = "t", "m", "r", "q"
-HELP = "t tare  m mark  r record  q quits"
+TARE, MARK, RECORD, STOP, LEAVE = "t", "m", "r", "s", "q"
+HELP = "t tare  m mark  r record  s stop  q quits"
 
 Keys = Callable[[], str]
 """Gives the keys pressed since it was last asked; empty when there are none."""

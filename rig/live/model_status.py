@@ -58,7 +58,7 @@ class ModelStatus:
         if self._days is None:
             return DeviceStatus(NAME, "ok", "within its fit, which has no date")
         state = "stale" if self._days > STALE_DAYS else "ok"
-        return DeviceStatus(NAME, state, f"fitted {self._days:.0f} days ago")
+        return DeviceStatus(NAME, state, f"fitted {words.counted(round(self._days), 'day')} ago")
 
 
 def with_model_status(

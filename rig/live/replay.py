@@ -10,7 +10,12 @@ import numpy as np
 from estimation.recording import Flag, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
+from rig.live.keys import LEAVE, Keys, no_keys
 
+HELP = "space pause  + faster  - slower  f skip 5 s  q quits"
+SKIP_S = 5.0
+SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
+"""A shorter wait is none; keys are read at least as often as the longer one."""
 ESTIMATED = "estimated_"
 """A column so prefixed holds the estimate that was made while recording."""
 
@@ -31,8 +36,7 @@ def replay_blocks(
     estimators: Sequence[EstimateStream],
     speed: float | None,
     block_s: float = 0.05,
-    sleep: Callable[[float], None] = time.sleep,
-    clock: Callable[[], float] = time.monotonic,
+    pace: "Pace | None" = None,
 ) -> Iterator[SampleBlock]:
     """Yield a recording block by block, at the pace of its own clock or faster.
 
@@ -44,8 +48,7 @@ def replay_blocks(
         estimators: Streams that have seen nothing yet; none for none.
         speed: Times real time; None for as fast as it can be read.
         block_s: Time a block covers, s.
-        sleep: Waits, s.
-        clock: Monotonic time, s.
+        pace: Waits for each block, and obeys keys; None for the speed alone.
 
     Raises:
         DataError: The run holds no samples.
@@ -55,19 +58,18 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, estimators, speed, block_s, sleep, clock)
+    return _blocks(recording, estimators, pace or Pace(speed), block_s)
 
 
 def _blocks(
     recording: Recording,
     estimators: Sequence[EstimateStream],
-    speed: float | None,
+    pace: "Pace",
     block_s: float,
-    sleep: Callable[[float], None],
-    clock: Callable[[], float],
 ) -> Iterator[SampleBlock]:
     lost = lost_samples(recording)
-    start_s, began_s = float(recording.time_s[0]), clock()
+    start_s = float(recording.time_s[0])
+    pace.wait_for(start_s)
     block_of = np.floor((recording.time_s - start_s) / block_s)
     edges = [0, *(np.flatnonzero(np.diff(block_of)) + 1).tolist(), len(recording)]
     for first, last in itertools.pairwise(edges):
@@ -81,11 +83,9 @@ def _blocks(
         }
         for estimator in estimators:
             estimates[estimator.target_channel] = estimator.push(columns, time_s)
-        if speed is not None:
-            # against the clock and not from block to block, so that small delays do not add up
-            wait_s = (float(time_s[-1]) - start_s) / speed - (clock() - began_s)
-            if wait_s > 0:
-                sleep(wait_s)
+        pace.wait_for(float(time_s[-1]))
+        if pace.is_left:
+            return
         yield SampleBlock(
             time_s=time_s,
             columns=columns,
@@ -94,6 +94,61 @@ def _blocks(
             lost=int(lost[last - 1]),
             devices=(_status(recording, float(time_s[0]), float(time_s[-1])),),
         )
+
+
+class Pace:
+    """Speed of a replay, changed by keys: space pauses, + and - double and halve, f skips 5 s.
+
+    Args:
+        speed: Times real time; None for as fast as it can be read.
+        keys: Keys pressed since it was last asked.
+        sleep: Waits, s.
+        clock: Monotonic time, s.
+    """
+
+    def __init__(
+        self,
+        speed: float | None,
+        keys: Keys = no_keys,
+        sleep: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._speed, self._keys, self._sleep, self._clock = speed, keys, sleep, clock
+        self._is_paused = False
+        self._skip_to_s = -np.inf
+        self._from_s: tuple[float, float] | None = None
+        self.is_left = False
+
+    def wait_for(self, time_s: float) -> None:
+        """Wait until a time of the recording is due, or a person quits."""
+        while True:
+            self._obey(time_s)
+            wait_s = LONGEST_WAIT_S if self._is_paused else self._wait_s(time_s)
+            if self.is_left or wait_s < SHORTEST_WAIT_S:
+                return
+            self._sleep(min(wait_s, LONGEST_WAIT_S))
+
+    def _wait_s(self, time_s: float) -> float:
+        """Return the wait by the clock, not from block to block: small delays do not add up."""
+        if self._speed is None or time_s < self._skip_to_s:
+            self._from_s = None
+            return 0.0
+        if self._from_s is None:
+            self._from_s = time_s, self._clock()
+        begun_s, began_s = self._from_s
+        return (time_s - begun_s) / self._speed - (self._clock() - began_s)
+
+    def _obey(self, time_s: float) -> None:
+        for key in self._keys():
+            self._from_s = None
+            if key == LEAVE:
+                self.is_left = True
+            elif key == " ":
+                self._is_paused = not self._is_paused
+            elif key == "f":
+                self._skip_to_s = time_s + SKIP_S
+            elif key in "+-" and self._speed is not None:
+                self._speed *= 2.0 if key == "+" else 0.5
 
 
 def lost_samples(recording: Recording) -> FloatArray:

@@ -4,6 +4,8 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
+from itertools import chain
 
 from rich.console import Console
 
@@ -12,6 +14,9 @@ from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Summary
 from rig.live.writers import Writer, choose_writer
+
+MOST_SHOWN = 6
+"""Channels shown of a device whose main ones are not known."""
 
 
 def show(
@@ -32,12 +37,16 @@ def show(
         console: Console of the user.
         clock: Monotonic time, s; only for silence and for frames that cost too much.
     """
+    close = getattr(blocks, "close", None)
+    if not options.channels:  # whatever the device measures
+        first = next(blocks)
+        options = replace(options, channels=tuple(first.columns)[:MOST_SHOWN])
+        blocks = chain([first], blocks)
     state = LiveState(options.channels)
     writer = choose_writer(options, console, clock)
     ended = "finished"
     with ExitStack() as stack:
         stack.enter_context(writer.running())
-        close = getattr(blocks, "close", None)
         if close is not None:
             stack.callback(close)
         try:

@@ -13,7 +13,7 @@ from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.calibration_status import CalibrationStatus
-from rig.live.keys import LEAVE, MARK, RECORD, TARE, Keys, no_keys
+from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
 from rig.live.replay import EstimateStream
 from rig.machines.machine import MachinePlan
 from rig.machines.reading import Reading
@@ -49,7 +49,7 @@ def session_blocks(
             session.take_zeros(ZERO_S)
         calibrations = CalibrationStatus(config, session.calibrations.name)
         with closing(_Hand(session, keys, folder)) as hand:
-            for reading in _readings(session, plans):
+            for reading in _readings(session, plans, hand):
                 hand.obey(reading)
                 if hand.leaves:
                     return
@@ -59,7 +59,7 @@ def session_blocks(
 
 
 class _Hand:
-    """Actions of the keys in a session: tare, mark, record, quit."""
+    """Actions of the keys in a session: tare, mark, record, stop, quit."""
 
     def __init__(self, session: Session, keys: Keys, folder: Path) -> None:
         self._session = session
@@ -67,12 +67,16 @@ class _Hand:
         self._recorder = LiveRecorder(session, folder)
         self._said = ""
         self.leaves = False
+        self.stopped = False
 
     def obey(self, reading: Reading) -> None:
         """Do what the keys pressed since the last reading ask for, and record."""
         for key in self._keys():
             if key == LEAVE:
                 self.leaves = True
+            elif key == STOP:
+                self._session.safe()  # raises unless the board confirms it
+                self.stopped = True
             elif key == TARE:
                 self._tare(reading)
             elif key == RECORD:
@@ -86,9 +90,13 @@ class _Hand:
     def status(self) -> tuple[DeviceStatus, ...]:
         """Return the message for the user."""
         said = ", ".join(part for part in (self._recorder.said, self._said) if part)
-        if not said:
-            return ()
-        return (DeviceStatus("recording", "on" if self._recorder.is_on else "off", said),)
+        found = []
+        if self.stopped:
+            found.append(DeviceStatus("stop", "disarmed", "confirmed by the board"))
+        if said:
+            state = "on" if self._recorder.is_on else "off"
+            found.append(DeviceStatus("recording", state, said))
+        return tuple(found)
 
     def close(self) -> None:
         """Close a log that is open."""
@@ -104,9 +112,13 @@ class _Hand:
             self._said = "tared"
 
 
-def _readings(session: Session, plans: Sequence[MachinePlan]) -> Iterator[Reading]:
+def _readings(session: Session, plans: Sequence[MachinePlan], hand: _Hand) -> Iterator[Reading]:
+    """Play the runs; once the rig is stopped it is only watched."""
     for plan in plans:
-        yield from session.play(*session.machine.motion(plan, session.here).setpoints)
+        for reading in session.play(*session.machine.motion(plan, session.here).setpoints):
+            yield reading
+            if hand.stopped:
+                yield from session.watch()
     if not plans:
         yield from session.watch()
 

@@ -97,6 +97,11 @@ def error_rms(reading: Reading) -> str:
     return f"error rms {with_unit(Value(reading.error_rms), reading.unit)} in 5 s"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words: `1 day`, `2 days`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def rate(snapshot: Snapshot) -> str:
     """Return the sample rate in words."""
     if snapshot.sample_rate_hz is None:
@@ -120,6 +125,11 @@ def limit_share(limit: LimitStatus) -> float | None:
     """Return how much of the limit is used, 1 at the limit, or None when that is unknown."""
     share = abs(limit.value) / limit.limit if limit.limit > 0 else math.nan
     return share if math.isfinite(share) else None
+
+
+def limit_style(share: float | None) -> str:
+    """Return the style of a limit by the share of it that is used."""
+    return "bad" if share is None or share >= 1 else "warning" if share >= 0.8 else "good"
 
 
 def limit_words(limit: LimitStatus) -> str:

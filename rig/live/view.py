@@ -114,17 +114,17 @@ def _headline(
         yield from (name, number)
     digits = words.digits(value, reading.unit)
     large = big(digits) if digits is not None else ["", "  ▀▀▀ ▀▀▀ ▀▀▀", ""]
-    beside = list(_beside(reading, source, value, lever_m))
+    notes = list(beside(reading, source, value, lever_m))
     if width < WIDE:
         yield from (_styled(line, source) for line in large)
-        yield from (_styled(line) for line in beside if line)
+        yield from (_styled(line) for line in notes if line)
         return
-    for line, note in zip(large, beside, strict=True):
+    for line, note in zip(large, notes, strict=True):
         # the column is wide enough for -999.9, so that the notes stand still
         yield _styled(f"{line:<24}", source).append(note, style="default")
 
 
-def _beside(reading: Reading, source: str, value: Value, lever_m: float) -> Iterator[str]:
+def beside(reading: Reading, source: str, value: Value, lever_m: float) -> Iterator[str]:
     """Yield three notes on the main number: the force at the tip, the sensor, the error."""
     force_n = words.tip_force_n(reading, value, lever_m)
     if reading.channel != words.TIP_CHANNEL:
@@ -206,7 +206,7 @@ def _urgency(share: float | None) -> float:
 def _limit(limit: LimitStatus, width: int) -> Text:
     """Return a limit as a bar and in numbers; the bar gives way in a narrow terminal."""
     share = words.limit_share(limit)
-    style = "bad" if share is None or share >= 1 else "warning" if share >= 0.8 else "good"
+    style = words.limit_style(share)
     line = _styled(f"{limit.name} ")
     if width >= WIDE:
         filled = round(20 * min(share or 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""The two streams of a run: samples in SI units, and the raw counts they were made from.
+"""The streams of a run: samples in SI units, the raw counts they were made from, and commands.
 
 Both carry the sequence number, so that a sample finds its counts. The SI stream is what people and
 programs read; the counts are kept so that a log can be read again with another calibration.
@@ -11,7 +11,10 @@ from rig.log.schema import Field, Stream
 
 SAMPLE = "/rig/sample"
 COUNTS = "/rig/counts"
+FLIGHT = "/rig/flight"
 RATE_HZ = 1000.0
+FLIGHT_BYTES = 56
+"""Bytes of commands in one message."""
 
 COUNTS_STREAM = Stream(
     COUNTS,
@@ -34,6 +37,21 @@ COUNTS_STREAM = Stream(
     RATE_HZ,
 )
 """The logger's raw counts with their raw signs."""
+
+
+FLIGHT_STREAM = Stream(
+    FLIGHT,
+    "rig_msgs/msg/Flight",
+    (
+        *(
+            Field(f"word_{k}", "uint64", "", "bytes sent to the board, little-endian")
+            for k in range(FLIGHT_BYTES // 8)
+        ),
+        Field("tick_us", "uint64", "", "device clock when they were sent, without its wrap"),
+        Field("size", "uint8", "", "bytes used"),
+    ),
+)
+"""What the host sent to the board since the session began."""
 
 
 def sample_stream(channels: Sequence[str], rate_hz: float | None = RATE_HZ) -> Stream:

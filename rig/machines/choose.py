@@ -19,7 +19,7 @@ def machine_of(config: Config) -> Machine:
     Raises:
         UsageError: No machine is installed for the profile of its logger.
     """
-    machine: Machine = installed(MACHINES, config.logger.profile)()
+    machine: Machine = installed(MACHINES, config.logger.profile).of(config)
     return machine
 
 

@@ -1,7 +1,7 @@
 """The interface of a machine to a session, the same for every kind of rig."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,15 @@ class Machine(Protocol):
         here_channels: Channels whose values say where it stands, in the order of its setpoints.
         shown: Channels the live display shows, the main one first.
     """
+
+    @classmethod
+    def of(cls, config: Config) -> Self:
+        """Return the machine of a configuration."""
+        ...
+
+    def at(self, rate_hz: float) -> Self:
+        """Return the machine with the rate that its device really has."""
+        ...
 
     @property
     def profile(self) -> Profile: ...  # noqa: D102

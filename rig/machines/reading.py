@@ -86,6 +86,8 @@ def reading_of(
     flags = np.zeros(len(status), np.uint8)
     flags[has_status(status, STATUS_SATURATED)] |= np.uint8(Flag.SATURATED)
     flags[tripped] |= np.uint8(Flag.SUSPECT)
+    if "flags" in (batch.samples.dtype.names or ()):  # a device's own
+        flags |= batch.samples["flags"]
     return Reading(
         batch.samples,
         batch.tick_us,

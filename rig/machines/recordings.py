@@ -12,7 +12,10 @@ from rig.machines.shipped import place_of
 
 
 def open_recordings(
-    path: Path, machine: Path | None = None, format_name: str | None = None
+    path: Path,
+    machine: Path | None = None,
+    format_name: str | None = None,
+    skip_bad: bool = False,
 ) -> Campaign:
     """Open recordings, those of a foreign table by the machine file's `[data]`.
 
@@ -20,6 +23,7 @@ def open_recordings(
         path: File, folder or archive.
         machine: Machine file or the name of a shipped one; None for the reference rig.
         format_name: Importer to use; found from the path when None.
+        skip_bad: Exclude runs that cannot be read, with the reason. Not of a foreign table.
 
     Raises:
         UsageError: The path does not exist, or the format is not known.
@@ -27,10 +31,10 @@ def open_recordings(
         NoPlantError: No such machine.
     """
     if machine is None or format_name is not None or LogImporter().recognises(path):
-        return open_campaign(path, format_name)
+        return open_campaign(path, format_name, skip_bad)
     file = place_of(machine)
     if not has_data(file):
-        return open_campaign(path)
+        return open_campaign(path, None, skip_bad)
     return open_table(path, read_mapping(file, ()))
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,17 @@ class ReferenceMachine:
         "load_ma": "load_command_a",
     }
     here_channels = ("spindle_angle_rad",)
-    shown = ("distal_torque_n_m",)
+    shown: tuple[str, ...] = ("distal_torque_n_m",)
     board_limits = staticmethod(board_limits)
+
+    @classmethod
+    def of(cls, config: Config) -> Self:
+        """Return the machine, the same for every configuration."""
+        return cls()
+
+    def at(self, rate_hz: float) -> Self:
+        """Return itself: its board has one rate."""
+        return self
 
     def first_look(self, config: Config) -> str:
         """Return the quick protocol, without load if the rig lacks a load motor."""

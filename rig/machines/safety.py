@@ -50,10 +50,16 @@ class InCounts:
         return min(TOP, round(heat_a2_s / line.slope**2)) if heat_a2_s else TOP
 
 
-def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
+def board_limits(config: Config, calibrations: CalibrationSet, period_s: float = TICK_S) -> Limits:
     """Return the limits the board holds against every sample itself, in its own counts.
 
     A channel that the rig does not have is not limited.
+
+    Args:
+        config: The configuration.
+        calibrations: Counts to SI.
+        period_s: Time between two samples. The core judges a motion by the ticks that passed, and
+            counts samples.
     """
     limits, safety = config.reference_limits, config.safety
     counts = InCounts(calibrations)
@@ -88,31 +94,31 @@ def board_limits(config: Config, calibrations: CalibrationSet) -> Limits:
         load_i2t=counts.heat("load_command_a", safety.load_heat_a2_s),
         max_motor_step=max_motor_step,
         max_motor_jump=jump_limit(max_motor_step),
-        max_target_step=target_step(size, safety.motor_speed_rad_s, config.plausibility.gear_ratio),
+        max_target_step=target_step(
+            size, safety.motor_speed_rad_s * period_s, config.plausibility.gear_ratio
+        ),
         continuous_current=size("motor_current_a", safety.continuous_current_a),
         i2t=counts.heat("motor_current_a", safety.heat_a2_s),
         stall_current=size("motor_current_a", safety.stall_current_a),
         stall_motion=size("motor_angle_rad", safety.stall_motor_angle_rad),
-        **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, TICK_S),
+        **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, period_s),
         **pair_limits(config.plausibility, calibrations),
-        stall_ticks=ticks_of(safety.stall_s, TICK_S),
-        saturated_ticks=ticks_of(safety.saturated_s, TICK_S),
-        stale_ticks=ticks_of(safety.stale_s, TICK_S),
-        dry_ticks=ticks_of(safety.dry_s, TICK_S),
-        hold_ticks=ticks_of(safety.hold_s, TICK_S),
+        stall_ticks=ticks_of(safety.stall_s, period_s),
+        saturated_ticks=ticks_of(safety.saturated_s, period_s),
+        stale_ticks=ticks_of(safety.stale_s, period_s),
+        dry_ticks=ticks_of(safety.dry_s, period_s),
+        hold_ticks=ticks_of(safety.hold_s, period_s),
         watchdog_us=round(safety.watchdog_s * 1e6),
         safe_state=SafeState[safety.safe_state.upper()],
         hold_command_e4=round(safety.hold_command_ratio * 1e4),
     )
 
 
-def target_step(
-    size: Callable[[str, float], int], motor_speed_rad_s: float, gear_ratio: float
-) -> int:
+def target_step(size: Callable[[str, float], int], motor_step_rad: float, gear_ratio: float) -> int:
     """Return how far one setpoint of the spindle may be from the next: at the motor's speed."""
     if not gear_ratio:
         return TOP
-    return min(TOP, 1 + size("spindle_angle_rad", motor_speed_rad_s * TICK_S / gear_ratio))
+    return min(TOP, 1 + size("spindle_angle_rad", motor_step_rad / gear_ratio))
 
 
 def ticks_of(duration_s: float, tick_s: float) -> int:

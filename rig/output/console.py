@@ -6,7 +6,8 @@ With `--json` stdout carries JSON alone, and results for people go to stderr.
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -72,6 +73,28 @@ def progress() -> "Progress":
         console=screen,
         disable=not screen.is_terminal,
     )
+
+
+@contextmanager
+def stages() -> "Iterator[Callable[[str], None]]":
+    """Yield what is called with each stage that begins; a terminal shows how long each takes."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    screen = remarks()
+    if not screen.is_terminal:
+        yield lambda what: screen.print(f"{what} ...")
+        return
+    columns = SpinnerColumn(finished_text="-"), TextColumn("{task.description}", markup=False)
+    with Progress(*columns, TimeElapsedColumn(), console=screen) as shown:
+
+        def begin(what: str) -> None:
+            for task in shown.tasks:
+                shown.update(task.id, total=1, completed=1)
+            shown.add_task(what, total=None)
+
+        yield begin
+        for task in shown.tasks:
+            shown.update(task.id, total=1, completed=1)
 
 
 def show_result(

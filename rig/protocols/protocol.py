@@ -164,6 +164,19 @@ class StepHoldRuns(_Table):
             yield _constant_load("hold", start + rise, load, start)
 
 
+class RestRuns(_Table):
+    """Nothing moves once it stands at its start; on a device without motors, nothing at all."""
+
+    kind: Literal["rest"]
+    duration_s: Positive = 10.0
+
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every repeat and start."""
+        for _, start in itertools.product(range(self.repeats), self.jaw_starts_rad):
+            angle = np.full(round(self.duration_s * trajectory.SAMPLE_RATE_HZ), start)
+            yield _constant_load("rest", angle, 0.0, start)
+
+
 class ChirpRuns(_Table):
     """Small grasps that become faster and faster, at each load."""
 
@@ -209,6 +222,7 @@ TABLES: tuple[type[BaseModel], ...] = (
     StepHoldRuns,
     ChirpRuns,
     DwellRuns,
+    RestRuns,
     JointHoldRuns,
     JointSineRuns,
 )
@@ -222,6 +236,7 @@ RunTable = Annotated[
     | StepHoldRuns
     | ChirpRuns
     | DwellRuns
+    | RestRuns
     | JointHoldRuns
     | JointSineRuns,
     Field(discriminator="kind"),

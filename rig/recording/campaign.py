@@ -11,6 +11,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,16 +26,17 @@ from rig import __version__
 from rig.bench.companions import Beside
 from rig.bench.session import Session
 from rig.configuration.config import Config
-from rig.errors import UsageError
+from rig.errors import SafetyTripError, UsageError
 from rig.log.container import Attached
 from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.schema import Stream
-from rig.log.streams import COUNTS, SAMPLE, sample_stream
+from rig.log.streams import COUNTS, FLIGHT_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
 from rig.machines.machine import MachineMotion, MachinePlan
 from rig.machines.reading import Reading
 from rig.protocols.protocol import Protocol
+from rig.recording.flight import FlightStream
 
 MANIFEST = "campaign.json"
 
@@ -206,20 +208,25 @@ def _record_run(
     lost_before = session.counters["lost"]
     samples = 0
     readings = session.play(*motion.setpoints)
+    flight = FlightStream(session)
     first = next(r for r in readings if len(_of_run(r, motion)))
     run_start_us = int(_of_run(first, motion).tick_us[0])
-    with _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log:
+    with (
+        _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log,
+        _crossing_in(log, session, flight, run_start_us, epoch_ns),
+    ):
         for reading in itertools.chain([first], readings):
             run = _of_run(reading, motion)
             beside = {c.stream().topic: c.take() for c in session.companions}
             if len(run):
-                _write_reading(log, session.machine.counts, run, run_start_us, epoch_ns)
+                _write_reading(log, session.raw, run, run_start_us, epoch_ns)
                 line = session.clock.line
                 for topic, block in beside.items():
                     _write_beside(log, topic, block, line, run_start_us, epoch_ns)
                 samples += len(run)
                 if on_progress:
                     on_progress(plan.name, samples, expected)
+            flight.write(log, epoch_ns + run_start_us * 1000)
             log.poll()
         after = session.take_zeros(REST_S)
         drift = drift_verdicts(
@@ -232,6 +239,21 @@ def _record_run(
         result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
         log.close(_end_of_run(result, after, session.counters))
     return result
+
+
+@contextmanager
+def _crossing_in(
+    log: LogWriter, session: Session, flight: FlightStream, run_start_us: int, epoch_ns: int
+) -> Iterator[None]:
+    """Write the samples in which a limit was crossed, too: they end the run."""
+    try:
+        yield
+    except SafetyTripError:
+        newest = session.newest
+        if newest is not None and newest.tick_us[0] > run_start_us:
+            _write_reading(log, session.raw, newest, run_start_us, epoch_ns)
+            flight.write(log, epoch_ns + run_start_us * 1000)
+        raise
 
 
 def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
@@ -270,9 +292,10 @@ def _new_log(
         Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
     ]
     _set_aside(path)
-    raw = session.machine.counts
+    raw = session.raw
     streams = [sample_stream(tuple(calibrations.channels), raw.rate_hz), raw]
     streams += [companion.stream() for companion in session.companions]
+    streams += [FLIGHT_STREAM] if session.flight else []
     return LogWriter(path, info, streams, attachments=attachments)
 
 

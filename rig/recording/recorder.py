@@ -10,9 +10,10 @@ from rig import __version__
 from rig.bench.session import Session
 from rig.log.container import Attached
 from rig.log.run import RunEnd, RunInfo
-from rig.log.streams import COUNTS, SAMPLE, sample_stream
+from rig.log.streams import COUNTS, FLIGHT_STREAM, SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 from rig.machines.reading import Reading
+from rig.recording.flight import FlightStream
 
 
 class LiveRecorder:
@@ -30,11 +31,12 @@ class LiveRecorder:
         self._kind = kind
         self._log: LogWriter | None = None
         self._path: Path | None = None
-        self._raw = session.machine.counts
+        self._raw = session.raw
         self._start_us = 0
         self._start_ns = 0
         self._samples = 0
         self._marks = 0
+        self._flight = FlightStream(session)
         self._newest_s = 0.0
 
     @property
@@ -81,8 +83,10 @@ class LiveRecorder:
         ]
         lines_of = tuple(session.calibrations.channels)
         streams = [sample_stream(lines_of, self._raw.rate_hz), self._raw]
+        streams += [FLIGHT_STREAM] if session.flight else []
         self._log = LogWriter(self._path, info, streams, attachments=attached)
         self._samples = self._marks = 0
+        self._flight = FlightStream(session)
 
     def write(self, reading: Reading) -> None:
         """Write a reading, if a log is open."""
@@ -98,6 +102,7 @@ class LiveRecorder:
         self._log.write(SAMPLE, rows, log_time_ns)
         counts = {field.name: reading.counts[field.name] for field in self._raw.fields}
         self._log.write(COUNTS, counts, log_time_ns)
+        self._flight.write(self._log, int(log_time_ns[0]))
         self._samples += len(reading)
         self._newest_s = float(time_s[-1])
 

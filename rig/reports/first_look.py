@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from estimation.campaign import Campaign
+from estimation.cross_validation import HeldOutError
 from estimation.model import Estimate, Model, balance_channels, estimate
 from estimation.residual import RunResidual, Structure, profile, residuals
 from rig.output import figures
@@ -73,6 +74,15 @@ def parameter_table(model: Model) -> TextTable:
             " over a bootstrap of runs; empty at a bound or with one run."
         )
     return TextTable("Fitted model", ["parameter", "side", "value", "spread", "unit"], rows, note)
+
+
+def held_out_sentence(model: Model, error: HeldOutError) -> str:
+    """Return the error on runs not fitted on in words."""
+    scale, unit = _display(model.unit)
+    return (
+        f"{model.target} on {error.runs} runs not fitted on: RMSE {scale * error.rmse:.3g} {unit}"
+        f" with each run's mean removed, {scale * error.rmse_with_means:.3g} {unit} with means."
+    )
 
 
 def _spread(known: Estimate) -> str:

@@ -78,10 +78,10 @@ def test_a_torque_command_holds_the_documented_registers() -> None:
     assert command[:6] == bytes.fromhex("01000a 0c0820")
     assert command[6:10] == struct.pack("<f", math.nan)
     # a public driver's test vector, "can send 8001 ...11001F01130D505050": the query behind it
-    assert protocol.STATE_QUESTION.hex() == "11001f01130d"
+    assert protocol.STATE_QUESTION.hex() == "11001f01130d" + "1d04"  # and one float, register 4
     sent = protocol.padded(command + protocol.STATE_QUESTION)
     assert len(sent) == 48
-    assert sent.endswith(b"\x13\x0d" + b"\x50" * (48 - len(command) - 6))
+    assert sent.endswith(b"\x13\x0d\x1d\x04" + b"\x50" * (48 - len(command) - 8))
     assert protocol.stop_command().hex() == "010000"
     wide = protocol.read(protocol.INT32, protocol.MODEL, 2)
     wide += protocol.read(protocol.INT32, protocol.SERIAL, 3)
@@ -89,8 +89,8 @@ def test_a_torque_command_holds_the_documented_registers() -> None:
 
 
 def test_a_state_survives_its_frame_and_its_bytes_are_little_endian() -> None:
-    state = State(10, 1.5, -0.25, 0.125, 48, -5, 0)
-    data = bytes.fromhex("21000a 2f01 0000c03f 000080be 0000003e 230d 30fb00")
+    state = State(10, 1.5, -0.25, 0.125, 2.5, 48, -5, 0)
+    data = bytes.fromhex("21000a 2f01 0000c03f 000080be 0000003e 230d 30fb00 2d04 00002040")
     assert protocol.encode_state(state) == data
     assert protocol.decode_state(data + b"\x50\x50") == state
 

@@ -9,7 +9,6 @@ from estimation.arm.balances import balances_of
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import motion_of
 from estimation.arm.shared import laid_out, shared_fit, with_links
-from estimation.candidates import candidates
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
@@ -76,29 +75,3 @@ def test_the_links_share_one_set_of_parameters_over_all_joints() -> None:
         assert 0 < np.std(whole[names.links]) < 2 * np.std(whole[names.torque])
     with pytest.raises(ArmError, match="Record longer runs"):
         shared_fit(arm, [run.at(np.arange(120))])
-
-
-def test_the_wrists_motors_and_a_sliding_joint_are_among_the_candidates() -> None:
-    (run,) = campaign(None, runs=1, seconds=30.0)
-    position = positions(run)
-    torque = np.column_stack([run[n.torque] for n in balances_of(run).joints])
-    seven = recorded("whole", *(np.hstack([x, x[:, 5:]]) for x in (position, torque)), RATE_HZ)
-    slides = {f"joint_3_{new}": seven[f"joint_3_{old}"] for old, new in RENAMED.items()}
-    kept = {n: x for n, x in seven.columns.items() if not n.startswith("joint_3_")}
-    seven = replace(seven, columns={**kept, **slides})
-    arm = balances_of(seven)
-    (whole,) = with_links(arm, [seven], shared_fit(arm, [seven]))
-    read = {
-        model.balance: {
-            c
-            for one in candidates(model.balance, list(whole.columns))
-            for c in one.channels.values()
-        }
-        for model in arm.models
-    }
-    assert "joint_6_drive_7_angle_rad" in read["joint.6"]
-    assert not any("drive" in channel for channel in read["joint.4"])
-    assert {"joint_3_position_m", "joint_3_velocity_m_s"} <= read["joint.3"]
-
-
-RENAMED = {"angle_rad": "position_m", "velocity_rad_s": "velocity_m_s", "torque_n_m": "force_n"}

@@ -21,6 +21,7 @@ from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term, predict
 from estimation.networks.network import Network
 from estimation.plant_models import declared
+from estimation.predicted import predicted_of, with_prediction
 from estimation.recording import Recording
 from tests.estimation.synthetic import campaign
 from tests.estimation.test_plant import SLIDE, slide
@@ -102,6 +103,21 @@ def test_a_model_with_a_gear_is_written_with_its_ratio(runs, tmp_path):
     assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
 
 
+def test_a_friction_under_load_reads_the_targets_prediction_in_c_and_live(runs, tmp_path):
+    fitted = with_prediction(fit(model_file.read(Path("motor")), Campaign.of(runs), bootstrap=0))
+    load = Term(
+        effect("friction.load"),
+        -1,
+        {"load": predicted_of(fitted.target, fitted.target)},
+        {"friction": Estimate(0.2), "width": Estimate(1.0)},
+    )
+    model = replace(fitted, terms=(*fitted.terms, load))
+    found = compiled(ModelEstimator(model), runs[0], tmp_path)
+    wanted = predict(model, runs[0], causal=True)
+    assert np.abs(wanted - predict(fitted, runs[0], causal=True)).max() > 1e-3
+    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+
+
 def test_an_effect_with_memory_is_refused_by_name():
     remembering = effect("friction.dwell")
     values = {p.name: Estimate(1.0) for p in (*remembering.amplitudes, *remembering.shape)}
@@ -154,10 +170,11 @@ def test_what_cannot_be_written_is_refused(bank, runs):
     odd = replace(
         NetworkEstimator(
             Network(
-                ("motor_load_n_m",), (TARGET,), np.array([[0.0], [1.0]]), np.array([[0.0], [1.0]]),
+                ("spindle_turned_s",), (TARGET,),
+                np.array([[0.0], [1.0]]), np.array([[0.0], [1.0]]),
                 np.ones((2, 2)), np.ones((1, 3)),
             )
         )
     )  # fmt: skip
-    with pytest.raises(ExportError, match="motor_load_n_m"):
+    with pytest.raises(ExportError, match="spindle_turned_s"):
         header(odd, "grip", 1000.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimation.effects import catalogue
+from estimation.effects import catalogue, effect
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, Term
 from estimation.model_file import ModelFileError, names, parse, parse_all, read, to_toml, write
@@ -107,7 +107,6 @@ DECLARED = to_toml(read(Path("motor")))
         ('"motor_velocity_rad_s"', '"motor_velocity"', "carries no unit"),
         ("sign = -1", "sign = 2", "it is 1 or -1"),
         ("sign = -1", 'sign = "minus"', "is not int"),
-        ('balance = "motor"', 'balance = "moter"', "Did you mean 'motor'"),
         ("run_offsets = true", "run_offsets = 1", "is not bool"),
         ("order = 3", "order = true", "is not int"),
         ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),
@@ -133,3 +132,25 @@ def test_what_is_wrong_is_named(old, new, message):
 def test_a_missing_file_names_the_shipped_ones(tmp_path):
     with pytest.raises(ModelFileError, match="grip, linear, motor, stretch"):
         read(tmp_path / "none.toml")
+
+
+LINEAR = Model("linear", "motor", "proximal_torque_n_m", (Term(effect("motor.torque_constant")),))
+
+
+@pytest.mark.parametrize("counted", [None, "all", "motion", "closing"])
+def test_a_model_file_says_which_samples_count(counted):
+    model = replace(LINEAR, counted=counted)
+    assert parse(to_toml(model)).counted == counted
+
+
+def test_friction_counts_samples_in_motion_unless_the_file_says_otherwise():
+    terms = (*LINEAR.terms, Term(effect("friction.coulomb"), -1))
+    assert replace(LINEAR, terms=terms).samples == "motion"
+    assert LINEAR.samples == "all"
+    assert replace(LINEAR, terms=terms, counted="all").samples == "all"
+
+
+def test_an_unknown_choice_of_samples_names_the_nearest():
+    text = to_toml(replace(LINEAR, counted="closing")).replace('"closing"', '"closed"')
+    with pytest.raises(ModelFileError, match="closing"):
+        parse(text)

@@ -12,6 +12,7 @@ from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.derived import measured_channels, zero_phase_channels
 from estimation.fitting import fit
+from estimation.noise import white_noise
 from estimation.plant import (
     Actuator,
     Axis,
@@ -271,7 +272,38 @@ def test_the_unit_of_a_travel_does_not_matter():
     assert errors[0] == pytest.approx(errors[1], rel=1e-4)
 
 
+def test_what_is_stated_of_a_sensor_replaces_what_its_readings_show():
+    exact = replace(SLIDE.sensors[0], noise=2e-5, counts=None, rate_hz=250.0)
+    known = signals(replace(SLIDE, sensors=(exact,)))
+    made = white_noise(slide(1), ["carriage_position_m"], known)["carriage_position_m"]
+    assert np.std(made) == pytest.approx(2e-5, rel=0.1)
+    assert np.ptp(made[:4000].reshape(-1, 4), axis=1).max() == 0.0  # held for four samples
+    coarse = signals(replace(SLIDE, sensors=(replace(exact, noise=0.0, counts=1e3),)))
+    made = white_noise(slide(1), ["carriage_position_m"], coarse)["carriage_position_m"]
+    assert np.std(made) == pytest.approx(1e-3 / np.sqrt(12.0), rel=0.1)
+
+
+def test_a_delay_that_is_stated_is_taken_out():
+    late = slide(1)
+    shifted = np.roll(late["carriage_position_m"], 20)
+    shifted[:20] = shifted[20]
+    late = late.with_columns(carriage_position_m=shifted)
+    sensor = replace(SLIDE.sensors[0], delay_s=0.0155, rate_hz=100.0)  # and held for 10 ms
+    known = signals(replace(SLIDE, sensors=(sensor,)))
+    found, wanted = (
+        zero_phase_channels(r, ["carriage_velocity_m_s"], signals=s)["carriage_velocity_m_s"]
+        for r, s in ((late, known), (slide(1), signals(SLIDE)))
+    )
+    assert np.abs(found - wanted)[200:-200].max() < 1e-4
+    (model,) = declared(replace(SLIDE, sensors=(sensor,)))
+    assert model_file.parse(model_file.to_toml(model)) == model
+
+
 def test_a_resting_speed_follows_the_counts_of_the_sensor():
+    shaft = replace(SLIDE.sensors[0], name="carriage_angle_rad", counts=651.9)
+    turned = replace(SLIDE, axes=(Axis("carriage", "rad"),), sensors=(shaft,))
+    turned = replace(turned, actuators=(Actuator("drive_torque_n_m", "carriage"),))
+    assert signals(turned).rest["carriage_velocity_rad_s"] == pytest.approx(50.0 / 651.9)
     coarse = replace(SLIDE, sensors=(replace(SLIDE.sensors[0], counts=1e3),))
     assert signals(coarse).rest["carriage_velocity_m_s"] == pytest.approx(1e-3 * 50.0)
     stated = replace(coarse, axes=(Axis("carriage", "m", rest_speed=0.01),))

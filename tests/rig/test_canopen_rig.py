@@ -17,13 +17,13 @@ from drivers.transport.simulated_can import SimulatedCanBus
 from rig.bench.companions import topic
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.canopen.logger import CanopenLogger
 from rig.canopen.simulated import open_simulated_bus, open_simulated_canopen
 from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
 from rig.log.reader import read_log
+from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
 from rig.protocols.protocol import Protocol
 from rig.recording.campaign import open_campaign_folder, record_campaign
@@ -38,9 +38,9 @@ def config(**changes: object) -> Config:
     return load_config(Path("canopen_simulated")).changed(**changes)
 
 
-def drive_of(link: CanopenLogger) -> Epos4Fake:
+def drive_of(link: LogicLink) -> Epos4Fake:
     """The fake at the far end of a simulated rig."""
-    bus = link._bus
+    bus = link._device._bus  # type: ignore[attr-defined]
     assert isinstance(bus, SimulatedCanBus)
     (drive,) = bus._nodes
     assert isinstance(drive, Epos4Fake)
@@ -69,7 +69,7 @@ def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it() -> None:
     drive.state = State.OPERATION_ENABLED
 
     bus = SimulatedCanBus([drive])
-    CanopenLogger(Epos4(bus), bus).close()
+    LogicLink(Epos4(bus), bus.url).close()
     assert drive.state is State.SWITCH_ON_DISABLED
 
 
@@ -187,7 +187,7 @@ def test_a_real_drives_motor_counts_as_warm_at_the_start_of_every_session() -> N
     machine = machine_of(settings)
     limits = machine.board_limits(settings, settings.calibration_set())
     bus = open_simulated_bus(settings)
-    with TeensyLogger(CanopenLogger(Epos4(bus), bus, is_cold=False), machine.profile) as logger:
+    with TeensyLogger(LogicLink(Epos4(bus), bus.url, is_cold=False), machine.profile) as logger:
         with pytest.raises(CommandRefusedError, match="half of the heat"):
             logger.arm(machine.gains(settings), limits)
         for _ in range(200):

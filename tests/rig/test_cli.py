@@ -68,10 +68,13 @@ def test_help_has_a_short_option_too(words, capsys):
 def test_the_help_names_what_is_shipped_and_the_default(capsys):
     main(["record", "-h"])
     shown = " ".join(capsys.readouterr().out.split())
-    assert "one of diagnosis, grasper, grasper_fit, quick, reference, thorough, unloaded" in shown
+    assert (
+        "one of diagnosis, grasper, grasper_fit, quick, reference, still, thorough, unloaded"
+        in shown
+    )
     assert "If none: diagnosis" in shown
     main(["fit", "-h"])
-    assert "cable, gearbox, grasper, grip" in " ".join(capsys.readouterr().out.split())
+    assert "cable, gearbox, grip" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -82,7 +85,7 @@ def test_the_help_names_what_is_shipped_and_the_default(capsys):
         ("rig record --protocol d", {"diagnosis"}),
         ("rig record --config gra", {"grasper", "grasper_pty"}),
         ("rig record --config b", {"bench.toml"}),
-        ("rig fit --model gr", {"grasper", "grip"}),
+        ("rig fit --model gr", {"grip"}),
         ("rig diagnose logs/mo", {"logs/monday"}),
         ("rig diagnose logs/monday --model gea", {"gearbox"}),
         ("rig campaigns mond", {"monday"}),

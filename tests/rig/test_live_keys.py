@@ -4,6 +4,7 @@ import os
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calibration.linear import shipped_calibration_set
@@ -59,6 +60,22 @@ def test_a_tare_takes_the_zero_of_a_rig_at_rest_only(tmp_path):
     assert "no tare while the rig moves" in status(moving[-1], "recording").detail
 
 
+def test_a_stop_disarms_a_moving_rig_and_goes_on_watching(tmp_path):
+    config = simulated()
+    link = transport(config)
+    script = iter(["", "s"])
+    stream = session_blocks(
+        config, lambda: link, short_protocol(1).plans(), (), lambda: next(script, ""), tmp_path
+    )
+    before = next(stream)
+    pressed = next(stream)
+    assert status(before, "logger").state == "armed"
+    assert status(pressed, "stop") == DeviceStatus("stop", "disarmed", "confirmed by the board")
+    after = list(until(stream, 1.0))
+    assert {status(block, "logger").state for block in after[1:]} == {"disarmed"}
+    assert np.ptp(after[-1].columns["spindle_angle_rad"]) < 1e-2
+
+
 def test_q_quits_and_a_mark_needs_a_recording(tmp_path):
     blocks = watched(simulated(), ["m", "", "q"], tmp_path, duration_s=60.0)
     assert len(blocks) == 2
@@ -68,7 +85,7 @@ def test_q_quits_and_a_mark_needs_a_recording(tmp_path):
 @pytest.mark.parametrize(
     ("low", "days_old", "state", "words"),
     [
-        (-1e6, 3, "ok", "1 records, oldest 3 days (proximal_torque_n_m)"),
+        (-1e6, 3, "ok", "1 record, oldest 3 days (proximal_torque_n_m)"),
         (-1e6, 12, "stale", "12 days old, good for 10"),
         (5e5, 3, "suspect", "outside its range: proximal_torque_n_m"),
     ],

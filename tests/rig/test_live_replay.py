@@ -14,7 +14,8 @@ from estimation.campaign import Campaign
 from estimation.recording import Flag, Recording, Stretch
 from rig.cli.replay import replay
 from rig.errors import DataError, ExitCode, UsageError
-from rig.live.replay import lost_samples, replay_blocks
+from rig.live.keys import no_keys
+from rig.live.replay import Pace, lost_samples, replay_blocks
 from rig.log.convert import write_recording
 
 GRIP = "distal_torque_n_m"
@@ -66,6 +67,28 @@ class VirtualTime:
         self.now_s += seconds
 
 
+def keyed(*pressed):
+    """Replay 20 s with keys at each question; returns the device times and the time it took."""
+    virtual, script = VirtualTime(), iter(pressed)
+    pace = Pace(1.0, lambda: next(script, ""), virtual.sleep, virtual.clock)
+    seen = [float(b.time_s[-1]) for b in replay_blocks(recording(seconds=20), (), 1.0, pace=pace)]
+    return seen, virtual.now_s - 100.0
+
+
+def test_keys_pause_hasten_skip_and_leave_a_replay():
+    _, plain_s = keyed()
+    _, paused_s = keyed("", " ", "", "", "", " ")
+    _, hastened_s = keyed("+")
+    seen, skipped_s = keyed("", "f")
+    left, _ = keyed("", "", "q")
+    assert plain_s == pytest.approx(20, abs=0.1)
+    assert paused_s == pytest.approx(20 + 4 * 0.1, abs=0.1)
+    assert hastened_s == pytest.approx(10, abs=0.1)
+    assert skipped_s == pytest.approx(15, abs=0.1)
+    assert len(seen) == 400  # every block is shown, and every estimator sees it
+    assert len(left) <= 2
+
+
 def test_blocks_together_are_the_recording():
     source = recording(seconds=1.234)
     blocks = list(replay_blocks(source, (), speed=None))
@@ -81,7 +104,9 @@ def test_blocks_together_are_the_recording():
 def test_pace_is_that_of_the_recording_times_speed(speed):
     time = VirtualTime()
     began = time.now_s
-    for block in replay_blocks(recording(), (), speed, sleep=time.sleep, clock=time.clock):
+    for block in replay_blocks(
+        recording(), (), speed, pace=Pace(speed, no_keys, time.sleep, time.clock)
+    ):
         due = began + block.time_s[-1] / speed
         assert time.now_s == pytest.approx(due), "a block comes when its last sample was taken"
     assert time.now_s - began == pytest.approx(1.999 / speed)
@@ -89,7 +114,7 @@ def test_pace_is_that_of_the_recording_times_speed(speed):
 
 def test_a_slow_reader_is_caught_up_with_and_not_waited_for():
     time = VirtualTime()
-    blocks = replay_blocks(recording(), (), 1.0, sleep=time.sleep, clock=time.clock)
+    blocks = replay_blocks(recording(), (), 1.0, pace=Pace(1.0, no_keys, time.sleep, time.clock))
     for index, _ in enumerate(blocks):
         if index == 3:
             time.now_s += 1.0  # the reader was away for a second
@@ -147,7 +172,7 @@ def logs(monkeypatch, tmp_path):
     def use(*recordings):
         monkeypatch.setattr(
             "rig.machines.recordings.open_campaign",
-            lambda path, format_name=None: Campaign.of(recordings),
+            lambda *_: Campaign.of(recordings),
         )
         return str(tmp_path)
 

@@ -93,5 +93,5 @@ def test_a_wrong_file_is_refused_with_the_key(tmp_path, text, message):
 
 
 def test_an_unknown_protocol_lists_the_shipped_ones():
-    with pytest.raises(UsageError, match="quick, reference, thorough"):
+    with pytest.raises(UsageError, match="quick, reference, still, thorough"):
         load_protocol("referense")

@@ -153,6 +153,8 @@ def _in_si(
         gain = float(gain_found)
     if source.wraps_at is not None:
         values = np.unwrap(values, period=source.wraps_at)
+    if source.sign_bit is not None:
+        values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
     unit = conversion(source.unit, name) if source.unit else None
     if unit is None:
         return np.asarray(gain * (values - source.zero))

@@ -74,6 +74,8 @@ class Source(_Section):
         gain: Number, or the name of a single value of the file.
         zero: Raw value that means nought.
         wraps_at: Raw range of a counter or angle that starts again at its end, or None.
+        sign_bit: Raw value of a bit that is set where the reading is negative, or None: the
+            registers of many servos hold sign and magnitude.
         value: Of a condition: the value itself, in place of a column.
     """
 
@@ -82,6 +84,7 @@ class Source(_Section):
     gain: FiniteFloat | str = 1.0
     zero: FiniteFloat = 0.0
     wraps_at: Positive | None = None
+    sign_bit: Positive | None = None
     value: FiniteFloat | str | None = None
 
 
@@ -89,10 +92,18 @@ Short = Annotated[Source, BeforeValidator(_short)]
 
 
 class Invalid(_Section):
-    """Samples that do not count: a formula that is true for them, and the reason."""
+    """Samples that do not count.
+
+    Attributes:
+        when: Formula that is true for them.
+        reason: Why.
+        missing: Whether nothing was read: a filter then bridges them, instead of smearing values
+            that are none over their neighbours.
+    """
 
     when: str
     reason: str
+    missing: bool = False
 
 
 class Runs(_Section):

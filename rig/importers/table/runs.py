@@ -178,7 +178,11 @@ def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], found.astype(bool), [False]])))
         for first, end in edges.reshape(-1, 2):
             start_s, stop_s = float(run.time_s[first]), float(run.time_s[end - 1])
-            run = run.with_stretch(Stretch(start_s, stop_s, Flag.SUSPECT, invalid.reason))
+            flag = Flag.MISSING if invalid.missing else Flag.SUSPECT
+            run = run.with_stretch(Stretch(start_s, stop_s, flag, invalid.reason))
+        if invalid.missing:
+            columns = {n: np.where(found, np.nan, values) for n, values in run.columns.items()}
+            run = replace(run, columns=columns)
     return run
 
 

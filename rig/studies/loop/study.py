@@ -11,17 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.candidates import candidates
 from estimation.diagnosis.split import Sealed, split
 from estimation.effects import effect
-from estimation.effects.roles import MOTOR_LOAD
 from estimation.fitting import prepared
 from estimation.model import Model, Term, estimate
 from estimation.recording import FloatArray, Recording
-from estimation.rest import Samples
+from estimation.signals import Samples
 from rig.errors import DataError
 from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
+from rig.simulation.reference_roles import MOTOR_LOAD, candidates
 from rig.studies.loop.selection import Chosen, grid, selected
 
 TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")

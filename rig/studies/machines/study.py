@@ -146,7 +146,7 @@ def _is_in(model: Model, found: Diagnosis) -> bool:
 
 def _row(case: Case, model: Model, found: Diagnosis, recordings: Sequence[Recording]) -> Row:
     name = model.balance
-    held_out = [r[model.target] for r in recordings if r.name in set(found.sealed.confirm)]
+    held_out = [r[model.target][r.valid] for r in recordings if r.name in set(found.sealed.confirm)]
     size = math.sqrt(float(np.mean(np.concatenate(held_out) ** 2)))
     error = found.errors[name]
     before, after = (

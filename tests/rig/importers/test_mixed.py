@@ -67,3 +67,31 @@ def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_l
     assert "another format; --format mrdlab opens it: more/007.TXT." in said
     assert "an earlier attempt of a run, or repaired: a.aborted-1.mcap.part." in said
     assert "notes.txt" not in said
+
+
+@pytest.mark.parametrize("words", [["fit"], ["diagnose", "--quick", "--balance", "motor"]])
+def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
+    tmp_path, make_log, capsys, words, monkeypatch
+):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for number, load_a in enumerate((0.2, 0.3, 0.4)):
+        text = make_log(seconds=8.0, load_a=load_a).text()
+        (folder / f"{number:03}.TXT").write_text(text)
+    (folder / "003.TXT").write_text(make_log().text() + "1.0, garbage\n")
+    call = [*words, str(folder)]
+    assert main(call) == 5
+    assert "003.TXT" in capsys.readouterr().err
+    assert main([*call, "--skip-bad"]) == 0
+    said = capsys.readouterr().err
+    assert "Run 003 does not count:" in said
+    assert "003.TXT" in said
+
+
+def test_a_folder_without_recordings_is_described(tmp_path, capsys):
+    assert main(["fit", str(tmp_path)]) == 5
+    assert "holds no file" in capsys.readouterr().err
+    (tmp_path / "bench.png").write_bytes(b"\x89PNG")
+    assert main(["fit", str(tmp_path)]) == 5
+    assert "1 .png" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import pytest
 from pyarrow import parquet
 from scipy.io import savemat
 
+from estimation.filters import LowPass, filter_recording
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 
@@ -119,6 +120,41 @@ def test_a_counter_that_starts_again_is_continued(tmp_path, machine):
         """
     (run,) = open_table(path, machine(text))
     np.testing.assert_allclose(np.diff(run["motor_angle_rad"]), 1000 / 4096 * 2 * np.pi)
+
+
+def test_a_register_of_sign_and_magnitude_is_read(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    text_table(path, {"t": [0.0, 0.1, 0.2, 0.3], "load": [30, 1054, 0, 1024]})
+    text = """
+        [data.columns]
+        time_s = "t"
+        drive_ratio = { column = "load", gain = 0.001, sign_bit = 1024 }
+        """
+    (run,) = open_table(path, machine(text))
+    np.testing.assert_allclose(run["drive_ratio"], [0.03, -0.03, 0.0, 0.0])
+
+
+def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    time_s = np.arange(200) / 100
+    angle = np.sin(2 * time_s)
+    text_table(path, {"t": time_s.tolist(), "q": np.where(time_s == 1.0, -np.pi, angle).tolist()})
+    text = """
+        [data]
+        even_rate_hz = 100.0
+        [data.columns]
+        time_s = "t"
+        motor_angle_rad = "q"
+        [[data.invalid]]
+        when = "motor_angle_rad < -3.1"
+        reason = "the servo did not answer"
+        missing = true
+        """
+    (run,) = open_table(path, machine(text))
+    filtered = filter_recording(run, LowPass(15.0, 3))
+    assert not filtered.valid[100]
+    error = (filtered["motor_angle_rad"] - angle)[filtered.valid]
+    assert np.abs(error[10:-10]).max() < 1e-3
 
 
 def test_a_gain_may_be_a_single_value_of_the_file(tmp_path, machine):

@@ -1,0 +1,52 @@
+"""White noise of sensors: as a machine's file states it, else as a recording shows it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.recording import FloatArray, Recording
+from estimation.signals import Reading, Signals
+
+
+def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
+    """Return a recording of white noise, as wide in each channel as that channel's own.
+
+    A sensor that is slower than the recording holds each value, and so its noise.
+
+    Args:
+        recording: One run.
+        measured: Channels of it.
+        signals: What the machine states of its sensors.
+    """
+    random = np.random.default_rng(0)
+    made = {}
+    for name in measured:
+        known = signals.readings.get(name, Reading())
+        held = 1 if known.rate_hz is None else round(recording.sample_rate_hz / known.rate_hz)
+        white = random.standard_normal(len(recording))
+        at = np.arange(len(recording)) // max(held, 1)
+        made[name] = noise_width(recording[name], known) * white[at]
+    return recording.with_columns(**made)
+
+
+def noise_width(values: FloatArray, known: Reading) -> float:
+    """Return the standard deviation of a reading's white noise, the steps of its counts included.
+
+    Unless stated: third differences hold noise and nearly no motion; a tenth of the blocks, in
+    which a contact or a reversal may show, is left out. At rest counts stand still, in motion they
+    are noise.
+
+    Args:
+        values: The reading, shape (n,).
+        known: What is stated of it.
+    """
+    if known.noise is None:
+        squared = np.diff(values, 3) ** 2 / 20.0
+        blocks = [float(np.mean(b)) for b in np.array_split(squared, max(1, len(squared) // 50))]
+        usual = float(np.nanmean(np.sort(blocks)[: max(1, round(0.9 * len(blocks)))]))
+    else:
+        usual = known.noise**2
+    steps = np.abs(np.diff(values))
+    step = float(steps[steps > 0.0].min(initial=np.inf)) if known.step is None else known.step
+    return math.sqrt(max(usual, step**2 / 12.0 if math.isfinite(step) else 0.0))

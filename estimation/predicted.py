@@ -1,0 +1,53 @@
+"""A target predicted by its own fitted equation: what an effect reads instead of the target.
+
+A term that reads its own target would explain the target's noise. The proportional terms of the
+fitted equation and its Coulomb friction are a channel of the machine, so that it is read live too.
+"""
+
+from dataclasses import replace
+
+from estimation.channels import ending_of
+from estimation.derived import CLOCKS, origin_of
+from estimation.effects import Proportional
+from estimation.model import Model
+from estimation.signals import Combination, Direction, Share
+
+
+def predicted_of(channel: str, target: str) -> str:
+    """Return the name of a prediction, of a target or a derivative of it.
+
+    That of `jaw_angle_rad` is `jaw_predicted_angle_rad`.
+
+    Args:
+        channel: The target, or a channel that is differentiated from it.
+        target: The target.
+    """
+    motion = (kind for kind in ("angle_rad", "position_m") if target.endswith(kind))
+    stem = target.removesuffix(f"_{next(motion, ending_of(target))}")
+    return f"{stem}_predicted{channel.removeprefix(stem)}"
+
+
+def with_prediction(model: Model) -> Model:
+    """Return a fitted model whose signals have the prediction of its target, where it has one."""
+    known = model.signals
+    shares, turn = [], None
+    for term in model.terms:
+        (channel, *_) = term.channels.values() or ("",)
+        plain = origin_of(channel) == (channel, 0) and known.combination(channel) is None
+        if isinstance(term.effect, Proportional) and plain and channel not in CLOCKS:
+            shares.append(Share(channel, times=term.weights[0]))
+        if term.effect.id == "friction.coulomb":
+            turn = Direction(channel, term.weights[0], term.values["width"].value)
+    if not shares:
+        return model
+    made = Combination(predicted_of(model.target, model.target), tuple(shares), turn)
+    return replace(model, signals=replace(known, combinations=(*known.combinations, made)))
+
+
+def without_unused(model: Model) -> Model:
+    """Return a model without the prediction of its target where no term reads it."""
+    name = predicted_of(model.target, model.target)
+    if name in {origin_of(channel)[0] for channel in model.channels}:
+        return model
+    kept = tuple(c for c in model.signals.combinations if c.name != name)
+    return replace(model, signals=replace(model.signals, combinations=kept))

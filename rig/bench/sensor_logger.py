@@ -1,0 +1,152 @@
+"""A device without motors where a session expects a logger: it gives its samples as they are."""
+
+from collections.abc import Sequence
+from time import monotonic
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.device import Channel, Device
+from drivers.link import LinkCounters
+from drivers.teensy.driver import ClockExchange, SampleBatch
+from drivers.teensy.profile import ArmLimits
+from drivers.teensy.protocol import Identity, Trip, TripReport
+from rig.errors import UsageError
+from rig.logic.pace import Pace
+
+FLAGS = "flags"
+"""Field of a device's own `SampleFlag` bits among the samples."""
+_HEAD = (("sequence", "<u4"), ("tick_us", "<u4"), ("status", "<u2"), (FLAGS, "u1"))
+
+
+class SensorWay:
+    """A device without motors, with the interface of `drivers.transport.Transport`.
+
+    Bytes cannot be sent through it: what arms, stops or tests a rig is refused.
+
+    Args:
+        device: The device, open.
+        url: Where it is, for messages.
+        is_simulated: Whether its time passes only while it is read.
+        pace: Simulated seconds a real second; None for as fast as possible.
+    """
+
+    def __init__(
+        self, device: Device, url: str, is_simulated: bool, pace: float | None = None
+    ) -> None:
+        self.url = url
+        self.device = device
+        self.is_simulated = is_simulated
+        self.pace = Pace(pace)
+        self.now_s = 0.0 if is_simulated else monotonic()
+        """Time of the newest reading."""
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass: that of the samples that came where it is simulated."""
+        self.now_s = self.now_s + seconds if self.is_simulated else monotonic()
+        self.pace.keep(self.now_s)
+
+    def read(self, timeout_s: float) -> NoReturn:
+        """Refuse: it has no motors."""
+        self._refuse()
+
+    def write(self, data: bytes) -> NoReturn:
+        """Refuse: it has no motors."""
+        self._refuse()
+
+    def close(self) -> None:
+        """Stop the device and let go of it."""
+        self.device.close()
+
+    def _refuse(self) -> NoReturn:
+        raise UsageError(
+            f"The {self.device.name} at {self.url} has no motors to arm, stop or test.",
+            'The configuration has [logger] profile = "sensor".',
+            "Use `rig live` or `rig record` with it.",
+        )
+
+
+class SensorLogger:
+    """A device without motors, with the calls of `TeensyLogger` that a session makes.
+
+    Args:
+        way: The device.
+    """
+
+    def __init__(self, way: SensorWay) -> None:
+        self._way = way
+        self._device = way.device
+        self._first_s: float | None = None
+        self._next = 0
+        self.channels: tuple[Channel, ...] = ()
+        self.last_exchange: ClockExchange | None = None
+
+    @property
+    def counters(self) -> LinkCounters:
+        """What happened to the device's samples."""
+        counted = self._device.counters
+        return LinkCounters(**{name: counted.get(name, 0) for name in LinkCounters().as_dict()})
+
+    def identify(self) -> Identity:
+        """Ask who is there."""
+        found = self._device.identify()
+        self.channels = self._device.channels
+        serial = " ".join(part for part in (found.model, found.serial) if part)
+        return Identity(serial, found.firmware, 0)
+
+    def start(self) -> None:
+        """Let samples come."""
+        self._device.start()
+
+    def stop(self) -> None:
+        """Let no more samples come."""
+        self._device.stop()
+
+    def close(self) -> None:
+        """Let go of the device."""
+        self._way.close()
+
+    def disarm(self) -> None:
+        """Do nothing: it has no motors."""
+
+    def heartbeat(self) -> None:
+        """Do nothing: nothing waits for it."""
+
+    def trip(self) -> TripReport:
+        """Return that nothing tripped."""
+        return TripReport(Trip.NONE, "", 0, 0, 0, 0)
+
+    def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
+        """Refuse: it has no motors."""
+        self._way.write(b"")
+
+    def queue(self, *columns: NDArray[np.integer]) -> int:
+        """Refuse: it has no motors."""
+        self._way.write(b"")
+
+    def read(self, timeout_s: float) -> SampleBatch:
+        """Return the samples that have come, waiting at most `timeout_s` for the first.
+
+        Times are the device's own where it has a clock, else by its nominal rate.
+        """
+        before_s = self._way.now_s
+        batch = self._device.read(timeout_s)
+        rate_hz = self.channels[0].rate_hz
+        count = int(batch.sequence[-1]) + 1 - self._next if len(batch) else 0
+        self._next += count
+        self._way.pass_time(count / rate_hz if len(batch) else timeout_s)
+        dtype = np.dtype([*_HEAD, *((c.name, "<f8") for c in self.channels)])
+        samples = np.zeros(len(batch), dtype)
+        if not len(batch):
+            return SampleBatch(samples, np.empty(0, np.int64), batch.lost)
+        time_s = batch.sequence / rate_hz if batch.clock == "host" else batch.time_s
+        if self._first_s is None:
+            self._first_s = float(time_s[0])
+        tick_us = np.round((time_s - self._first_s) * 1e6).astype(np.int64)
+        samples["sequence"], samples["tick_us"] = batch.sequence, tick_us % 2**32
+        samples[FLAGS] = batch.flags
+        for channel in self.channels:
+            samples[channel.name] = batch.columns[channel.name]
+        self.last_exchange = ClockExchange(before_s, self._way.now_s, int(tick_us[-1]) % 2**32)
+        return SampleBatch(samples, tick_us, batch.lost)

@@ -1,0 +1,1 @@
+"""The logger board's logic in this computer, behind it a drive."""

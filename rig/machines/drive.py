@@ -1,0 +1,106 @@
+"""One drive that this computer controls: the reference rig's machine at the drive's own rate.
+
+The drive's shaft counts as motor and as spindle. There is no load motor.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Self
+
+from calibration.linear import CalibrationSet
+from drivers.registry import drivers
+from drivers.teensy.profile import Profile
+from drivers.teensy.reference import REFERENCE, Limits
+from rig.configuration.config import Config
+from rig.errors import UsageError
+from rig.machines.machine import MachinePlan
+from rig.machines.reference import ReferenceMachine
+from rig.machines.safety import board_limits
+from rig.protocols.motion import Motion
+from rig.protocols.trajectory import SAMPLE_RATE_HZ
+
+
+@dataclass(frozen=True, eq=False)
+class SampledProfile(Profile):
+    """The reference rig's profile with a tick of its core, and samples at another rate.
+
+    Attributes:
+        sampled_hz: Samples a second.
+    """
+
+    sampled_hz: float = 1000.0
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return self.sampled_hz
+
+
+def sampled_at(rate_hz: float) -> SampledProfile:
+    """Return the profile of a drive that is sampled at a rate."""
+    same = {field.name: getattr(REFERENCE, field.name) for field in fields(REFERENCE)}
+    return SampledProfile(**same, sampled_hz=rate_hz)
+
+
+class DriveMachine(ReferenceMachine):
+    """Implements `rig.machines.machine.Machine`.
+
+    Args:
+        rate_hz: Samples a second; divides 1000, the rate of the trajectories.
+    """
+
+    shown = ("motor_current_a", "spindle_angle_rad")
+
+    def __init__(self, rate_hz: float) -> None:
+        every = SAMPLE_RATE_HZ / rate_hz
+        if every < 1 or not every.is_integer():
+            raise UsageError(
+                f"A drive cannot be sampled at {rate_hz:g} Hz here.",
+                f"Trajectories have {SAMPLE_RATE_HZ:g} samples a second, of which each sample of"
+                " the drive takes one.",
+                "Write a rate_hz that divides 1000, such as 50, 100, 125, 200, 250 or 500.",
+            )
+        self.profile = sampled_at(rate_hz)
+        self._every = int(every)
+
+    @classmethod
+    def of(cls, config: Config) -> Self:
+        """Return the machine at the rate that the drive is asked at."""
+        return cls(rate_of(config))
+
+    def at(self, rate_hz: float) -> Self:
+        """Return the machine of a device with another rate."""
+        return type(self)(rate_hz)
+
+    def first_look(self, config: Config) -> str:
+        """Return the protocol without load."""
+        return "unloaded"
+
+    def board_limits(self, config: Config, calibrations: CalibrationSet) -> Limits:  # type: ignore[override]
+        """Return the limits of the core that runs in this computer."""
+        return board_limits(config, calibrations, 1 / self.profile.rate_hz)
+
+    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> Motion:
+        """Return approach, run and release, at the drive's rate."""
+        return self._taken(super().motion(plan, here))
+
+    def settling(self, here: tuple[float, ...]) -> Motion:
+        """Return a little motion, at the drive's rate."""
+        return self._taken(super().settling(here))
+
+    def _taken(self, motion: Motion) -> Motion:
+        angle, load = (column[:: self._every] for column in motion.setpoints)
+        first, last = (math.ceil(index / self._every) for index in (motion.first, motion.last))
+        return Motion(angle, load, first, last)
+
+
+def rate_of(config: Config) -> float:
+    """Return the rate a device is asked at, by its options; 1000 Hz where it has none.
+
+    A fake is opened without options.
+    """
+    section = config.logger
+    driver = drivers().get(section.driver)
+    own = driver.options if driver else {}
+    asked = {} if config.is_simulated else section.options
+    return float({**own, **asked}.get("rate_hz", SAMPLE_RATE_HZ))

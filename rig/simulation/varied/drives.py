@@ -1,0 +1,204 @@
+"""Recipes of ripples, springs, transmission and torque constant: catalogue names, drawn forms."""
+
+import numpy as np
+
+from rig.simulation.varied.drawn import Drawn, Ranges, Recipe, order_over
+from rig.simulation.varied.forms import Random, Table, bend, grid, knee, rising, wave
+from rig.simulation.varied.frictions import LOOPS, WORDS, bank, level, power
+from rig.simulation.varied.hidden import Hidden
+from rig.simulation.varied.plant import Plant, over
+
+TURN = 2.0 * np.pi
+BANK_OF_LAGS = 3
+
+
+def turn_table(random: Random, ranges: Ranges, shaft: str, most: int) -> Table:
+    """Draw a wave over the turn of `motor` or `spindle`."""
+    order = order_over(random, ranges, shaft, most)
+    form = wave(random, order, sidebands=shaft == "motor" and random.random() < 0.6)
+    return Table(f"{shaft}_angle", 0.0, TURN, form, periodic=True)
+
+
+def motor_ripple(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw cogging."""
+    part = Hidden("motor", "table", (turn_table(random, ranges, "motor", 12),))
+    return Drawn(WORDS["motor"], "ripple.motor", ("motor_angle",), part, level(plant, "motor"))
+
+
+def current_ripple(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a torque constant that ripples with the motor's turn."""
+    part = Hidden("constant", "table", (turn_table(random, ranges, "motor", 12),))
+    return Drawn(WORDS["motor"], "ripple.current", ("motor_angle", "current"), part, 0.1)
+
+
+def output_ripple(place: str) -> Recipe:
+    """Return a recipe of a torque that repeats with the spindle's turn."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        part = Hidden(place, "table", (turn_table(random, ranges, "spindle", 60),))
+        return Drawn(WORDS[place], "ripple.output", ("spindle_angle",), part, level(plant, place))
+
+    return recipe
+
+
+def eccentric(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a lever arm of the gear that varies with the spindle's angle."""
+    wheel = turn_table(random, ranges, "spindle", 16)
+    load = ranges.sided("gear_torque", power(random, 0.9, 1.1), odd=True)
+    part = Hidden("motor", "table", (wheel, load))
+    return Drawn(
+        WORDS["motor"], "eccentric.load", ("spindle_angle", "load"), part, level(plant, "motor")
+    )
+
+
+def pulley(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a pulley that is not round: it moves the cable and changes its own lever."""
+    part = Hidden("pulley", "table", (turn_table(random, ranges, "spindle", 16),))
+    others = ("coupling.kinematic", "ripple.output")
+    return Drawn("pulley", "eccentric.load", ("spindle_angle", "load"), part, 0.01, others)
+
+
+def spring(place: str) -> Recipe:
+    """Return a recipe of a spring between a part and the ground, hardening or softening."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        variable = "jaw_angle" if place == "jaw" else "spindle_angle"
+        part = Hidden(place, "table", (ranges.table(variable, rising(random) - 0.5),))
+        word = WORDS.get(place, "jaw")
+        return Drawn(word, "spring.position", (variable,), part, level(plant, place))
+
+    return recipe
+
+
+def end_stop(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a stop that is met near one end of the jaw's travel."""
+    x = np.clip(grid() - random.uniform(0.6, 0.8), 0.0, None)
+    form = (x / x.max()) ** random.uniform(1.0, 2.2)
+    part = Hidden("jaw", "table", (ranges.table("jaw_angle", form),))
+    return Drawn("jaw", "spring.end_stop", ("jaw_angle",), part, level(plant, "jaw"))
+
+
+def payload(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a weight on the jaw whose arm is not quite that of a point."""
+    x = np.linspace(-np.pi, np.pi, 513)
+    form = np.sin(x + random.uniform(0.0, TURN)) * np.interp(
+        x, np.linspace(-4, 4, 129), bend(random)
+    )
+    table = Table("jaw_angle", -np.pi, np.pi, form)
+    part = Hidden("jaw", "table", (table,))
+    return Drawn("jaw", "gravity.payload", ("jaw_angle",), part, 2.0 * level(plant, "jaw"))
+
+
+def saturation(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a torque constant that falls with the size of the current."""
+    table = ranges.sided("current", power(random, 1.0, 2.5), odd=False)
+    part = Hidden("constant", "table", (table,))
+    return Drawn(WORDS["motor"], "motor.saturation", ("current",), part, 0.1)
+
+
+def thermal(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a torque constant that falls as the winding warms."""
+    part = Hidden(
+        "constant", "table", (ranges.table("heat", rising(random)),), heat_s=over(random, 1.5, 10.0)
+    )
+    return Drawn(WORDS["motor"], "motor.thermal", ("current", "time"), part, 0.1)
+
+
+def backlash(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw lost motion of the gear with edges that are more or less soft."""
+    x = np.linspace(-8.0, 8.0, 1025)
+    table = Table("twist", -8.0, 8.0, knee(random, x))
+    part = Hidden("gear", "table", (table,), similar=True)
+    return Drawn("gear", "transmission.backlash", ("load",), part, 0.05 * ranges.size("twist"))
+
+
+def stiffening(place: str, variable: str) -> Recipe:
+    """Return a recipe of a spring that is not straight."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        sign = 1.0 if random.random() < 0.5 else -1.0
+        table = ranges.sided(variable, power(random, 1.6, 3.0), odd=True)
+        made = Table(variable, table.low, table.high, sign * table.values)
+        part = Hidden(place, "table", (made,))
+        guess = 0.1 * ranges.size(variable)
+        return Drawn(place, "transmission.stiffening", ("load",), part, guess)
+
+    return recipe
+
+
+def relaxation(place: str, variable: str) -> Recipe:
+    """Return a recipe of a part of the deflection that comes with time, over several times."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        count = int(random.integers(1, BANK_OF_LAGS + 1))
+        times = np.sort([over(random, 0.08, 3.0) for _ in range(count)])
+        weights = random.dirichlet(np.ones(count))
+        part = Hidden(place, "lags", (ranges.table(variable),), reach=times, weights=weights)
+        return Drawn(place, "transmission.relaxation", ("load", "time"), part, 0.15)
+
+    return recipe
+
+
+def inner_loop(place: str, variable: str) -> Recipe:
+    """Return a recipe of wires or teeth that rub on each other while a spring deflects."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        reach = ranges.span(variable) * over(random, 0.04, 0.25)
+        kind, reaches, weights = bank(random, reach)
+        if kind == "relays":
+            middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
+            reaches = reaches + middle
+        part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=-weights)
+        if kind == "bouc_wen":
+            part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
+        guess = 0.03 * ranges.size(variable)
+        return Drawn(place, LOOPS[kind == "bouc_wen"], ("load", "history"), part, guess, LOOPS)
+
+    return recipe
+
+
+def play(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw play of the cable that is taken up after each reversal of the spindle."""
+    count = int(random.integers(1, 4))
+    reach = ranges.span("spindle_angle") * over(random, 0.01, 0.06)
+    reaches = reach * np.exp(random.uniform(-0.5, 0.5, count))
+    weights = random.dirichlet(3.0 * np.ones(count))
+    table = ranges.table("spindle_angle")
+    part = Hidden("cable", "stops", (table,), reach=reaches, weights=weights)
+    guess = 0.03 * ranges.size("stretch")
+    return Drawn(
+        "cable", "transmission.backlash", ("spindle_angle", "history"), part, guess, LOOPS,
+    )  # fmt: skip
+
+
+def wavy(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a wave of the gear's position along the spindle's turn."""
+    part = Hidden("gear", "table", (turn_table(random, ranges, "spindle", 40),))
+    guess = 0.03 * ranges.size("twist")
+    return Drawn("gear", "ripple.output", ("spindle_angle",), part, guess)
+
+
+DRIVES: dict[str, Recipe] = {
+    "ripple.motor motor": motor_ripple,
+    "ripple.current motor": current_ripple,
+    "ripple.output motor": output_ripple("motor"),
+    "ripple.output spindle": output_ripple("spindle"),
+    "eccentric.load motor": eccentric,
+    "eccentric.load pulley": pulley,
+    "spring.position motor": spring("motor"),
+    "spring.position spindle": spring("spindle"),
+    "spring.position jaw": spring("jaw"),
+    "spring.end_stop jaw": end_stop,
+    "gravity.payload jaw": payload,
+    "motor.saturation motor": saturation,
+    "motor.thermal motor": thermal,
+    "transmission.backlash gear": backlash,
+    "transmission.stiffening gear": stiffening("gear", "twist"),
+    "transmission.stiffening cable": stiffening("cable", "stretch"),
+    "transmission.relaxation gear": relaxation("gear", "twist"),
+    "transmission.relaxation cable": relaxation("cable", "stretch"),
+    "hysteresis.presliding gear": inner_loop("gear", "twist"),
+    "hysteresis.presliding cable": inner_loop("cable", "stretch"),
+    "transmission.backlash cable": play,
+    "ripple.output gear": wavy,
+}

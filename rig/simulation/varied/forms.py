@@ -1,0 +1,167 @@
+"""Random functions on a grid: what distorts a hidden effect's form, or makes it.
+
+All are tables over a range of one variable, shape (`POINTS`,); between its points a table is linear
+and beyond its ends it stays at its last value.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.recording import FloatArray
+
+POINTS = 129
+WAVES = 24
+
+Random = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A function of one variable.
+
+    Attributes:
+        variable: Name from `rig.simulation.varied.hidden.VARIABLES`.
+        low: First point of the grid.
+        high: Last point.
+        values: Shape (`POINTS`,).
+        periodic: Whether it repeats itself beyond the range; its last value is then its first.
+    """
+
+    variable: str
+    low: float
+    high: float
+    values: FloatArray
+    periodic: bool = False
+
+    @property
+    def x(self) -> FloatArray:
+        """The grid, shape (`POINTS`,)."""
+        return np.linspace(self.low, self.high, len(self.values))
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return its values at places, the same shape."""
+        place = np.mod(x - self.low, self.high - self.low) + self.low if self.periodic else x
+        found: FloatArray = np.interp(place, self.x, self.values)
+        return found
+
+    def steepest(self) -> float:
+        """Return its largest slope, without sign."""
+        return float(np.max(np.abs(np.gradient(self.values, self.x))))
+
+
+def grid() -> FloatArray:
+    """Return the unit grid that forms are drawn on."""
+    return np.linspace(0.0, 1.0, POINTS)
+
+
+def smooth(random: Random, scale: float) -> FloatArray:
+    """Return one draw of a Gaussian process on the unit grid: mean 0, variance 1.
+
+    Made of random waves (Rahimi and Recht 2007) of a squared-exponential kernel.
+
+    Args:
+        random: Source of the draw.
+        scale: Length scale, shares of the range.
+    """
+    rates = random.standard_normal(WAVES) / scale
+    phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
+    waves = np.cos(np.outer(grid(), rates) + phases)
+    drawn: FloatArray = np.sqrt(2.0 / WAVES) * waves.sum(axis=1)
+    return drawn
+
+
+def bend(random: Random, most: float = 0.45) -> FloatArray:
+    """Return a positive factor about 1 on the unit grid: exp of a smooth draw."""
+    depth = random.uniform(0.1, most)
+    return np.exp(depth * smooth(random, float(random.uniform(0.25, 0.8))))
+
+
+def rising(random: Random) -> FloatArray:
+    """Return a random function that rises from 0 to 1: the integral of a bend's square."""
+    rate = bend(random, 0.9) ** 2
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))])
+    return np.asarray(total / total[-1])
+
+
+def falling(random: Random, x: FloatArray) -> FloatArray:
+    """Return a form that falls from 1 at 0 towards 0 beyond 1, of a random kind, distorted.
+
+    Args:
+        random: Source of the draw.
+        x: Where, 0 and more, shape (`POINTS`,).
+    """
+    power = random.uniform(0.8, 2.5)
+    kinds = (
+        np.exp(-(x**power)),
+        1.0 / (1.0 + x**power),
+        1.0 - np.tanh(x**power),
+        np.log1p(1.0 / (x**power + 1.0 / (np.e - 1.0))),
+        np.clip(1.0 - 0.5 * x, 0.0, None) ** power,
+    )
+    form = kinds[int(random.integers(len(kinds)))] * bend(random)
+    return np.asarray(form / form[0])
+
+
+def knee(random: Random, x: FloatArray) -> FloatArray:
+    """Return an odd form of slope 1 at 0 that levels off at about 1, of a random kind."""
+    power = random.uniform(1.0, 4.0)
+    kinds = (
+        np.tanh(x),
+        x / (1.0 + np.abs(x) ** power) ** (1.0 / power),
+        2.0 / np.pi * np.arctan(0.5 * np.pi * x),
+        np.clip(x, -1.0, 1.0),
+    )
+    return np.asarray(kinds[int(random.integers(len(kinds)))])
+
+
+def spots(random: Random, most: int = 2, narrow: float = 0.04, wide: float = 0.12) -> FloatArray:
+    """Return one or a few local features on the unit grid: bumps of random shapes and places."""
+    x, total = grid(), np.zeros(POINTS)
+    for _ in range(int(random.integers(1, most + 1))):
+        centre, width = random.uniform(0.2, 0.8), random.uniform(narrow, wide)
+        d = np.abs(x - centre) / width
+        power = random.uniform(1.2, 3.0)
+        shapes = (np.exp(-0.5 * d**power), 1.0 / (1.0 + d**2) ** power, np.clip(1 - d / 2, 0, None))
+        total += random.uniform(0.5, 1.0) * shapes[int(random.integers(len(shapes)))]
+    return np.asarray(total / total.max())
+
+
+def wave(random: Random, order: int, sidebands: bool) -> FloatArray:
+    """Return a wave over one turn: an order, some of its harmonics, and sidebands once a turn.
+
+    Args:
+        random: Source of the draw.
+        order: Whole periods a turn.
+        sidebands: Whether its amplitude is modulated once a turn.
+    """
+    turn = 2.0 * np.pi * np.linspace(0.0, 1.0, 2048)
+    total = np.sin(order * turn + random.uniform(0.0, 2.0 * np.pi))
+    for harmonic in (2, 3):
+        if random.random() < 0.5:
+            share = random.uniform(0.1, 0.4) / (harmonic - 1)
+            total += share * np.sin(harmonic * order * turn + random.uniform(0.0, 2.0 * np.pi))
+    if sidebands and order > 1:
+        depth = random.uniform(0.1, 0.5)
+        total *= 1.0 + depth * np.sin(turn + random.uniform(0.0, 2.0 * np.pi))
+    return np.asarray(total)
+
+
+def course(random: Random, x: FloatArray) -> FloatArray:
+    """Return how something drifts, from 0, of a random kind: towards a level, slower, in seasons.
+
+    Args:
+        random: Source of the draw.
+        x: Time, shares of the whole, shape (n,).
+    """
+    time = random.uniform(0.1, 0.6)
+    kinds = (
+        1.0 - np.exp(-x / time),
+        np.log1p(x / (0.2 * time)),
+        x / (x + time),
+        x.copy(),
+        np.sin(2.0 * np.pi * random.uniform(0.4, 1.2) * x),
+    )
+    form = kinds[int(random.integers(len(kinds)))]
+    form = form * np.interp(x, np.linspace(x[0], x[-1], POINTS), bend(random, 0.25))
+    return np.asarray(form / np.max(np.abs(form)))

@@ -1,0 +1,211 @@
+"""Recipes of losses at motor and spindle: catalogue names, forms drawn again each time."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from estimation.recording import FloatArray
+from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
+from rig.simulation.varied.forms import Random, Table, bend, course, falling, grid, rising, smooth
+from rig.simulation.varied.hidden import BANK, Hidden
+from rig.simulation.varied.plant import Plant, over
+
+Form = Callable[[FloatArray], FloatArray]
+Drawer = Callable[[Random, Ranges], Table]
+"""Draws one factor of an effect over its variable's range."""
+
+WORDS = {"motor": "motor shaft", "spindle": "spindle"}
+LOADS = {"motor": "gear_torque", "spindle": "cable_torque"}
+LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
+
+
+def level(plant: Plant, place: str) -> float:
+    """Return a tenth of the torque at a place."""
+    torque = 0.1 * plant.pull * plant.load_scale
+    return torque / plant.ratio if place == "motor" else torque
+
+
+def power(random: Random, low: float, high: float) -> Form:
+    """Return a distorted power of a size on the unit range, with its exponent drawn."""
+    exponent, factor = random.uniform(low, high), bend(random)
+
+    def form(x: FloatArray) -> FloatArray:
+        return np.asarray(x**exponent * np.interp(x, grid(), factor))
+
+    return form
+
+
+def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:
+    """Return a recipe of friction whose level is a product of tables drawn by functions."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        made = tuple(table(random, ranges) for table in tables)
+        dwell = over(random, 0.2, 1.5), over(random, 0.02, 0.3)
+        part = Hidden(place, "table", made, friction=True, dwell_s=dwell)
+        return Drawn(WORDS[place], family, variables, part, level(plant, place))
+
+    return recipe
+
+
+def slow(place: str) -> Drawer:
+    """Return the drawer of a level that falls with the size of the speed."""
+
+    def table(random: Random, ranges: Ranges) -> Table:
+        return ranges.way(f"{place}_way", falling(random, grid() / random.uniform(0.05, 0.3)))
+
+    return table
+
+
+def loaded(place: str) -> Drawer:
+    """Return the drawer of a level that grows with the load, of either sign."""
+    return lambda random, ranges: ranges.sided(LOADS[place], power(random, 0.6, 1.7), odd=False)
+
+
+def along(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that goes slowly with the spindle's angle."""
+    forms = (
+        rising(random),
+        1.0 - rising(random),
+        np.exp(0.8 * smooth(random, random.uniform(0.5, 0.9))),
+    )
+    form = forms[int(random.integers(len(forms)))]
+    return ranges.table("spindle_angle", form - form.min())
+
+
+def fading(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that fades or grows with time, in each run or over the campaign."""
+    clock = "campaign_time" if random.random() < 0.4 else "run_time"
+    form = course(random, grid())
+    form = form - form.min()
+    return ranges.table(clock, form.max() - form if random.random() < 0.6 else form)
+
+
+def fading_within(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that goes towards another one in each run."""
+    time = random.uniform(0.15, 0.8)
+    form = (1.0 - np.exp(-grid() / time)) * bend(random, 0.15)
+    return ranges.table("run_time", form.max() - form if random.random() < 0.5 else form)
+
+
+def stepping(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that comes at one moment of each run or of the campaign."""
+    clock = "campaign_time" if random.random() < 0.4 else "run_time"
+    sharp = random.uniform(0.002, 0.015)
+    return ranges.table(clock, 0.5 + 0.5 * np.tanh((grid() - random.uniform(0.3, 0.7)) / sharp))
+
+
+def rested(random: Random, ranges: Ranges) -> Table:
+    """Draw a level that grows with rest."""
+    return ranges.table("dwell", rising(random))
+
+
+def sided_share(random: Random, ranges: Ranges) -> Table:
+    """Draw a factor that differs by the direction of the spindle."""
+    share, width = random.uniform(0.15, 0.4), random.uniform(0.01, 0.05)
+    return ranges.table(
+        "spindle_speed",
+        1.0 + share * np.tanh(_centred(ranges, "spindle_speed") / width),
+    )
+
+
+def _centred(ranges: Ranges, variable: str) -> FloatArray:
+    """Return the grid of a variable's table in shares of its size, zero where it is zero."""
+    return np.asarray(ranges.table(variable).x / ranges.size(variable))
+
+
+def speeding(place: str, family: str, low: float, high: float, odd: bool) -> Recipe:
+    """Return a recipe of a torque that is a distorted power of the speed."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        table = ranges.sided(f"{place}_speed", power(random, low, high), odd)
+        return Drawn(
+            WORDS[place], family, ("velocity",), Hidden(place, "table", (table,)),
+            level(plant, place),
+        )  # fmt: skip
+
+    return recipe
+
+
+def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a loss of the gear that grows with load and speed."""
+    tables = (
+        ranges.sided("motor_speed", power(random, 0.7, 1.3), odd=True),
+        ranges.sided("gear_torque", power(random, 0.7, 1.5), odd=False),
+    )
+    return Drawn(
+        WORDS["motor"], "friction.load_viscous", ("velocity", "load"),
+        Hidden("motor", "table", tables), level(plant, "motor"),
+    )  # fmt: skip
+
+
+def bank(random: Random, reach: float) -> tuple[str, FloatArray, FloatArray]:
+    """Draw an operator with memory of some reach: its kind, reaches and weights.
+
+    Stops side by side (Prandtl-Ishlinskii, Maxwell slip), relays side by side (Preisach) or a loop
+    after Bouc and Wen.
+    """
+    kind = str(random.choice(["stops", "relays", "bouc_wen"]))
+    if kind == "bouc_wen":
+        shape = np.array([reach, random.uniform(1.0, 3.0), random.uniform(0.5, 1.0)])
+        return kind, shape, np.ones(1)
+    count = int(random.integers(3, 12)) if kind == "stops" else BANK
+    weights = random.gamma(random.uniform(0.6, 2.0), size=count)
+    weights /= weights.sum()
+    reaches = reach * np.exp(random.uniform(-1.2, 0.4, count))
+    if kind == "stops":
+        return kind, reaches, weights
+    middle = reach * random.normal(0.0, 0.6, BANK)
+    return kind, np.concatenate([middle + reaches, middle - reaches]), weights
+
+
+def loop(place: str) -> Recipe:
+    """Return a recipe of friction that builds up over a way after each reversal."""
+
+    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+        variable = f"{place}_angle"
+        reach = ranges.span(variable) * over(random, 0.02, 0.15)
+        kind, reaches, weights = bank(random, reach)
+        if kind == "relays":  # relays about the whole travel, not about zero
+            middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
+            spread = 0.4 * ranges.span(variable) * random.uniform(-1.0, 1.0, BANK)
+            reaches = reaches + np.tile(middle + spread, 2)
+        part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
+        family = LOOPS[kind == "bouc_wen"]
+        return Drawn(WORDS[place], family, (variable, "history"), part, level(plant, place), LOOPS)
+
+    return recipe
+
+
+def _recipes() -> dict[str, Recipe]:
+    found: dict[str, Recipe] = {
+        "friction.load_viscous motor": load_viscous,
+        "friction.capstan spindle": rubbing(
+            "spindle", "friction.capstan", ("load", "velocity_sign"), loaded("spindle"), sided_share
+        ),
+    }
+    for place in WORDS:
+        for family, variables, table in (
+            ("friction.stribeck", ("velocity",), slow(place)),
+            ("friction.load", ("load", "velocity_sign"), loaded(place)),
+            ("friction.position", ("spindle_angle", "velocity_sign"), along),
+            ("friction.warmup", ("time", "velocity_sign"), fading),
+            ("change.step", ("time", "velocity_sign"), stepping),
+            ("friction.dwell", ("dwell", "velocity_sign"), rested),
+        ):
+            found[f"{family} {place}"] = rubbing(place, family, variables, table)
+        found[f"friction.drag {place}"] = speeding(place, "friction.drag", 1.7, 3.0, odd=True)
+        asymmetric = speeding(place, "friction.viscous_asymmetry", 0.8, 1.4, odd=False)
+        found[f"friction.viscous_asymmetry {place}"] = asymmetric
+        found[f"hysteresis.presliding {place}"] = loop(place)
+    return found
+
+
+FRICTIONS = _recipes()
+
+WITHIN: dict[str, Recipe] = {
+    f"friction.warmup {place} within": rubbing(
+        place, "friction.warmup", ("time", "velocity_sign"), fading_within
+    )
+    for place in WORDS
+}
+"""Frictions of which runs that all load alike show no more than that they go with time."""

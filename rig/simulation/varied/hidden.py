@@ -1,0 +1,134 @@
+"""A hidden effect of the simulated plant as data, and its arrays for the compiled loop.
+
+An effect adds `amplitude x operator(one variable) x table(another)` at one place of the plant. The
+operator is a table, or has memory: stops side by side, relays side by side, a Bouc-Wen loop, lags.
+So its form is drawn, not written: no two cases share a formula.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.recording import FloatArray
+from rig.simulation.varied.forms import Table
+
+VARIABLES = (
+    "one",
+    "motor_angle",
+    "motor_speed",
+    "spindle_angle",
+    "spindle_speed",
+    "jaw_angle",
+    "jaw_speed",
+    "current",
+    "gear_torque",
+    "cable_torque",
+    "run_time",
+    "campaign_time",
+    "acceleration",
+    "dwell",
+    "heat",
+    "jump",
+    "twist",
+    "stretch",
+    "motor_way",
+    "spindle_way",
+)
+"""What an effect's tables may be over, in the order of the compiled loop's array. `*_way` is the
+size of a speed; `jump` switches between 0 and 1 at random times; `dwell` is 1 after a long rest and
+falls as it slides; `heat` is the square of the current behind a lag."""
+
+PLACES = ("motor", "constant", "gear", "spindle", "cable", "jaw", "pulley")
+"""Where it acts: a torque against the motor, a share of the torque constant lost, twist of the gear
+beyond its spring's, a torque against the spindle, elongation of the cable beyond its spring's, a
+torque against the jaw in front of its sensor, cable wound beyond a round pulley's."""
+
+OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
+MOST = 2
+"""Most effects at once."""
+
+BANK = 40
+"""Most elements side by side of an operator with memory."""
+
+SHAPES = 4
+TABLE_POINTS = 2048
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """One hidden effect of the plant.
+
+    Attributes:
+        place: One of `PLACES`.
+        operator: One of `OPERATORS`.
+        tables: Up to two factors; the first is the operator's variable where that has memory.
+        friction: Whether it is a level of friction, which takes the sign of its place's speed.
+        similar: Whether the table's width grows with the amplitude, as play's does.
+        reach: Of stops: how far each moves. Of relays: where each switches on, then off. Of lags:
+            time of each, s. Of Bouc-Wen: its reach, sharpness and share that loads.
+        weights: Of each element.
+        dwell_s: Time within which a rest counts, and slip, rad, that wears it off.
+        heat_s: Lag of the heat.
+    """
+
+    place: str
+    operator: str
+    tables: tuple[Table, ...]
+    friction: bool = False
+    similar: bool = False
+    reach: FloatArray = field(default_factory=lambda: np.empty(0))
+    weights: FloatArray = field(default_factory=lambda: np.empty(0))
+    dwell_s: tuple[float, float] = (1.0, 1.0)
+    heat_s: float = 5.0
+
+
+class Rows(NamedTuple):
+    """Effects as the compiled loop takes them."""
+
+    number: int
+    kinds: NDArray[np.int64]  # (effects, 8): place, operator, friction, similar, 2 variables, bank
+    amplitudes: FloatArray  # (effects,)
+    ranges: FloatArray  # (effects, 2, 3): low, high, periodic
+    tables: FloatArray  # (effects, 2, TABLE_POINTS)
+    reach: FloatArray  # (effects, 2 BANK)
+    weights: FloatArray  # (effects, BANK)
+    times: FloatArray  # (3,): dwell's time and slip, heat's lag
+
+
+def rows_of(effects: Sequence[Hidden], amplitudes: Sequence[float]) -> Rows:
+    """Return effects with their amplitudes as the compiled loop takes them."""
+    rows = Rows(
+        len(effects),
+        np.zeros((MOST, 8), np.int64),
+        np.zeros(MOST),
+        np.zeros((MOST, 2, 3)),
+        np.ones((MOST, 2, TABLE_POINTS)),
+        np.ones((MOST, 2 * BANK)),
+        np.zeros((MOST, BANK)),
+        np.array([1.0, 1.0, 5.0]),
+    )
+    for k, (effect, amplitude) in enumerate(zip(effects, amplitudes, strict=True)):
+        names = [t.variable for t in effect.tables] + ["one"] * (2 - len(effect.tables))
+        rows.kinds[k, :4] = (
+            PLACES.index(effect.place),
+            OPERATORS.index(effect.operator),
+            effect.friction,
+            effect.similar,
+        )
+        rows.kinds[k, 4:6] = [VARIABLES.index(name) for name in names]
+        rows.kinds[k, 6] = len(effect.weights)
+        rows.amplitudes[k] = amplitude
+        for j, table in enumerate(effect.tables):
+            rows.ranges[k, j] = table.low, table.high, table.periodic
+            fine = np.linspace(table.low, table.high, TABLE_POINTS)
+            rows.tables[k, j] = np.interp(fine, table.x, table.values)
+        rows.reach[k, : len(effect.reach)] = effect.reach
+        rows.weights[k, : len(effect.weights)] = effect.weights
+        if "dwell" in names:
+            rows.times[:2] = effect.dwell_s
+        if "heat" in names:
+            rows.times[2] = effect.heat_s
+    return rows

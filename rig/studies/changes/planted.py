@@ -1,0 +1,113 @@
+"""Pairs of simulated campaigns of one rig: nothing changed, a parameter moved, an effect came."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.changes.compare import Change, compare
+from estimation.plant_file import shipped_plant
+from estimation.plant_models import declared
+from rig.simulation.varied import draw
+from rig.simulation.varied.build import spread_over
+
+MOVED: Mapping[str, tuple[str, ...]] = {
+    "constant": ("motor.torque_constant gain of motor", "gain of actuator motor_current_a"),
+    "motor_friction": ("friction.coulomb friction of motor",),
+    "motor_viscous": ("friction.viscous damping of motor",),
+    "spindle_friction": ("friction.coulomb friction of cable",),
+    "gear_stiffness": ("compliance.link compliance of gearbox",),
+    "cable_stiffness": ("compliance.link compliance of stretch",),
+}
+"""Parameter of the simulated rig to the names that are right for it."""
+
+FACTORS = (1.3, 2.0)
+"""A parameter is multiplied or divided by a factor between these."""
+
+RUNS = 8
+"""Runs of each campaign."""
+
+GEAR_RATIO = 35.0
+SECOND = 500_000
+"""Added to the seed of the sensors' noise in the second campaign."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One pair of campaigns and its answer.
+
+    Attributes:
+        seed: Seed of the rig.
+        planted: What changed, in words; empty where nothing did.
+        kind: `nothing`, `parameter` or `effect`.
+        found: The names of the changes found, those that share one place joined by `or`.
+        outcome: `named`, `in a set`, `missed`, `wrong`, or `right` where nothing changed.
+    """
+
+    seed: int
+    planted: str
+    kind: str
+    found: tuple[str, ...]
+    outcome: str
+
+
+def pairs(seeds: range) -> Iterator[Pair]:
+    """Yield one pair a seed: nothing, parameters and effects in turn."""
+    for seed in seeds:
+        kind = ("parameter", "effect", "nothing")[seed % 3]
+        yield _effect(seed) if kind == "effect" else _parameter(seed, kind)
+
+
+def _parameter(seed: int, kind: str) -> Pair:
+    stage = draw(seed, "clean", gear_ratio=GEAR_RATIO).stage
+    random = np.random.default_rng([seed, SECOND])
+    name = str(random.choice(list(MOVED)))
+    factor = float(np.exp(random.uniform(*np.log(FACTORS)) * random.choice([-1, 1])))
+    known = float(getattr(stage.plant, name))
+    moved = {name: factor * known} if kind == "parameter" else {}
+    later = replace(
+        stage, plant=replace(stage.plant, **moved), seed=seed + SECOND, clean={}, noise={}
+    )
+    runs = spread_over(stage.every, RUNS)
+    found = compare(
+        [stage.record(k) for k in runs],
+        [later.record(k) for k in runs],
+        declared(shipped_plant("reference")),
+    )
+    planted = f"{name} x {factor:.2f}" if moved else ""
+    return _judged(seed, planted, kind, found.changes, MOVED[name] if moved else ())
+
+
+def _effect(seed: int) -> Pair:
+    case = draw(seed, "strong", gear_ratio=GEAR_RATIO)
+    (hidden,) = case.truth.effects
+    later = replace(case.stage, seed=seed + SECOND, clean={}, noise={})
+    runs = spread_over(hidden.runs, RUNS)
+    found = compare(
+        [case.stage.record(k) for k in runs],
+        [later.record(k, case.switched) for k in runs],
+        declared(shipped_plant("reference")),
+    )
+    right = (hidden.family, *hidden.synonyms)
+    return _judged(seed, f"{hidden.family} at the {hidden.place}", "effect", found.changes, right)
+
+
+def _judged(
+    seed: int, planted: str, kind: str, changes: tuple[Change, ...], right: tuple[str, ...]
+) -> Pair:
+    def names(change: Change) -> tuple[str, ...]:
+        return (change.name, *change.alternatives)
+
+    def is_right(name: str) -> bool:
+        return any(name == one or name.startswith(f"{one} at ") for one in right)
+
+    found = tuple(" or ".join(names(change)) for change in changes)
+    if not changes:
+        outcome = "right" if kind == "nothing" else "missed"
+    elif not all(any(map(is_right, names(c))) for c in changes):
+        outcome = "wrong"
+    elif is_right(changes[0].name) and not changes[0].alternatives:
+        outcome = "named"
+    else:
+        outcome = "in a set"
+    return Pair(seed, planted, kind, found, outcome)

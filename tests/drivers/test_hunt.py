@@ -1,0 +1,120 @@
+"""Random sequences of commands and faults against the compiled core, and the search itself."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from benchmarks.hunt import FIRMWARE, MOST_EVENTS, Search, is_known, joined, run, write_settings
+
+pytestmark = [
+    pytest.mark.integration,
+    pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
+]
+
+SANITIZED = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
+def built(folder: Path, flags: tuple[str, ...] = ("-O1",), firmware: Path = FIRMWARE) -> Path:
+    program = folder / "hunt"
+    words = ["g++", "-std=c++17", "-ffp-contract=off", *flags, "-o", str(program)]
+    subprocess.run([*words, str(firmware / "proofs" / "hunt.cpp")], check=True)
+    return program
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("settings") / "settings.bin"
+    write_settings(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(tmp_path_factory.mktemp("hunt"), SANITIZED)
+
+
+def test_no_sequence_of_commands_arms_without_a_live_session_or_moves_beyond_the_limits(
+    sanitized: Path, settings: Path
+) -> None:
+    found = run(sanitized, settings, "commands", 0, 3000)
+    assert found.found == []
+    assert found.armings > 1000
+    assert found.trips > 1000
+
+
+def test_no_sequence_of_faults_breaks_a_rule_that_is_not_known(
+    sanitized: Path, settings: Path
+) -> None:
+    found = run(sanitized, settings, "faults", 0, 400)
+    assert found.open == []
+    assert found.trips > 200
+    assert found.farthest_rad > 2.5
+
+
+def test_two_halves_of_a_search_are_the_whole(sanitized: Path, settings: Path) -> None:
+    whole = run(sanitized, settings, "commands", 0, 40)
+    halves = [run(sanitized, settings, "commands", first, 20) for first in (0, 20)]
+    assert joined(*halves) == whole
+
+
+BROKEN = {
+    "the watchdog": (
+        "board.hpp",
+        "armed() && silent_us > patience_us",
+        "armed() && silent_us > 100 * patience_us",
+        "armed without a sign of life of its session",
+    ),
+    "the session": (
+        "session.hpp",
+        "if (number != offer()) return false;",
+        "if (number == 0) return false;",
+        "armed with a number that was not offered",
+    ),
+    "the emergency stop": (
+        "board.hpp",
+        "if (stopped_ && (in_force()",
+        "if (stopped_ && !armed() && (in_force()",
+        "in force while the emergency stop is pressed",
+    ),
+    "the name of a trip": (
+        "board.hpp",
+        "if (code != first_.code) return kWrongTrip;",
+        "",
+        "a trip was cleared by something else than its own name",
+    ),
+    "the limits of setpoints": (
+        "board.hpp",
+        "allowed = allowed && profile_.allow(staged_[i]);",
+        "",
+        "a load beyond its limit",
+    ),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_core_that_breaks_a_rule_is_found_with_few_events(
+    name: str, settings: Path, tmp_path: Path
+) -> None:
+    file, text, change, rule = BROKEN[name]
+    firmware = tmp_path / "firmware"
+    for part in ("core", "proofs"):
+        shutil.copytree(FIRMWARE / part, firmware / part)
+    source = firmware / "core" / file
+    assert text in source.read_text()
+    source.write_text(source.read_text().replace(text, change))
+    program = built(tmp_path, firmware=firmware)
+    searched = Search()
+    for kind in ("commands", "faults"):
+        searched = joined(searched, run(program, settings, kind, 0, 1500))
+    found = [events for _, broken, events in searched.open if broken == rule]
+    assert found
+    assert min(len(events) for events in found) <= MOST_EVENTS
+
+
+def test_a_known_case_is_known_with_whatever_else_happens() -> None:
+    assert is_known(["host pauses at 3 ms", "all encoders dead at 7 ms"])
+    assert not is_known(["encoder frozen at 7 ms"])
+    assert not is_known([])

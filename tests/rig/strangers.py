@@ -1,0 +1,155 @@
+"""Machines that nobody has: a linear axis driven by PWM, and a drive of two masses."""
+
+from pathlib import Path
+
+import numpy as np
+
+from estimation.recording import FloatArray
+
+AXIS = """
+schema = "rig.machine/1"
+
+[machine]
+name = "plotter"
+run_offsets = false
+
+[[axis]]
+name = "gantry"
+unit = "m"
+
+[[actuator]]
+name = "pwm_ratio"
+axis = "gantry"
+
+[[sensor]]
+name = "gantry_position_m"
+axis = "gantry"
+reads = "position"
+counts = 20000
+
+[data]
+[data.columns]
+time_s = "t:ms"
+pwm_ratio = "pwm:1/255"
+gantry_position_m = "x:mm"
+
+[data.runs]
+lap_s = 4.0
+"""
+
+DRIVE = """
+schema = "rig.machine/1"
+
+[machine]
+name = "bench drive"
+
+[[axis]]
+name = "input"
+unit = "rad"
+
+[[axis]]
+name = "output"
+unit = "rad"
+
+[[transmission]]
+name = "belt"
+input = "input"
+output = "output"
+ratio = RATIO
+compliant = true
+
+[[actuator]]
+name = "drive_current_a"
+axis = "input"
+
+[[sensor]]
+name = "input_angle_rad"
+axis = "input"
+reads = "position"
+counts = 1304
+
+[[sensor]]
+name = "output_angle_rad"
+axis = "output"
+reads = "position"
+counts = 2608
+
+[[sensor]]
+name = "cell_torque_n_m"
+axis = "output"
+reads = "effort"
+noise = 0.01
+
+[data]
+files = "*.csv"
+
+[data.columns]
+time_s = "t"
+input_angle_rad = "q_in:deg"
+output_angle_rad = "q_out:deg"
+drive_current_a = "i:mA"
+cell_torque_n_m = "cell:N m"
+
+[data.runs]
+changes = ["trial"]
+"""
+"""`RATIO` stands for the ratio."""
+
+
+def axis_table(file: Path, runs: int = 10, asymmetry: float = 0.0, seed: int = 1) -> None:
+    """Write a table of an axis whose viscous friction differs by direction, N s/m as share."""
+    random = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 4.0 * runs, 2e-3)
+    position = 0.15 * np.sin(2 * np.pi * time_s / 4.0) + 0.03 * np.sin(2.7 * time_s)
+    speed = np.gradient(position, time_s)
+    pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed + 0.05 * np.tanh(speed / 2e-3)
+    pwm += asymmetry * np.abs(speed) + random.normal(0.0, 1e-3, time_s.size)
+    read = np.round(position * 20000) / 20000
+    rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read])
+    np.savetxt(file, rows, delimiter=",", header="t,pwm,x", comments="", fmt="%.9g")
+
+
+def drive_table(
+    file: Path,
+    ratio: float = 35.0,
+    runs: int = 9,
+    rubs: float = 0.0,
+    lost_rad: float = 0.0,
+    seed: int = 1,
+) -> None:
+    """Write a table of a belt drive with a torque cell.
+
+    Args:
+        file: The table.
+        ratio: Turns of the input per turn of the output.
+        runs: Trials.
+        rubs: Share of the torque that friction takes at the input.
+        lost_rad: Half of the belt's free travel, at the output.
+        seed: Seed of the noise.
+    """
+    random = np.random.default_rng(seed)
+    parts = [_trial(k, ratio, rubs, lost_rad, random) for k in range(runs)]
+    rows = np.concatenate(parts)
+    head = "trial,t,q_in,q_out,i,cell"
+    np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.9g")
+
+
+def _trial(
+    k: int, ratio: float, rubs: float, lost_rad: float, random: np.random.Generator
+) -> FloatArray:
+    time_s = np.arange(0.0, 8.0, 1e-3)
+    turn = 2 * np.pi * time_s
+    output = 0.8 * np.sin((0.2 + 0.05 * (k % 3)) * turn + k) + 0.2 * np.sin(0.61 * turn)
+    torque = (0.5 + 0.5 * (k // 3)) * np.sin(0.33 * turn + 2 * k) + 0.3 * output
+    bend = 0.02 * torque + lost_rad * np.tanh(torque / 0.02)
+    angle = ratio * (output + bend)
+    speed = np.gradient(angle, time_s)
+    loss = 1e-5 * np.gradient(speed, time_s) + 2e-4 * speed + 4e-3 * np.tanh(speed / 0.5)
+    loss += rubs * np.abs(torque) / ratio * np.tanh(speed / 0.5)
+    current = (torque / ratio + loss) / 0.05
+    counts = [np.round(a * c / (2 * np.pi)) * 360 / c for a, c in ((angle, 8192), (output, 16384))]
+    read = [
+        1e3 * (current + random.normal(0, 2e-3, len(turn))),
+        torque + random.normal(0, 0.01, len(turn)),
+    ]
+    return np.column_stack([np.full(len(turn), k), time_s, *counts, *read])

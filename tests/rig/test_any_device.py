@@ -1,0 +1,238 @@
+"""Any registered driver where a rig has its logger: recorded, shown, calibrated, and left safe."""
+
+import json
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.device import Drive
+from drivers.dynamixel.driver import Dynamixel
+from drivers.dynamixel.fake import DynamixelFake
+from drivers.errors import DisarmUnconfirmedError, DriverError
+from drivers.moteus.driver import Moteus
+from drivers.moteus.fake import MoteusFake
+from drivers.registry import fakes
+from drivers.transport.faulty import Faults
+from drivers.transport.simulated import SimulatedTransport
+from rig.bench.logger import open_logger
+from rig.bench.session import Session
+from rig.cli.main import main
+from rig.configuration.config import Config, load_config
+from rig.errors import SafetyTripError, UsageError
+from rig.log.reader import read_log
+from rig.log.streams import SAMPLE
+
+pytestmark = pytest.mark.integration
+
+COUNTED = {"teensy": "spindle_count", "teensy-can": "spindle_count", "teensy-master": "yaw_count"}
+"""Drivers whose channels need a calibration, and one of these channels."""
+SHORT = 'name = "short"\n[[runs]]\nkind = "rest"\nduration_s = 1.0\n'
+DRIVES = {"dynamixel": (DynamixelFake, Dynamixel), "moteus": (MoteusFake, Moteus)}
+
+
+class Rig:
+    """A simulated rig whose drive's fake can be reached."""
+
+    def __init__(self, name: str, **changes: object) -> None:
+        make_fake, make_device = DRIVES[name]
+        self.fake = make_fake()
+        self.link = SimulatedTransport(self.fake)  # type: ignore[arg-type]
+        self.device = make_device(self.link)
+        self.config: Config = load_config(Path(f"{name}_simulated")).changed(**changes)
+
+    @property
+    def in_force(self) -> bool:
+        if isinstance(self.fake, DynamixelFake):
+            return self.fake.in_force
+        return bool(self.fake.mode)  # 0 is stopped
+
+
+@pytest.fixture
+def rig_of(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Rig]:
+    def make(name: str, **changes: object) -> Rig:
+        rig = Rig(name, **changes)
+        monkeypatch.setattr("rig.bench.logger.open_fake", lambda _: rig.device)
+        return rig
+
+    return make
+
+
+def moving(session: Session, seconds: float = 2.0, travel_rad: float = 0.4):
+    ticks = round(seconds * session.machine.profile.rate_hz)
+    return session.play(session.here[0] + np.linspace(0, travel_rad, ticks), np.zeros(ticks))
+
+
+@pytest.mark.parametrize("name", sorted(fakes()))
+def test_every_driver_is_recorded_and_shown(name: str, tmp_path: Path, capsys) -> None:
+    lines = ""
+    if name in COUNTED:
+        lines = f'[channels.shaft_rad]\ncounts = "{COUNTED[name]}"\nslope = 1e-3\n'
+    (tmp_path / "lines.toml").write_text(f'name = "own"\n[channels]\n{lines}')
+    (tmp_path / "rig.toml").write_text(
+        f'name = "{name}"\ncalibration = "{tmp_path / "lines.toml"}"\n'
+        f'[logger]\ndriver = "{name}"\nprofile = "sensor"\nurl = "sim://"\n'
+    )
+    (tmp_path / "short.toml").write_text(
+        'name = "short"\n[[runs]]\nkind = "rest"\nduration_s = 1.0\n'
+    )
+    rig = ("-c", str(tmp_path / "rig.toml"))
+    protocol = ("-p", str(tmp_path / "short.toml"))
+    assert main(["record", *rig, *protocol, "-o", str(tmp_path / "runs"), "--json"]) == 0
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert run["samples"] == run["expected"]
+    log = read_log(Path(run["path"]))
+    columns = log.topics[SAMPLE].rows
+    device = fakes()[name](Faults())
+    device.start()
+    channels = [channel for channel in device.channels if channel.unit != "count"]
+    device.close()
+    named = [n for n in columns.dtype.names if n not in ("time_s", "sequence", "flags")]
+    assert len(named) == (1 if name in COUNTED else len(channels))
+    assert (columns["flags"] == 0).all()
+    time_s = columns["time_s"]
+    assert time_s[-1] - time_s[0] == pytest.approx(1.0, abs=1.5 * np.diff(time_s).max())
+    assert main(["live", *rig, "--duration", "0.3", "--pace", "0", "--json"]) == 0
+    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert said[-1]["summary"]["lost"] == 0
+    assert set(said[0]["channels"]) <= set(named)
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_a_drive_follows_its_target_and_gives_all_that_it_measures(rig_of, name: str) -> None:
+    rig = rig_of(name)
+    with Session(rig.config, open_logger(rig.config)) as session:
+        next(session.rest(0.1))
+        readings = list(moving(session))
+        assert rig.in_force
+    columns = readings[-1].columns
+    assert abs(columns["spindle_angle_rad"][-1] - columns["target_angle_rad"][-1]) < 0.1
+    played = np.concatenate([reading.setpoint for reading in readings])
+    played = played[played >= 0]
+    assert np.array_equal(played, np.arange(len(played)))
+    assert 273 < columns["temperature_k"][-1] < 343
+    assert columns["supply_v"][-1] > 0
+    assert not rig.in_force
+
+
+def broken(session: Session, rig: Rig) -> None:
+    raise RuntimeError("a mistake in the program")
+
+
+def interrupted(session: Session, rig: Rig) -> None:
+    raise KeyboardInterrupt
+
+
+def terminated(session: Session, rig: Rig) -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def left_alone(session: Session, rig: Rig) -> None:
+    """Nothing goes wrong; the caller has seen enough."""
+
+
+WAYS_OUT = {
+    broken: RuntimeError,
+    interrupted: KeyboardInterrupt,
+    terminated: (KeyboardInterrupt, SystemExit),
+    left_alone: StopIteration,
+}
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+@pytest.mark.parametrize("way_out", WAYS_OUT, ids=lambda way: way.__name__)
+def test_no_way_out_leaves_a_motor_in_force(rig_of, name: str, way_out) -> None:
+    rig = rig_of(name)
+    with pytest.raises(WAYS_OUT[way_out]), Session(rig.config, open_logger(rig.config)) as session:  # noqa: PT012
+        next(session.rest(0.1))
+        readings = moving(session)
+        next(readings)
+        assert rig.in_force
+        way_out(session, rig)
+        for _ in readings:
+            if way_out is left_alone:
+                raise StopIteration
+    assert not rig.in_force
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"limits": {"motor_current_a": 0.002}}, "current"),
+        ({"limits": {"temperature_k": 290.0}}, "temperature_k reached"),
+        ({"safety": {"motor_speed_rad_s": 0.05}}, "too fast"),
+        ({"plausibility": {"following_rad": 0.01, "following_s": 0.02}}, "behind its target"),
+    ],
+)
+def test_the_limits_hold_on_a_drive(rig_of, name: str, change: dict, message: str) -> None:
+    rig = rig_of(name, **change)
+    unsafe = pytest.raises((SafetyTripError, DriverError), match=message)
+    with unsafe, Session(rig.config, open_logger(rig.config)) as session:
+        next(session.rest(0.1))
+        list(moving(session, 1.0, 2.0))
+    assert not rig.in_force
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_a_setpoint_beyond_the_travel_moves_nothing(rig_of, name: str) -> None:
+    rig = rig_of(name)
+    with Session(rig.config, open_logger(rig.config)) as session:
+        next(session.rest(0.1))
+        with pytest.raises(SafetyTripError, match="nothing was moved"):
+            next(moving(session, 1.0, 4.0))
+        assert not rig.in_force
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name: str, monkeypatch) -> None:
+    rig = rig_of(name)
+    unsafe = pytest.raises((SafetyTripError, DisarmUnconfirmedError), match="not confirm")
+    with unsafe, Session(rig.config, open_logger(rig.config)) as session:
+        next(session.rest(0.1))
+        for _ in moving(session):
+            monkeypatch.setattr(rig.fake, "transmit", lambda: b"")
+    rig.fake.advance(1000)  # nobody asks any more: its own watch ends it
+    current = rig.fake.current if isinstance(rig.fake, DynamixelFake) else rig.fake.torque_n_m
+    assert current == 0
+
+
+def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, capsys) -> None:
+    words = ("--yes", "--operator", "a", "--store", str(tmp_path / "s"), "--json")
+    rig = ("-c", "dynamixel_simulated", "-o", str(tmp_path / "raw"))
+    assert main(["calibrate", "current", *rig, *words]) == 0
+    said = json.loads(capsys.readouterr().out)
+    (record,) = said["records"].values()
+    assert record["fit"]["parameters"]["gain_a"] == pytest.approx(1.75, rel=0.02)
+    # the fake's rotor: 4 units of speed lost for 40 gained a milliampere, 0.229 rpm a unit
+    damping = 4 / 40 * 1e-3 / (0.229 * 2 * np.pi / 60)
+    assert said["found"]["damping_current_at_1_rad_s_a"] == pytest.approx(damping, rel=0.03)
+    assert abs(said["found"]["friction_current_a"]) < 1e-3
+
+
+def test_what_needs_a_motor_is_refused_in_words(tmp_path: Path, capsys) -> None:
+    text = 'name = "cell"\ncalibration = "sensor"\n[logger]\ndriver = "{}"\nprofile = "{}"\n'
+    sensor = tmp_path / "sensor.toml"
+    sensor.write_text(text.format("amt21", "sensor") + 'url = "sim://"\n')
+    for command in (["selftest"], ["clear"]):
+        assert main([*command, "-c", str(sensor)]) == 2
+        assert "no motors to arm, stop or test" in capsys.readouterr().err
+    drive = tmp_path / "drive.toml"
+    gains = "[controller]\nkp = 1\nki = 0\nkd = 0\nvelocity_filter = 1\n"
+    limits = "[limits]\nmotor_current_a = 1\nspindle_angle_rad = 1\n"
+    drive.write_text(text.format("amt21", "drive") + 'url = "sim://"\n' + gains + limits)
+    with pytest.raises(UsageError, match="has no motor"):
+        open_logger(load_config(drive))
+    drive.write_text(text.format("dynamixel", "drive") + 'url = "sim://"\n' + limits)
+    with pytest.raises(UsageError, match="controller"):
+        load_config(drive)
+
+
+def test_the_drives_of_the_registry_are_drives() -> None:
+    for name in (*DRIVES, "epos4"):
+        device = fakes()[name](Faults())
+        assert isinstance(device, Drive)
+        device.close()

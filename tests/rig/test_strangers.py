@@ -1,0 +1,65 @@
+"""Machines that nobody has, from a table to a named effect in a model that runs live."""
+
+import json
+
+import pytest
+
+from rig.cli.main import main
+from tests.rig.strangers import AXIS, DRIVE, axis_table, drive_table
+
+pytestmark = pytest.mark.integration
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        assert main([*words]) == 0
+        return capsys.readouterr().out
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("hidden", "found"),
+    [
+        ({}, []),
+        ({"rubs": 0.08}, [("input", "friction.load")]),
+        ({"lost_rad": 0.003}, [("belt", "transmission.backlash")]),
+    ],
+)
+def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidden, found):
+    (tmp_path / "drive.toml").write_text(DRIVE.replace("RATIO", "12.5"))
+    (tmp_path / "tables").mkdir()
+    drive_table(tmp_path / "tables" / "trials.csv", 12.5, **hidden)
+    run("import", "tables", "--machine", "drive.toml", "--out", "runs")
+    run("fit", "runs", "--machine", "drive.toml", "--out", "fitted.toml")
+    words = ["--quick", "--machine", "drive.toml", "--model-out", "model.toml", "--json"]
+    told = json.loads(run("diagnose", "runs", *words))
+    named = [(f["balance"], f["family"]) for f in told["findings"] if f["verdict"] == "identified"]
+    assert named == found
+    words = ["--machine", "drive.toml", "--model", "model.toml", "--speed", "0", "--json"]
+    assert "cell_torque_n_m" in run("replay", "runs", *words)
+    run("export", "model.toml", "--equation", "input", "--out", "input.h")
+    assert "cell_torque" in (tmp_path / "input.h").read_text()
+
+
+def test_a_noise_that_the_recordings_contradict_is_named(run, tmp_path, capsys):
+    drive_table(tmp_path / "trials.csv", runs=3)
+    text = DRIVE.replace("RATIO", "35.0").replace("noise = 0.01", "noise = 0.1")
+    (tmp_path / "drive.toml").write_text(text)
+    assert main(["machine", "check", "drive.toml", "trials.csv"]) == 1
+    assert "states a noise of 0.1 N m for cell_torque_n_m" in capsys.readouterr().out
+
+
+def test_an_axis_driven_by_pwm_is_diagnosed_in_units_of_its_drive(run, tmp_path):
+    (tmp_path / "axis.toml").write_text(AXIS)
+    axis_table(tmp_path / "axis.csv", asymmetry=0.03)
+    printed = run("machine", "check", "axis.toml", "axis.csv")
+    assert "Needed: A sensor of effort (N) on one of gantry." in printed
+    told = json.loads(run("diagnose", "axis.csv", "--quick", "--machine", "axis.toml", "--json"))
+    (finding,) = told["findings"]
+    assert finding["family"] == "friction.viscous_asymmetry"
+    assert finding["parameters"]["asymmetry"]["value"] == pytest.approx(0.03, rel=0.1)
