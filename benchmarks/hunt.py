@@ -6,7 +6,7 @@ Two kinds of sequences run against the compiled core (`firmware/proofs/hunt.cpp`
 hosts send anything at any time; in `faults` an honest host moves a small rig whose sensors, link,
 host, board and load motor fail, up to eight faults a sequence. Whatever breaks a rule is printed
 with its seed and its events, shrunk to as few as still break it. Where a search stopped is kept in
-`build/hunt.json` for the core that it searched; another core begins from seed 0.
+`build/hunt.json` for the core that it searched; another core begins from the start.
 
 Exit code 1 when a rule was broken by something else than what is in `KNOWN`.
 """
@@ -164,7 +164,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.hunt", description=__doc__)
     parser.add_argument("--hours", type=float, default=100.0, help="rig-hours with faults, in all")
     parser.add_argument("--commands", type=int, default=1_000_000, help="command sequences, in all")
-    parser.add_argument("--again", action="store_true", help="begin at seed 0")
+    parser.add_argument("--again", action="store_true", help="begin from the start")
     options = parser.parse_args()
     subprocess.run(["make", "-C", str(FIRMWARE), "build/hunt"], check=True, stdout=sys.stderr)  # noqa: S603, S607
     core = f"{source_hash() or 0:08x}"

@@ -45,7 +45,7 @@ class FlightRecorder:
         self._way.write(data)
 
     def rows(self, since: int) -> tuple[NDArray[np.void], int]:
-        """Return the bytes sent as rows of the log's stream, and the number of sendings.
+        """Return the sendings as rows of the log's stream, and how many sendings there are.
 
         Args:
             since: Number of the first sending to return.
