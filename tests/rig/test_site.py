@@ -21,6 +21,12 @@ def test_the_site_builds_strictly(tmp_path):
     build(config)
     assert "Troubleshooting" in (tmp_path / "index.html").read_text()
     assert "FsrMemory" in (tmp_path / "reference" / "calibration.html").read_text()
+    for page, word in (
+        ("effects", "ripple.motor"),
+        ("configuration", "watchdog_s"),
+        ("protocols", "loads_a"),
+    ):
+        assert word in (tmp_path / f"{page}.html").read_text()
     loaded = r"<(?:script[^>]+src|link[^>]+href)=\"https?://"
     pages = [page.read_text() for page in tmp_path.rglob("*.html")]
     assert not [page for page in pages if re.search(loaded, page)]
