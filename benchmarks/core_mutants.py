@@ -7,7 +7,7 @@ a constant, a result, or a statement left out. `--count` of them are drawn over 
 seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`) and against
 random sequences (`proofs/hunt.cpp`); one that passes both against every small input
 (`proofs/small.cpp`), and one that passes that too against the contract tests in Python. A mutant
-that does not compile is no mutant. What was found is kept in `build/core_mutants.json` for this
+that does not compile does not count. What was found is kept in `build/core_mutants.json` for this
 core; the command goes on where it stopped, and writes `docs/results/core-mutants.md`.
 """
 
