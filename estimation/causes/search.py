@@ -79,8 +79,10 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
     conditional = []
     for k, cause in enumerate(causes):
-        conditional.append(ranking.next_to([c for c in causes if c is not cause]))
-        causes[k] = conditional[-1][0]
+        # next to the others every candidate may be dropped: the cause then stands as it was found
+        ranked = ranking.next_to([c for c in causes if c is not cause]) or [cause]
+        conditional.append(ranked)
+        causes[k] = ranked[0]
     return Found(causes, conditional, joint, first[0].score)
 
 
