@@ -1,8 +1,7 @@
-"""Hidden torque of an arm's joints by families of effects, each joint with a form drawn anew.
+"""Hidden torque of an arm's joints by families of effects, each joint with a form of its own.
 
-The recipes are those of the simulated rigs (`rig.simulation.varied`): tables of random functions
-and banks of elements with memory, so the form of a hidden effect is drawn, not written. A joint
-takes the place of the recipes' spindle, or of their motor where the form is over another joint.
+The forms are random tables and banks of elements with memory (`rig.simulation.varied`), so the form
+of a hidden effect is drawn, not written.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,37 +13,157 @@ import numpy as np
 from estimation.arm.elements import slip
 from estimation.arm.motion import Motion
 from estimation.recording import FloatArray
-from rig.simulation.varied.drawn import Ranges
-from rig.simulation.varied.frictions import FRICTIONS, LOOPS
-from rig.simulation.varied.hidden import Hidden
-from rig.simulation.varied.outside import OUTSIDE
-from rig.simulation.varied.plant import draw_plant
+from rig.simulation.varied.forms import Random, course, falling, grid, rising, smooth, spots
+from rig.simulation.varied.frictions import bank, power
+from rig.simulation.varied.hidden import BANK
 
 OWN = "the simulation's own"
 """The written form that a study's paper was matched with."""
 
-IN_CATALOGUE = {
-    "loop after reversals": "hysteresis.presliding spindle",
-    "friction that falls with speed": "friction.stribeck spindle",
-    "friction along the angle": "friction.position spindle",
-    "bent drag": "friction.drag spindle",
-    "friction that changes with time": "friction.warmup spindle",
-}
-"""Family to its recipe. The catalogue of effects has the family, not the drawn form."""
+SIGN_SHARE = 0.02
+"""Speed over which a friction changes its sign, as a share of a joint's usual highest."""
 
-NOT_IN_CATALOGUE = {
-    "friction by another joint's angle": "friction.position motor",
-    "friction at tight spots": "unknown spindle tight spot",
-    "friction by acceleration": "unknown spindle pushed",
-    "drag on a part of the travel": "unknown spindle drag beyond",
-    "friction switched by speed": "unknown spindle switching",
+LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """What a joint's hidden torque may depend on, along a motion; each of shape (n,).
+
+    Attributes:
+        angle: Its angle or position.
+        speed: Its velocity.
+        acceleration: Its acceleration.
+        other: Angle of the next joint.
+        time_s: Time since the start of the run.
+    """
+
+    angle: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    other: FloatArray
+    time_s: FloatArray
+
+
+Torque = Callable[[Joint], FloatArray]
+Drawer = Callable[[Random, Joint], Torque]
+"""Draws a torque, its form laid out over the ranges of a joint's motion."""
+
+
+def _over(x: FloatArray, form: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return a form on the unit grid as a function over the usual range of a variable."""
+    low, high = np.percentile(x, [0.5, 99.5])
+    margin = 0.15 * (high - low)
+    at = np.linspace(low - margin, high + margin, len(form))
+    return lambda values: np.interp(values, at, form)
+
+
+def _sized(x: FloatArray, form: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return a form on the unit grid as a function of a variable's size, from 0."""
+    at = np.linspace(0.0, 1.15 * float(np.percentile(np.abs(x), 99.5)), len(form))
+    return lambda values: np.interp(np.abs(values), at, form)
+
+
+def _signed(reference: Joint, level: Torque) -> Torque:
+    """Return friction of a level."""
+    width = SIGN_SHARE * float(np.percentile(np.abs(reference.speed), 99.5))
+    return lambda joint: level(joint) * np.tanh(joint.speed / width)
+
+
+def _loop(random: Random, reference: Joint) -> Torque:
+    span = float(np.ptp(np.percentile(reference.angle, [0.5, 99.5])))
+    kind, reach, weights = bank(random, span * float(np.exp(random.uniform(*np.log([0.02, 0.15])))))
+    if kind == "bouc_wen":
+        turn, sharpness, loads = reach
+        return lambda j: bouc_wen(j.angle[:, None], np.array([turn]), sharpness, loads)[:, 0]
+    if kind == "stops":
+        return lambda j: np.column_stack([slip(j.angle[:, None], r)[:, 0] for r in reach]) @ weights
+    middle = np.median(reference.angle) + 0.4 * span * random.uniform(-1.0, 1.0, BANK)
+    on, off = reach[:BANK] + middle, reach[BANK:] + middle
+    return lambda j: _relays(j.angle, on, off) @ weights
+
+
+def _falling(random: Random, reference: Joint) -> Torque:
+    level = _sized(reference.speed, falling(random, grid() / random.uniform(0.05, 0.3)))
+    return _signed(reference, lambda j: level(j.speed))
+
+
+def _along(random: Random) -> FloatArray:
+    forms = (rising(random), 1.0 - rising(random), np.exp(0.8 * smooth(random, 0.7)))
+    form = forms[int(random.integers(len(forms)))]
+    return np.asarray(form - form.min())
+
+
+def _by_angle(random: Random, reference: Joint) -> Torque:
+    level = _over(reference.angle, _along(random))
+    return _signed(reference, lambda j: level(j.angle))
+
+
+def _drag(random: Random, reference: Joint) -> Torque:
+    size = _sized(reference.speed, power(random, 1.7, 3.0)(grid()))
+    return lambda j: size(j.speed) * np.sign(j.speed)
+
+
+def _by_time(random: Random, reference: Joint) -> Torque:
+    form = course(random, grid())
+    level = _sized(reference.time_s, form - form.min())
+    return _signed(reference, lambda j: level(j.time_s))
+
+
+def _by_other(random: Random, reference: Joint) -> Torque:
+    level = _over(reference.other, _along(random))
+    return _signed(reference, lambda j: level(j.other))
+
+
+def _tight(random: Random, reference: Joint) -> Torque:
+    level = _over(reference.angle, spots(random))
+    return _signed(reference, lambda j: level(j.angle))
+
+
+def _pushed(random: Random, reference: Joint) -> Torque:
+    form = falling(random, grid() / random.uniform(0.05, 0.2))
+    level = _sized(reference.acceleration, form if random.random() < 0.5 else 1.0 - form)
+    return _signed(reference, lambda j: level(j.acceleration))
+
+
+def _beyond(random: Random, reference: Joint) -> Torque:
+    x = grid() - random.uniform(0.35, 0.65)
+    side = 0.5 + 0.5 * np.tanh(x / random.uniform(0.03, 0.1)) * random.choice([-1.0, 1.0])
+    share = _over(reference.angle, side)
+    return lambda j: share(j.angle) * j.speed
+
+
+def _switched(random: Random, reference: Joint) -> Torque:
+    fast = np.percentile(np.abs(reference.speed), 99.5)
+    on, off = random.uniform(0.35, 0.6) * fast, random.uniform(0.08, 0.25) * fast
+    thresholds = np.array([on]), np.array([off])
+    return _signed(reference, lambda j: _relays(np.abs(j.speed), *thresholds)[:, 0])
+
+
+IN_CATALOGUE: Mapping[str, tuple[tuple[str, ...], Drawer]] = {
+    "loop after reversals": (LOOPS, _loop),
+    "friction that falls with speed": (("friction.stribeck",), _falling),
+    "friction along the angle": (("friction.position",), _by_angle),
+    "bent drag": (("friction.drag",), _drag),
+    "friction that changes with time": (("friction.warmup",), _by_time),
+}
+"""Family to the catalogue's names of it. The catalogue has the family, not the drawn form."""
+
+NOT_IN_CATALOGUE: Mapping[str, Drawer] = {
+    "friction by another joint's angle": _by_other,
+    "friction at tight spots": _tight,
+    "friction by acceleration": _pushed,
+    "drag on a part of the travel": _beyond,
+    "friction switched by speed": _switched,
 }
 """The same for functions of variables that no effect of the catalogue has."""
 
 FAMILIES = (OWN, *IN_CATALOGUE, *NOT_IN_CATALOGUE)
 
-SIGN_SHARE = 0.02
-"""Speed over which a friction changes its sign, as a share of a joint's usual highest."""
+
+def names_of(family: str) -> tuple[str, ...]:
+    """Return the catalogue's names of a family; none where the catalogue does not have it."""
+    return LOOPS if family == OWN else IN_CATALOGUE[family][0] if family in IN_CATALOGUE else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,39 +171,22 @@ class HiddenTorque:
     """A drawn hidden torque of every joint.
 
     Attributes:
-        parts: Of each joint, the drawn effect.
-        over: Of each joint, the joint whose angle its form is over.
-        fast: Of each joint, its usual highest speed, rad/s or m/s.
+        parts: Of each joint, the drawn torque.
         amplitude: Of each joint, N m or N: what makes it as large as asked on the motion it was
             drawn on.
     """
 
-    parts: tuple[Hidden, ...]
-    over: tuple[int, ...]
-    fast: FloatArray
+    parts: tuple[Torque, ...]
     amplitude: FloatArray
 
     def __call__(self, motion: Motion) -> FloatArray:
         """Return the torque along a motion, shape (n, joints)."""
-        columns = [
-            _along(part, _channels(motion, k, over), self.fast[k])
-            for k, (part, over) in enumerate(zip(self.parts, self.over, strict=True))
-        ]
+        columns = [part(_joint(motion, k)) for k, part in enumerate(self.parts)]
         torque: FloatArray = self.amplitude * np.column_stack(columns)
         return torque
 
 
-def names_of(family: str) -> tuple[str, ...]:
-    """Return the catalogue's names of a family; none where the catalogue does not have it."""
-    if family == OWN:
-        return LOOPS
-    name = IN_CATALOGUE.get(family, "").partition(" ")[0]
-    return LOOPS if name in LOOPS else (name,) if name else ()
-
-
-def draw_hidden(
-    family: str, rng: np.random.Generator, motion: Motion, rms: FloatArray
-) -> HiddenTorque:
+def draw_hidden(family: str, rng: Random, motion: Motion, rms: FloatArray) -> HiddenTorque:
     """Draw a hidden torque.
 
     Args:
@@ -93,73 +195,30 @@ def draw_hidden(
         motion: A motion; the forms are laid out over its ranges.
         rms: Standard deviation of each joint's torque along that motion, shape (joints,).
     """
-    recipe = {**FRICTIONS, **OUTSIDE}[{**IN_CATALOGUE, **NOT_IN_CATALOGUE}[family]]
+    drawer = IN_CATALOGUE[family][1] if family in IN_CATALOGUE else NOT_IN_CATALOGUE[family]
     joints = motion.position.shape[1]
-    plant = draw_plant(rng)  # of a drawn rig's sizes none is kept: the amplitude is set here
-    parts, over = [], []
-    for k in range(joints):
-        other = (k + 1) % joints if recipe is FRICTIONS["friction.position motor"] else k
-        parts.append(recipe(rng, _ranges(motion, k, other), plant).part)
-        over.append(other)
-    fast = np.percentile(np.abs(motion.velocity), 99.5, axis=0)
-    unit = HiddenTorque(tuple(parts), tuple(over), fast, np.ones(joints))  # type: ignore[arg-type]
-    spread = np.std(unit(motion), axis=0)
-    return HiddenTorque(unit.parts, unit.over, fast, rms / np.where(spread > 0, spread, 1.0))
-
-
-def _channels(motion: Motion, joint: int, over: int) -> dict[str, FloatArray]:
-    """Return the recipes' variables of a joint: it is the motor, and the other is the spindle."""
-    time = np.arange(len(motion)) * motion.period_s
-    own, other = motion.velocity[:, joint], motion.velocity[:, over]
-    return {
-        "motor_angle": motion.position[:, joint],
-        "motor_speed": own,
-        "motor_way": np.abs(own),
-        "spindle_angle": motion.position[:, over],
-        "spindle_speed": other,
-        "spindle_way": np.abs(other),
-        "acceleration": motion.acceleration[:, joint],
-        "run_time": time,
-        "campaign_time": time,
-    }
-
-
-def _ranges(motion: Motion, joint: int, over: int) -> Ranges:
-    channels = _channels(motion, joint, over)
-    low, high = (
-        {name: float(np.percentile(x, share)) for name, x in channels.items()}
-        for share in (0.5, 99.5)
+    unit = HiddenTorque(
+        tuple(drawer(rng, _joint(motion, k)) for k in range(joints)), np.ones(joints)
     )
-    usual = {name: float(np.median(np.abs(x))) for name, x in channels.items()}
-    seconds = len(motion) * motion.period_s
-    return Ranges(low, high, usual, seconds, seconds)
+    spread = np.std(unit(motion), axis=0)
+    return HiddenTorque(unit.parts, rms / np.where(spread > 0, spread, 1.0))
 
 
-def _along(part: Hidden, channels: Mapping[str, FloatArray], fast: float) -> FloatArray:
-    """Return a drawn effect's value along channels, shape (n,)."""
-    first, *factors = part.tables
-    value = OPERATORS[part.operator](part, channels[first.variable])
-    for table in factors:
-        value = value * table.at(channels[table.variable])
-    if part.friction:
-        value = value * np.tanh(channels[f"{part.place}_speed"] / (SIGN_SHARE * fast))
-    return value
+def _joint(motion: Motion, k: int) -> Joint:
+    return Joint(
+        motion.position[:, k],
+        motion.velocity[:, k],
+        motion.acceleration[:, k],
+        motion.position[:, (k + 1) % motion.position.shape[1]],
+        motion.period_s * np.arange(len(motion), dtype=np.float64),
+    )
 
 
-def _stops(part: Hidden, x: FloatArray) -> FloatArray:
-    elements = [slip(x[:, None], float(reach))[:, 0] for reach in part.reach]
-    return np.column_stack(elements) @ part.weights
-
-
-def _relays(part: Hidden, x: FloatArray) -> FloatArray:
-    """Return relays side by side; each starts off and keeps its state between its thresholds."""
-    half = len(part.reach) // 2
-    count = len(part.weights)
-    switched = (x[:, None] > part.reach[:count]).astype(np.float64)
-    switched -= x[:, None] < part.reach[half : half + count]
+def _relays(x: FloatArray, on: FloatArray, off: FloatArray) -> FloatArray:
+    """Return relays side by side, shape (n, relays); each keeps its state between thresholds."""
+    switched = (x[:, None] > on).astype(np.float64) - (x[:, None] < off)
     at = np.where(switched != 0, np.arange(len(x))[:, None], 0)
-    state = np.take_along_axis(switched, np.maximum.accumulate(at, axis=0), axis=0)
-    return np.asarray(state @ part.weights)
+    return np.take_along_axis(switched, np.maximum.accumulate(at, axis=0), axis=0)
 
 
 def bouc_wen(
@@ -189,16 +248,3 @@ def _bouc_wen(position, reach, sharpness, loads):  # type: ignore[no-untyped-def
             z += way * (1.0 - abs(z) ** sharpness * (loads * side + 1.0 - loads))
             state[k, j] = min(max(z, -1.0), 1.0)
     return state
-
-
-def _loop(part: Hidden, x: FloatArray) -> FloatArray:
-    reach, sharpness, loads = part.reach
-    return bouc_wen(x[:, None], np.array([reach]), float(sharpness), float(loads))[:, 0]
-
-
-OPERATORS: Mapping[str, Callable[[Hidden, FloatArray], FloatArray]] = {
-    "table": lambda part, x: part.tables[0].at(x),
-    "stops": _stops,
-    "relays": _relays,
-    "bouc_wen": _loop,
-}

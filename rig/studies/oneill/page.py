@@ -10,6 +10,7 @@ from estimation.closing import SPEED, is_closing
 from rig.output import figures
 from rig.output.render import render
 from rig.output.table import TextTable, to_markdown
+from rig.studies.coverage import coverage
 from rig.studies.oneill import fits, goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
@@ -157,6 +158,7 @@ def all_tables(study: Study, more: More) -> list[TextTable]:
         *(networks.tables(more.networks) if more.networks is not None else []),
         *([kinds_table(more.kinds)] if more.kinds else []),
         *(states.tables(more.states) if more.states is not None else []),
+        coverage("oneill"),
     ]
 
 

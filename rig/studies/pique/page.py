@@ -9,6 +9,7 @@ from rig.arm.search import DAMPING, LEAST_GAIN
 from rig.arm.within import STRETCHES
 from rig.output.figures import paired_bars, write_svgs
 from rig.output.table import TextTable, to_markdown
+from rig.studies.coverage import coverage
 from rig.studies.pique.study import EFFECTS, THESIS, WITHIN, Row, Study
 
 AIMS = {
@@ -71,7 +72,14 @@ def notes(study: Study) -> list[str]:
 def tables(study: Study) -> list[TextTable]:
     """Return the study's tables."""
     others = [_others(study)] if any(r.tested_on not in study.paths for r in study.rows) else []
-    return [_errors(study), *others, _kept(study), _dropped(study), _parameters(study)]
+    return [
+        _errors(study),
+        *others,
+        _kept(study),
+        _dropped(study),
+        _parameters(study),
+        coverage("pique"),
+    ]
 
 
 def markdown(study: Study, figures: Sequence[str] = ()) -> str:
