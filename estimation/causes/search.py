@@ -125,8 +125,10 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     conditional = []
     for k, cause in enumerate(causes):
         others = [c for c in causes if c is not cause]
-        conditional.append(_ranked(_with(joint, others), pool, folds, numbers))
-        causes[k] = conditional[-1][0]
+        # with the others there, noise may hide every candidate: the cause then stands by its chain
+        ranked = _ranked(_with(joint, others), pool, folds, numbers) or [cause]
+        conditional.append(ranked)
+        causes[k] = ranked[0]
     return Found(causes, conditional, joint, first[0].score)
 
 

@@ -17,8 +17,6 @@ from rig.simulation.varied.forms import Random, course, falling, grid, rising, s
 from rig.simulation.varied.frictions import bank, power
 from rig.simulation.varied.hidden import BANK
 
-p
-
 OWN = "the simulation's own"
 """The written form that a study's paper was matched with."""
 
