@@ -97,6 +97,10 @@ MUTANTS ?=
 mutants: $(VENV)/.developing
 	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
+# damages the firmware's core in 200 places; goes on where it stopped; an hour
+mutants-core: $(VENV)/.developing firmware
+	$(BIN)/python -m benchmarks.core_mutants $(MUTANTS)
+
 figures: $(VENV)/.developing
 	for script in docs/figures/*.py; do $(BIN)/python $$script || exit 1; done
 

@@ -12,12 +12,12 @@ from pathlib import Path
 
 from benchmarks.ratio import Ratio
 from estimation import model_file
+from estimation.causes.candidates import candidates
 from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
-from estimation.causes.numbers import DEFAULT
-from estimation.causes.search import candidates, evaluate
+from estimation.causes.search import assessed
 from estimation.recording import Recording
 from rig.simulation.campaign import simulate_reference_campaign
 
@@ -87,9 +87,9 @@ def _cost(recordings: tuple[Recording, ...], share: float) -> Cost:
         layout = lay_out([model], recordings, names)
         add_instruments(layout, names)
         joint = Joint(layout)
-        pool = candidates(layout, joint)[::step]
-        evaluate(joint, pool, folds_of(layout), DEFAULT)
-        tried = len(pool)
+        pool = candidates(joint)[::step]
+        assessed(joint, pool, folds_of(layout))
+        tried = sum(len(group.candidates) for group in pool)
 
     search()  # compiles
     seconds = []

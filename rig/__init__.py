@@ -25,6 +25,7 @@ __all__ = [
     "save",
     "simulate",
     "to_pandas",
+    "to_polars",
     "to_xarray",
 ]
 

@@ -13,6 +13,7 @@ from rig.library import read as read
 from rig.library import save as save
 from rig.library import simulate as simulate
 from rig.library import to_pandas as to_pandas
+from rig.library import to_polars as to_polars
 from rig.library import to_xarray as to_xarray
 
 __version__: str

@@ -296,6 +296,29 @@ def to_pandas(campaign: Campaign) -> Any:
     return pd.concat(parts, ignore_index=True)
 
 
+def to_polars(campaign: Campaign) -> Any:
+    """Return all runs that count as one Polars table, a row a sample, with run and conditions.
+
+    Raises:
+        MissingExtraError: Polars is not installed.
+    """
+    try:
+        import polars as pl
+    except ImportError as error:
+        raise _missing("Polars") from error
+    parts = [
+        pl.DataFrame(
+            {"time_s": r.time_s, **{n: np.asarray(values) for n, values in r.columns.items()}}
+        ).select(pl.lit(r.name).alias("run"), *_literals(pl, r), pl.all())
+        for r in campaign.evidence
+    ]
+    return pl.concat(parts, how="diagonal")
+
+
+def _literals(pl: Any, recording: Recording) -> list[Any]:
+    return [pl.lit(value).alias(name) for name, value in recording.conditions.items()]
+
+
 def to_xarray(recording: Recording) -> Any:
     """Return a run as an xarray data set over `time_s`, units and conditions as attributes.
 

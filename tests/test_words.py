@@ -43,6 +43,8 @@ BANNED: dict[str, tuple[str, str]] = {
 
 RIGHT = {
     "estimation/arm/effects.py": ("bent cable J",),
+    "rig/arm/hidden.py": ("bent drag",),
+    "rig/grasper/hidden.py": ("bent in the load",),
     "estimation/effects/friction_capstan_wrist.py": ("straight and bent",),
     "estimation/effects/ripple_output.py": ("bent shaft",),
     "estimation/effects/sensor_crosstalk.py": ("bent mount",),

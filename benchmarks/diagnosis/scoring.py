@@ -127,8 +127,8 @@ def _level(hidden: Hidden, findings: Sequence[Report]) -> str:
             continue
         families = {finding["family"], *finding["alternatives"]}
         named = finding["verdict"] in ("identified", "one_of")
-        if named and families <= {*hidden.families}:
-            said.add("right name")  # effects that no sensor distinguishes are one name
+        if named and finding["family"] in hidden.families:
+            said.add("right name")  # alone or as the likeliest of a set
         elif finding["verdict"] == "one_of" and families & {*hidden.families}:
             said.add("one of")
         elif finding["verdict"] == "depends_on" and _variables_right(hidden, finding):

@@ -127,6 +127,15 @@ class FirmwareBoard:
         """Whether the motors are, or may any moment be, given current."""
         return bool(self._functions.rig_board_in_force(self._handle))
 
+    @property
+    def trip(self) -> int:
+        """Code of what it has tripped over, 0 for nothing."""
+        return int(self._functions.rig_board_trip(self._handle))
+
+    def restore_trip(self, code: int) -> None:
+        """Take over a trip from before this start; it is to be cleared here, too."""
+        self._functions.rig_board_restore(self._handle, code)
+
     def assume_hot(self) -> None:
         """Take the motors for as hot as they may be, where nothing is known of the time before."""
         self._functions.rig_board_assume_hot(self._handle)
@@ -254,6 +263,8 @@ def _load(path: Path, built_ns: int) -> ctypes.CDLL:
         ("rig_board_limit", number, (pointer, text)),
         ("rig_board_stop", None, (pointer, number)),
         ("rig_board_in_force", number, (pointer,)),
+        ("rig_board_trip", number, (pointer,)),
+        ("rig_board_restore", None, (pointer, number)),
         ("rig_board_skip", None, (pointer, word)),
         ("rig_board_destroy", None, (pointer,)),
         ("rig_board_receive", None, (pointer, text, size)),

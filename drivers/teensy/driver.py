@@ -13,78 +13,16 @@ from drivers.errors import (
     DisarmUnconfirmedError,
     DriverError,
     FrameError,
-    ProtocolMismatchError,
 )
 from drivers.link import FramedLink, LinkCounters
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity
-from drivers.teensy.grasper import GRASPER
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Ack, Identity, Kind, Result, TripReport
 from drivers.teensy.reference import REFERENCE
+from drivers.teensy.refusals import other_layout, other_protocol, refused
+from drivers.teensy.setpoints import whole_setpoints
 from drivers.transport.transport import Transport
-
-FLASH = "Run: rig firmware flash"
-_REASONS: dict[int, tuple[str, str]] = {
-    Result.UNKNOWN_KIND: ("The command is unknown to the board.", "Run: rig firmware flash"),
-    Result.WRONG_SIZE: ("The command has the wrong size.", "Run: rig firmware flash"),
-    Result.WRONG_VERSION: ("Its frame version differs.", "Run: rig firmware flash"),
-    Result.BAD_VALUE: (
-        "A value is not finite, out of its range, or beyond the limits it was armed with.",
-        "Check gains, limits and setpoints.",
-    ),
-    Result.QUEUE_FULL: (
-        f"Its queue holds {protocol.QUEUE_CAPACITY} setpoints and is full.",
-        "Read samples, then queue on.",
-    ),
-    Result.NOT_REFERENCED: (
-        "Its counts have no zeros: it was restarted, or an encoder was doubted.",
-        "Run: rig reference",
-    ),
-    Result.NOT_AT_REST: (
-        "It is armed, or a shaft is turning.",
-        "Disarm it, let go of the shafts and try again.",
-    ),
-    Result.NOT_ARMED: (
-        "It is not armed: it never was, was disarmed, or its watchdog or a limit tripped.",
-        "Look at the status of its samples, then arm it.",
-    ),
-    Result.WRONG_SESSION: (
-        "It was armed by another program, or by an earlier command of this one.",
-        "Let only one program move the rig.",
-    ),
-    Result.OLD_SEQUENCE: (
-        "A later command of this program has come before it.",
-        "Look for a link that doubles or re-orders frames.",
-    ),
-    Result.TRIPPED: (
-        "It tripped, or its emergency stop is pressed, and nobody has cleared that.",
-        "Find the cause, then run: rig clear",
-    ),
-    Result.WRONG_TRIP: (
-        "It has tripped over something else.",
-        "Read its trip again, then clear that one.",
-    ),
-    Result.ALREADY_ARMED: (
-        "It is armed already.",
-        "Disarm it first: rig stop",
-    ),
-    Result.TOO_HOT: (
-        "More than half of the heat its motors may take is used up, or it was just started and"
-        " the heat from before is not known.",
-        "Wait; they cool while nothing moves.",
-    ),
-    Result.TOO_FAST: (
-        "A setpoint asks for a motion that is too fast: it is farther from the one before it than"
-        " the motor may turn in a tick.",
-        "Let the trajectory begin where the shaft stands, or slow it down; [safety]"
-        " motor_speed_rad_s is the limit.",
-    ),
-    Result.BEYOND_BOARD: (
-        "A limit or a command is wider than those the board was built with (wiring*.hpp).",
-        "Choose narrower limits. Wider ones need another build of the firmware.",
-    ),
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,16 +106,9 @@ class TeensyLogger:
         try:
             identity = protocol.decode_identity(self._request(Kind.HELLO_REPLY, hello))
         except FrameError as error:
-            raise self._mismatch("a protocol of another layout", str(error)) from error
+            raise other_layout(self._link.transport.url, self._profile, str(error)) from error
         if identity.protocol_hash != self._profile.protocol_hash:
-            other = _profile_named(identity.protocol_hash)
-            raise self._mismatch(
-                f"protocol {identity.protocol_hash:08x}" + (f" ({other})" if other else ""),
-                f"The board {identity.serial} has firmware {identity.firmware_version},"
-                f" this program goes with"
-                f" {protocol.version_text(protocol.FIRMWARE_VERSION)}.",
-                f'Write profile = "{other}" into [logger], or {FLASH}' if other else FLASH,
-            )
+            raise other_protocol(self._link.transport.url, self._profile, identity)
         self._identity = identity
         return identity
 
@@ -267,13 +198,7 @@ class TeensyLogger:
             DriverError: The arrays do not fit each other or the board's number range.
         """
         self._require_identity()
-        names, layout = self._profile.setpoint_names, self._profile.setpoint
-        if len(columns) != len(names):
-            raise DriverError(f"A setpoint has {', '.join(names)}; {len(columns)} were given.")
-        whole = [_whole(values, layout[n], n) for n, values in zip(names, columns, strict=True)]
-        if len({values.shape for values in whole}) > 1:
-            sizes = ", ".join(f"{v.size} of {n}" for n, v in zip(names, whole, strict=True))
-            raise DriverError(f"The fields of the setpoints differ in number: {sizes}.")
+        whole = whole_setpoints(columns, self._profile)
         for first in range(0, whole[0].size, self._profile.max_setpoints):
             block = [values[first : first + self._profile.max_setpoints] for values in whole]
             payload = self._profile.encode_setpoints(self._number(), block, self._session)
@@ -340,14 +265,6 @@ class TeensyLogger:
         finally:
             self._link.transport.close()
 
-    def _mismatch(self, theirs: str, why: str, fix: str = FLASH) -> ProtocolMismatchError:
-        return ProtocolMismatchError(
-            f"The board at {self._link.transport.url} has {theirs}, this program"
-            f" protocol {self._profile.protocol_hash:08x} ({self._profile.name}).",
-            why,
-            fix,
-        )
-
     def _unconfirmed(self, why: str) -> DisarmUnconfirmedError:
         return DisarmUnconfirmedError(
             f"The board at {self._link.transport.url} has not confirmed that it is disarmed.",
@@ -376,9 +293,7 @@ class TeensyLogger:
         ack = protocol.decode_ack(self._request(Kind.ACK, payload))
         self.queue_free = ack.queue_free
         if ack.result != Result.OK:
-            why, fix = _REASONS.get(ack.result, (f"Its reason has number {ack.result}.", ""))
-            what = f"The board at {self._link.transport.url} refused {kind.name.lower()}."
-            raise CommandRefusedError(what, why, fix, ack.result)
+            raise refused(self._link.transport.url, kind, ack.result)
         return ack
 
     def _request(self, expected: Kind, payload: bytes) -> np.void:
@@ -423,33 +338,3 @@ class TeensyLogger:
 
 
 _ACK = bytes([Kind.ACK])
-
-
-def _profile_named(protocol_hash: int) -> str:
-    """Return which of this program's profiles has that hash, if any."""
-    named = [
-        profile.name for profile in (REFERENCE, GRASPER) if protocol_hash == profile.protocol_hash
-    ]
-    return named[0] if named else ""
-
-
-def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArray[Any]:
-    """Return setpoints in the board's number type.
-
-    Raises:
-        DriverError: Not whole numbers in one dimension, or outside the type's range.
-    """
-    array = np.atleast_1d(np.asarray(values))
-    bounds = np.iinfo(kind)
-    if not np.issubdtype(array.dtype, np.integer) or array.ndim != 1:
-        raise DriverError(
-            f"A {name} setpoint is a whole number, not {array.dtype} of {array.ndim} dimensions.",
-            fix="Round to counts first.",
-        )
-    if array.size and not (bounds.min <= array.min() and array.max() <= bounds.max):
-        raise DriverError(
-            f"A {name} setpoint lies outside {bounds.min}..{bounds.max}.",
-            f"The setpoints reach from {array.min()} to {array.max()}.",
-        )
-    whole: NDArray[Any] = array.astype(kind)
-    return whole

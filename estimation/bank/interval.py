@@ -1,22 +1,26 @@
 """Intervals from the errors on runs that were not fitted.
 
-The width follows the state: a linear fit of the absolute error on a few products. It is then scaled
-so that the wanted share of the errors on left-out runs lies inside. Since the run's offset is the
-larger part of the error, a run lies wholly inside, or has a tail outside; the share holds over runs
-like those fitted, not within each. Runs are the units that can be exchanged, so of R runs the
-quantile is taken at coverage x (1 + 1 / R), as conformal prediction does for R samples. Where runs
-state conditions, the width is raised so that the share holds too on the lowest and highest level of
-each condition, left out in turn (`edges`, `widened`).
+The width follows the state: a linear fit of the absolute error on a few products, scaled by the
+root mean square of left-out errors over it. A run's own offset is the larger part of the error,
+so the runs are the sample, not their readings: of R runs the quantile is Student's with R - 1
+degrees of freedom, and the variance of a new run's prediction 1 + 1 / R times theirs. The conformal
+quantile of so few runs would be their largest error, twice as wide as needed on 20 runs (decision
+221).
 
-Source: locally weighted split conformal prediction, J. Lei et al., "Distribution-free predictive
-inference for regression", Journal of the American Statistical Association 113 (2018), section 5.2.
+Away from the fitted conditions the squared half width grows (`estimation.bank.beyond`).
+
+Sources: the shape as in J. Lei et al., "Distribution-free predictive inference for regression",
+Journal of the American Statistical Association 113 (2018), section 5.2; the quantile as of a new
+observation of a normal sample, G. J. Hahn, W. Q. Meeker, "Statistical Intervals" (1991), 4.7.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
+from estimation.bank.beyond import Beyond
 from estimation.bank.fitting import Normal, Pool, Settings, Shape, solve
 from estimation.bank.states import Bank, Product
 from estimation.recording import FloatArray
@@ -39,19 +43,34 @@ class Interval:
         columns: Columns of the design that the width depends on, shape (m,).
         weights: Their weights, shape (m,), in the target's unit.
         least: Smallest half width, in the target's unit.
+        beyond: What is added to its square away from the fitted conditions; NaN beyond its nodes.
+        price: What a score of 1 adds to its square at best knowledge, the target's unit squared.
+        usual_score: Score that left-out runs have, which the weights include.
     """
 
     columns: np.ndarray
     weights: FloatArray
     least: float
+    beyond: Beyond
+    price: float = 0.0
+    usual_score: float = 0.0
 
     @property
     def typical(self) -> float:
         """Half the width where the error is of its mean size, in the target's unit."""
         return self.least / NARROWEST
 
-    def half_width(self, design: FloatArray) -> FloatArray:
-        """Return half the interval's width for each row of a design, shape (n,)."""
+    def half_width(self, design: FloatArray, places: FloatArray) -> FloatArray:
+        """Return half the interval's width for each row of a design, shape (n,); NaN if unknown.
+
+        Args:
+            design: The bank's products, shape (n, size).
+            places: Conditions of the rows, from `estimation.bank.beyond.coordinates`.
+        """
+        return np.asarray(np.sqrt(self.usual(design) ** 2 + self.beyond.at(places)))
+
+    def usual(self, design: FloatArray) -> FloatArray:
+        """Return the half width where runs were fitted, shape (n,)."""
         width = np.maximum(design[:, self.columns] @ self.weights, self.least)
         return np.where(np.isfinite(design).all(axis=1), width, np.nan)
 
@@ -61,6 +80,10 @@ class Interval:
             "width_columns": self.columns,
             "width_weights": self.weights,
             "width_least": np.array(self.least),
+            "beyond_lowest": self.beyond.lowest,
+            "beyond_step": self.beyond.step,
+            "beyond_values": self.beyond.values,
+            "beyond_price": np.array([self.price, self.usual_score]),
         }
 
     @classmethod
@@ -72,73 +95,69 @@ class Interval:
             arrays["width_columns"].astype(np.int64),
             arrays["width_weights"],
             float(arrays["width_least"]),
+            Beyond(arrays["beyond_lowest"], arrays["beyond_step"], arrays["beyond_values"]),
+            *arrays["beyond_price"].tolist(),
         )
-
-
-def rescaled(
-    source: Interval,
-    designs: Sequence[FloatArray],
-    residuals: Sequence[FloatArray],
-    coverage: float = COVERAGE,
-) -> Interval:
-    """Return an interval of the same shape that covers a few runs' errors; never a narrower one.
-
-    Args:
-        source: The interval before.
-        designs: Design of each run, shape (n, size).
-        residuals: Error of each run, shape (n,).
-        coverage: The share, raised for few runs as in `calibrate`: up to 19 runs, all of them.
-    """
-    widths = np.concatenate([source.half_width(design) for design in designs])
-    level = min(coverage * (1 + 1 / len(designs)), 1.0)
-    factor = max(float(np.quantile(np.abs(np.concatenate(residuals)) / widths, level)), 1.0)
-    return Interval(source.columns, factor * source.weights, factor * source.least)
-
-
-def widened(
-    interval: Interval,
-    designs: Sequence[FloatArray],
-    residuals: Sequence[FloatArray],
-    coverage: float = COVERAGE,
-) -> Interval:
-    """Return an interval that covers a share of the errors beyond the edges; never a narrower one.
-
-    Args:
-        interval: The interval of runs like those fitted.
-        designs: Design of each run at an extreme level of a condition, shape (n, size).
-        residuals: Its error by weights fitted without that level, shape (n,).
-        coverage: The share.
-    """
-    ratio = [
-        np.abs(residual) / interval.half_width(design)
-        for design, residual in zip(designs, residuals, strict=True)
-    ]
-    factor = max(float(np.quantile(np.concatenate(ratio), coverage)), 1.0)
-    return Interval(interval.columns, factor * interval.weights, factor * interval.least)
 
 
 def calibrate(
     bank: Bank,
     designs: Sequence[FloatArray],
     residuals: Sequence[FloatArray],
+    grid: Beyond,
     coverage: float = COVERAGE,
 ) -> Interval:
-    """Return the interval that covers a share of the errors on left-out runs.
+    """Return the interval of the errors on left-out runs, with nothing added anywhere.
 
     Args:
         bank: The bank of the designs.
         designs: Design of each run, shape (n, size).
         residuals: Error of each run by weights that it was not fitted with, shape (n,).
-        coverage: The share.
+        grid: A table whose nodes are those of the conditions.
+        coverage: The share of a new run's samples that it covers on average.
     """
     columns = np.array([bank.products.index(p) for p in SHAPE if p in bank.products])
     sizes = [np.abs(residual) for residual in residuals]
     parts = [design[:, columns] for design in designs]
     runs = [Normal.of(part, size[:, None]) for part, size in zip(parts, sizes, strict=True)]
     weights = solve(Pool.of(runs), Shape.plain(len(columns)), Settings(offset_share=0.0))[:, 0]
-    size = np.concatenate(sizes)
-    least = NARROWEST * float(size.mean())
-    width = np.maximum(np.concatenate(parts) @ weights, least)
-    level = min(coverage * (1 + 1 / len(sizes)), 1.0)
-    scale = float(np.quantile(size / width, level))
-    return Interval(columns, scale * weights, scale * least)
+    nothing = replace(grid, values=np.zeros_like(grid.values))
+    shape = Interval(columns, weights, NARROWEST * float(np.concatenate(sizes).mean()), nothing)
+    usual = [shape.usual(design) for design in designs]
+    squares = [np.mean((size / width) ** 2) for size, width in zip(sizes, usual, strict=True)]
+    variance = (1 + 1 / len(sizes)) * float(np.mean(squares))
+    return scaled(shape, student(len(sizes) - 1, coverage) * variance**0.5)
+
+
+def with_scores(interval: Interval, scores: FloatArray, doubt: float = 1.0) -> Interval:
+    """Return an interval whose squared half width also grows by a score of each node.
+
+    Args:
+        interval: The interval before, with its price and usual score.
+        scores: The scores, on the interval's grid.
+        doubt: Factor on the price.
+    """
+    added = doubt * interval.price * np.maximum(scores - interval.usual_score, 0.0)
+    beyond = replace(interval.beyond, values=interval.beyond.values + added)
+    return replace(interval, beyond=beyond)
+
+
+def scaled(interval: Interval, factor: float) -> Interval:
+    """Return an interval of another width everywhere."""
+    return replace(
+        interval,
+        weights=factor * interval.weights,
+        least=factor * interval.least,
+        beyond=replace(interval.beyond, values=factor**2 * interval.beyond.values),
+    )
+
+
+def covered_share(error: FloatArray, half_width: FloatArray) -> float | None:
+    """Return the share of errors inside their interval, of those that have one; None without."""
+    stated = np.isfinite(half_width)
+    return float(np.mean(np.abs(error) <= half_width, where=stated)) if stated.any() else None
+
+
+def student(freedom: int, coverage: float = COVERAGE) -> float:
+    """Return the quantile of Student's distribution that a share lies within, both signs."""
+    return float(stats.t.ppf((1 + coverage) / 2, freedom))

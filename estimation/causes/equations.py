@@ -76,6 +76,12 @@ class RunSignals:
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
 
+    def shaken(self) -> "RunSignals":
+        """Return the run with a second realisation of its readings' noise, without instruments."""
+        return replace(
+            self, channels={n: x + self.noise.get(n, 0.0) for n, x in self.channels.items()}
+        )
+
     @cached_property
     def memo(self) -> dict[object, FloatArray | None]:
         """Columns already worked out."""
@@ -198,20 +204,29 @@ class Layout:
         equations: Name to equation.
         runs: The runs, in the order they were recorded.
         measured: Channels that every run has.
+        shaken: The runs once more with each reading's noise added to it a second time, in the same
+            order, instruments included: how a column follows noise. Filled with the instruments.
         independent: Pairs of an effort and an equation that has it from other sensors than its own.
         undecided: Declared equation that is not laid out to the reason.
+        left_out: Run without enough samples of some equation to the reason.
     """
 
     equations: Mapping[str, Equation]
     runs: Sequence[RunSignals]
     measured: tuple[str, ...]
+    shaken: list[RunSignals] = field(default_factory=list)
     independent: set[tuple[str, str]] = field(default_factory=set)
     undecided: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
         kept = set(names)
-        return replace(self, runs=[run for run in self.runs if run.name in kept])
+        return replace(
+            self,
+            runs=[run for run in self.runs if run.name in kept],
+            shaken=[run for run in self.shaken if run.name in kept],
+        )
 
 
 def lay_out(
@@ -225,7 +240,7 @@ def lay_out(
         train: Names of the runs that may be fitted on.
 
     Raises:
-        LayoutError: A run has no sample to regress on.
+        LayoutError: No run has samples enough to regress on.
         FitError: An equation cannot be identified.
     """
     timed = on_one_clock(recordings)
@@ -247,9 +262,9 @@ def lay_out(
             undecided[model.balance] = error
     if not equations:
         raise next(iter(undecided.values()))
-    runs = [_signals(r, equations, measured) for r in timed]
+    runs, lost = _laid_out(timed, equations, measured)
     reasons = {name: str(error) for name, error in undecided.items()}
-    return Layout(equations, runs, measured, undecided=reasons)
+    return Layout(equations, runs, measured, undecided=reasons, left_out=lost)
 
 
 def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
@@ -260,15 +275,24 @@ def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
     Raises:
         LayoutError: All of them are.
     """
-    runs, lost = [], None
-    for recording in on_one_clock(recordings):
+    runs, lost = _laid_out(on_one_clock(recordings), layout.equations, layout.measured)
+    return Layout(layout.equations, runs, layout.measured, left_out=lost)
+
+
+def _laid_out(
+    recordings: Sequence[Recording], equations: Mapping[str, Equation], measured: Sequence[str]
+) -> tuple[list[RunSignals], dict[str, str]]:
+    """Return the runs, and those without enough samples of some equation with the reason."""
+    runs: list[RunSignals] = []
+    lost: dict[str, LayoutError] = {}
+    for recording in recordings:
         try:
-            runs.append(_signals(recording, layout.equations, layout.measured))
+            runs.append(_signals(recording, equations, measured))
         except LayoutError as error:
-            lost = error
-    if lost is not None and not runs:
-        raise lost
-    return Layout(layout.equations, runs, layout.measured)
+            lost[recording.name] = error
+    if lost and not runs:
+        raise next(iter(lost.values()))
+    return runs, {name: error.what for name, error in lost.items()}
 
 
 def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:

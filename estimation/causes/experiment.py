@@ -88,7 +88,7 @@ def question(answer: Answer, place: int) -> Question | None:
             _label(one),
             share / total,
             one.candidate.cause,
-            one.amplitudes / one.candidate.laid.size,
+            one.amplitudes / one.candidate.size,
         )
         for share, one in likely
     )

@@ -22,6 +22,14 @@ PLAY = 0.06
 GROWTH_S, FADE_S = 0.1, 0.3
 """Dwell: the logarithm of the last rest over the first time, fading in motion by the second."""
 
+ROLE_OF_VARIABLE = {
+    "velocity_sign": "speed",
+    "velocity": "speed",
+    "history": "travel",
+    "dwell": "speed",
+}
+"""Variable to the role of an effect that its channel plays, where the names differ."""
+
 LOOSE_PLACES = ("loss", "deflection", "actuator")
 
 
@@ -42,6 +50,12 @@ class Function:
     width: float
 
     family = "unknown"
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Channels that its variables come from, before instruments."""
+        roles = [ROLE_OF_VARIABLE.get(v, v) for v in self.variables if v != "time"]
+        return tuple(self.place.roles[role][0] for role in roles)
 
     @property
     def knots(self) -> int:
@@ -115,10 +129,9 @@ def variable_of(
     run: RunSignals, place: Place, variable: str, equation: str, width: float
 ) -> FloatArray:
     """Return a variable's values on the run's grid, shape (n,)."""
-    role = {"velocity_sign": "speed", "velocity": "speed", "history": "travel", "dwell": "speed"}
     if variable == "time":
         return run.on_grid(CAMPAIGN_TIME)
-    name = signal(run, place.roles[role.get(variable, variable)][0], equation)
+    name = signal(run, place.roles[ROLE_OF_VARIABLE.get(variable, variable)][0], equation)
     key = (variable, name, width if variable == "velocity_sign" else 0.0)
     found = run.memo.get(key)
     if found is None:
@@ -131,8 +144,9 @@ def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> Floa
     if variable == "velocity_sign":
         return np.tanh(run.on_grid(name) / width)
     if variable == "history":
+        # half the difference to the same backwards in time: the loop, without what noise follows
         half = PLAY * float(np.ptp(whole)) or 1.0
-        return (whole - _play(whole, half))[run.grid]
+        return 0.5 * (_play(whole[::-1], half)[::-1] - _play(whole, half))[run.grid]
     if variable == "dwell":
         usual = float(np.percentile(np.abs(whole), 95))
         resting = (np.abs(whole) < max(width, 0.05 * usual)).astype(np.float64)

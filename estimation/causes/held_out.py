@@ -1,13 +1,14 @@
 """The test runs: opened once, when every hypothesis is fixed, to keep or drop each cause."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimation.causes.candidates import Candidate, Claim, laid_out
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import Numbers
-from estimation.causes.search import Candidate, laid_out
 from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
@@ -52,21 +53,25 @@ class HeldOut:
             out[name] = around.pop() if len(around) == 1 else None
         return out
 
-    def gain(self, before: Sequence[Candidate], cause: Candidate) -> float:
-        """Return the score of one more cause on the test runs that it decides."""
+    def evidence(self, before: Sequence[Candidate], cause: Candidate) -> float:
+        """Return the e-value of one more cause on the test runs that it decides.
+
+        It is the likelihood ratio of as many independent samples as these runs are worth.
+        """
         old, new = self._squared(before), self._squared([*before, cause])
         state = self.acts_in(cause)
         open_to = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is None]
         known = [k for k in range(len(self.at)) if k not in open_to]
         if not known:
-            return 0.0
+            return 1.0
         total = 0.0
         for p, samples in self.joint.samples.items():
             pair = [
                 np.asarray(e[p][known].sum() / samples[self.at][known].sum()) for e in (old, new)
             ]
             total += float(self.joint.log_ratio(p, pair[0], pair[1]))
-        return total
+        worth = 0.5 * self.numbers.samples_a_run * len(known)
+        return math.exp(min(worth * total, 300.0))
 
     def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""
@@ -81,7 +86,7 @@ class HeldOut:
         acts = None
         if candidate.acts is not None:
             acts = tuple(on is True for on in self.acts_in(candidate).values())
-        laid = laid_out(self.layout, self.joint, candidate.cause, acts)
+        laid = laid_out(self.joint, Claim(candidate.cause, acts))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 
 

@@ -31,20 +31,22 @@ def add_instruments(layout: Layout, train: Sequence[str]) -> None:
     """
     torques = [e for e in layout.equations.values() if not e.of_angle]
     trained = {run.name for run in layout.runs} & set(train)
+    layout.shaken[:] = [run.shaken() for run in layout.runs]
     for equation in layout.equations.values():
         own = set(_efforts(equation))
         apart: set[str] = set()  # from no noise of this equation's own accelerations either
-        known = {}
-        for run in layout.runs:
-            known[run.name] = _propagated(torques, run, own)
+        known = []
+        for run in (*layout.runs, *layout.shaken):
+            known.append(_propagated(torques, run, own))
             apart |= set(_propagated([e for e in torques if e is not equation], run, own))
-        seen = [run for run in layout.runs if run.name in trained]
-        good = {c for c in own if _is_better(equation, c, seen, known)}
+        seen = [(r, k) for r, k in zip(layout.runs, known, strict=False) if r.name in trained]
+        good = {c for c in own if _is_better(equation, c, seen)}
         layout.independent.update((c, equation.name) for c in good & apart)
-        for run in layout.runs:
+        estimated = equation.target not in good and equation.is_quieter([r for r, _ in seen])
+        for run, others in zip((*layout.runs, *layout.shaken), known, strict=True):
             for channel in good:
-                run.channels[instrumented(channel, equation.name)] = known[run.name][channel]
-            if equation.target not in good and equation.is_quieter(seen):
+                run.channels[instrumented(channel, equation.name)] = others[channel]
+            if estimated:
                 _add_estimate(equation, run)
 
 
@@ -78,18 +80,17 @@ def _is_motion(channel: str) -> bool:
 def _is_better(
     equation: Equation,
     channel: str,
-    runs: Sequence[RunSignals],
-    known: Mapping[str, Mapping[str, FloatArray]],
+    runs: Sequence[tuple[RunSignals, Mapping[str, FloatArray]]],
 ) -> bool:
     """Whether an effort's prediction adds no more error to an equation than there is."""
-    if any(channel not in known[run.name] for run in runs):
+    if any(channel not in known for _, known in runs):
         return False
     gain = 1.0 if channel == equation.target else equation.channels[channel]
     added = left = 0.0
-    for run in runs:
+    for run, known in runs:
         used = run.grid[run.used[equation.name]]
         residual = run.channels[equation.target] - equation.estimate(run.channels)
-        added += gain**2 * float(np.var((known[run.name][channel] - run.channels[channel])[used]))
+        added += gain**2 * float(np.var((known[channel] - run.channels[channel])[used]))
         left += float(np.var(residual[used]))
     return added <= left
 

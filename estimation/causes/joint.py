@@ -6,85 +6,72 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.causes.equations import SHAPE_STEP, Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Equation, Layout, RunSignals
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import signal
+from estimation.causes.laid import TINY, Laid, Projection, Stacks, inverse
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 
 Part = tuple[str, str]
 """An equation and `within` runs or `between` them."""
 
-Columns = Mapping[Part, FloatArray]
-
-Scale = Literal["each", "first", "none"]
-"""Of which columns the norm is one: of each, of the first, or of none."""
-
-TINY = 1e-300
-
-MOST_CHANGE = 2.0
-"""Factor by which the largest linear term of an equation may change next to a cause."""
+Family = Sequence[Sequence[int]]
+"""Folds of one kind: each is the runs that are left out together."""
 
 
-@dataclass(frozen=True)
-class Laid:
-    """A candidate's columns without what the declared columns explain.
+class LeftOut(NamedTuple):
+    """The base fitted without the runs of each fold of a family.
 
     Attributes:
-        columns: Part to the columns, one mapping a run.
-        taken: How much of each declared column was taken off, equation to (declared, k).
-        size: What the columns were divided by, shape (k,).
+        left: Which runs each fold leaves out, shape (folds, runs), 0 or 1.
+        runs: The runs left out by some fold, shape (n,).
+        fold: The fold that leaves each of them out, shape (n,).
+        inverse: Of the normal matrices, shape (folds, base, base).
+        base: Parameters, shape (folds, base).
     """
 
-    columns: Sequence[Columns]
-    taken: Mapping[str, FloatArray]
-    size: FloatArray
+    left: FloatArray
+    runs: NDArray[np.intp]
+    fold: NDArray[np.intp]
+    inverse: FloatArray
+    base: FloatArray
 
 
-@dataclass(frozen=True)
-class Block:
-    """Cross-products of candidates with as many columns each, run by run.
+class Next(NamedTuple):
+    """Causes next to a base, with parameters.
 
     Attributes:
-        base: Part to candidates' columns times the base's, shape (runs, candidates, base, k).
-        own: Part to candidates' columns times themselves, shape (runs, candidates, k, k).
-        target: Part to candidates' columns times the target, shape (runs, candidates, k).
-        taken: How much of each declared column was taken off them, (candidates, declared, k).
+        laid: The causes.
+        amplitudes: Theirs in each run, shape (n, causes, k).
+        taken: What their columns take off the declared parameters, shape (n, causes, declared).
     """
 
-    base: Mapping[Part, FloatArray]
-    own: Mapping[Part, FloatArray]
-    target: Mapping[Part, FloatArray]
+    laid: Laid
+    amplitudes: FloatArray
     taken: FloatArray
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Candidates of one block, fitted and left out.
+class Joint:
+    """The stacked regression of some runs. Causes that were accepted are part of its base.
 
     Attributes:
-        errors: For each family of folds, part to squared error, shape (runs, candidates).
-        amplitudes: On all runs, shape (candidates, k).
-        base: Parameters of the base on all runs, shape (candidates, base).
-        cross: Products of the columns with the base's residual within runs, weighted, shape
-            (runs, candidates, k).
-        own: Products of the columns with themselves, shape (runs, candidates, k, k).
+        layout: The equations and runs.
+        parts: The residuals, in one order.
+        samples: Part to the samples of each run, shape (runs,).
+        error: Part to the mean squared residual of the declared model.
+        tables: Part to the columns of the base and, last, the target: (runs, samples, columns).
+        at: Part to the parameters of the base whose columns are in its table.
+        gram: Part to the cross-products of all parameters and, last, the target, of each run.
+        declared: Parameters of the declared model on all runs.
+        projection: Lays candidates out.
+        power: Weighted square of all targets within runs.
     """
-
-    errors: Sequence[Mapping[Part, FloatArray]]
-    amplitudes: FloatArray
-    base: FloatArray
-    cross: FloatArray
-    own: FloatArray
-
-
-class Joint:
-    """The stacked regression of some runs. Causes that were accepted are part of its base."""
 
     def __init__(self, layout: Layout, numbers: Numbers = DEFAULT) -> None:
         self.layout, self.numbers = layout, numbers
@@ -92,21 +79,30 @@ class Joint:
         self.parts: list[Part] = [
             (name, kind) for name in layout.equations for kind in ("within", "between")
         ]
-        self._tables: list[dict[Part, FloatArray]] = [self._laid(run) for run in self.runs]
-        self.samples = {p: np.array([float(len(t[p])) for t in self._tables]) for p in self.parts}
-        self._gram, self._added = self._products(), np.zeros(0)
-        self._declared_size = self.size
-        self._taken = np.zeros((self.size, 0))
-        self._noise = self._noise_products()
-        self.error = self._declared_error()
-        self._prepare()
-        self._declared = self._fitted()[1]
-        self._instrumented = [self._instruments(run) for run in self.runs]
-        self._projector = self._projectors()
+        stacks = Stacks(layout)
+        self._equations_at = _places(layout)
+        self._added, self.taken = np.zeros(0), np.zeros((self._declared_size, 0))
+        self.tables, self.at, self.samples = self._laid_out(stacks)
+        self.gram = self._products()
+        noise = {
+            name: stacks.centred(
+                name,
+                stacks.stacked(name, [e.noise(r)[r.grid[r.used[name]]] for r in self.runs]),
+            )[0]
+            for name, e in layout.equations.items()
+        }
+        self._noise = self._noise_products(noise)
+        self.error: Mapping[Part, float] = self._declared_error()
+        self.declared = self.left_out(((),)).base[0]
         weights = self.weights
+        self.projection = Projection(
+            stacks,
+            {e.name: [_instrumented(e, r) for r in self.runs] for e in layout.equations.values()},
+            noise,
+            {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
+        )
         self.power = sum(
-            weights[p] * float(t[p][:, -1] @ t[p][:, -1])
-            for t in self._tables
+            weights[p] * float(self.gram[p][:, -1, -1].sum())
             for p in self.parts
             if p[1] == "within"
         )
@@ -123,328 +119,234 @@ class Joint:
     @property
     def size(self) -> int:
         """Parameters of the base."""
-        return int(self._tables[0][self.parts[0]].shape[1]) - 1
+        return self._declared_size + len(self._added)
 
-    # ---- laying out
+    @property
+    def _declared_size(self) -> int:
+        """Declared parameters and the offset of each equation."""
+        return sum(map(len, self._equations_at.values())) + len(self._equations_at)
 
-    def _laid(self, run: RunSignals) -> dict[Part, FloatArray]:
-        equations = list(self.layout.equations.values())
-        widths = [e.columns(_first(run)).shape[1] for e in equations]
-        total, at, out = sum(widths) + len(equations), 0, {}
-        for k, (equation, width) in enumerate(zip(equations, widths, strict=True)):
-            used = run.grid[run.used[equation.name]]
-            table = np.zeros((len(used), total + 1))
-            table[:, at : at + width] = equation.columns(run.channels)[used]
-            table[:, -1] = run.channels[equation.target][used]
-            mean = table.mean(axis=0)
-            out[equation.name, "within"] = table - mean
-            mean[sum(widths) + k] = 1.0
-            out[equation.name, "between"] = mean[None]
-            at += width
-        return out
+    # ---- the base
 
-    def _instruments(self, run: RunSignals) -> dict[str, FloatArray]:
-        out = {}
-        for equation in self.layout.equations.values():
-            seen = dict(run.channels)
-            for channel in equation.channels:
-                seen[channel] = run.channels[signal(run, channel, equation.name)]
-                if "_rate_" in channel:
-                    source = channel.replace("_rate_n_m_s", "_n_m")
-                    seen[channel] = (
-                        np.gradient(run.channels[signal(run, source, equation.name)]) * run.rate_hz
-                    )
-            used = run.grid[run.used[equation.name]]
-            out[equation.name] = equation.columns(seen)[used]
-        return out
-
-    def _projectors(self) -> Mapping[str, FloatArray]:
-        out, weights = {}, self.weights
-        for name in self.layout.equations:
-            total: FloatArray = np.zeros(())
-            for own in self._instrumented:
-                mean = np.append(own[name].mean(axis=0), 1.0)
-                inner = np.pad(own[name] - mean[:-1], ((0, 0), (0, 1)))
-                total = total + weights[name, "within"] * inner.T @ inner
-                total = total + weights[name, "between"] * np.outer(mean, mean)
-            out[name] = _inverse(total)
-        return out
+    def _laid_out(
+        self, stacks: Stacks
+    ) -> tuple[Mapping[Part, FloatArray], Mapping[Part, Sequence[int]], Mapping[Part, FloatArray]]:
+        tables, at, samples = {}, {}, {}
+        offsets = self._declared_size - len(self._equations_at)
+        for k, (name, equation) in enumerate(self.layout.equations.items()):
+            columns = []
+            for run in self.runs:
+                used = run.grid[run.used[name]]
+                target = run.channels[equation.target][used, None]
+                columns.append(np.hstack([equation.columns(run.channels)[used], target]))
+            inner, means = stacks.centred(name, stacks.stacked(name, columns))
+            one = np.ones((len(means), 1))
+            tables[name, "within"] = inner
+            tables[name, "between"] = np.hstack([means[:, :-1], one, means[:, -1:]])[:, None]
+            at[name, "within"] = [*self._equations_at[name]]
+            at[name, "between"] = [*self._equations_at[name], offsets + k]
+            samples[name, "within"] = stacks.counts[name].astype(np.float64)
+            samples[name, "between"] = np.ones(len(means))
+        return tables, at, samples
 
     def _products(self) -> Mapping[Part, FloatArray]:
-        return {p: np.array([t[p].T @ t[p] for t in self._tables]) for p in self.parts}
+        out = {}
+        for p, table in self.tables.items():
+            out[p] = np.zeros((len(table), self.size + 1, self.size + 1))
+            places = [*self.at[p], self.size]
+            rows, columns = np.ix_(places, places)
+            out[p][:, rows, columns] = table.transpose(0, 2, 1) @ table
+        return out
 
     def _declared_error(self) -> Mapping[Part, float]:
         """Return the mean squared residual of the declared model in each part."""
         error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
         for _ in range(5):
-            self.error = error
+            self.error = dict(error)
             self._prepare()
-            vector = np.append(self._fitted()[1], -1.0)
+            vector = np.append(self.left_out(((),)).base[0], -1.0)
             for p in self.parts:
-                value = float(np.einsum("i,rij,j->", vector, self._gram[p], vector))
+                value = float(np.einsum("i,rij,j->", vector, self.gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
+        self.error = dict(error)
+        self._prepare()
         return error
 
-    def _avoided(self, part: Part, run: int, declared: FloatArray) -> FloatArray:
-        """Return the error that is missing because a noisy reading got a smaller amplitude.
+    def _prepare(self) -> None:
+        """Work out what all fits of this base share."""
+        weights, zero = self.weights, np.zeros(())
+        self._run_grams = np.asarray(sum((weights[p] * self.gram[p] for p in self.parts), zero))
+        self._fits: dict[tuple[tuple[int, ...], ...], LeftOut] = {}
+        whole = self._run_grams.sum(axis=0)
+        # no term exceeds half of all signals, and a shape is known to within its own size
+        self._prior = 4.0 * np.diag(whole)[:-1] / float(whole[-1, -1])
+        shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
+        self._prior[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
+        self._prior[self._declared_size :] = self._added
 
-        A cause that stands in for a noisy reading removes that reading's noise. The
+    def left_out(self, family: Family) -> LeftOut:
+        """Return the base fitted without the runs of each fold."""
+        key = tuple(map(tuple, family))
+        if key not in self._fits:
+            left = np.zeros((len(family), len(self.runs)))
+            for own, without in zip(left, family, strict=True):
+                own[list(without)] = 1.0
+            fold, runs = np.nonzero(left)
+            gram = self._run_grams.sum(axis=0) - np.tensordot(left, self._run_grams, 1)
+            gram[:, range(self.size), range(self.size)] += self._prior
+            inverses = inverse(gram[:, :-1, :-1])
+            base = np.einsum("fij,fj->fi", inverses, gram[:, :-1, -1])
+            self._fits[key] = LeftOut(left, runs, fold, inverses, base)
+        return self._fits[key]
+
+    def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
+        """Return the regression with a cause's columns, of a prior precision each, in its base.
+
+        Args:
+            laid: One cause.
+            precision: Prior precision of every amplitude, shape (k,).
+        """
+        made = object.__new__(Joint)
+        made.__dict__.update(self.__dict__)
+        made._added = np.append(self._added, precision)
+        made.taken = np.hstack([self.taken, self.taken_off(laid)[0]])
+        made.tables, made.at = {}, {}
+        new = range(self.size, self.size + len(precision))
+        for p, table in self.tables.items():
+            columns = _columns(laid, p)
+            made.at[p] = self.at[p] if columns is None else [*self.at[p], *new]
+            parts = [table[..., :-1], table[..., -1:]]
+            made.tables[p] = (
+                table
+                if columns is None
+                else np.concatenate([parts[0], columns[:, 0], parts[1]], axis=2)
+            )
+        made.gram = made._products()
+        made._noise = {name: self._grown_noise(name, laid) for name in self._noise}
+        made._prepare()
+        return made
+
+    def _grown_noise(self, name: str, laid: Laid) -> FloatArray:
+        """Return an equation's noise products with those of one more cause before the target's."""
+        old, k = self._noise[name], laid.size.shape[1]
+        new = range(self.size, self.size + k)
+        kept = [*range(self.size), self.size + k]
+        out = np.zeros((len(old), self.size + k + 1, self.size + k + 1))
+        out[:, np.array(kept)[:, None], kept] = old
+        if name in laid.noise:
+            there = [*self._equations_at[name], -1]
+            out[:, np.array(there)[:, None], new] = laid.noise[name][:, 0]
+            out[:, np.array(new)[:, None], there] = laid.noise[name][:, 0].transpose(0, 2, 1)
+            out[:, np.array(new)[:, None], new] = laid.own_noise[name][:, 0]
+        return out
+
+    # ---- noise of what is read
+
+    def _noise_products(self, noise: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+        """Return the noise in the cross-products within runs; the target's own is left in."""
+        size = self._declared_size + 1
+        out = {}
+        for name, table in noise.items():
+            places = np.array([*self._equations_at[name], size - 1])
+            kept = [*np.flatnonzero(table[..., :-1].any(axis=(0, 1))), -1]
+            inner = np.ix_(places[kept], places[kept])
+            out[name] = np.zeros((len(self.runs), size, size))
+            for r, own in enumerate(table[..., kept]):
+                product = own.T @ own
+                product[-1, -1] = 0.0
+                out[name][r][inner] = _at_most(product, self.gram[name, "within"][r][inner])
+        return out
+
+    def avoided(
+        self,
+        part: Part,
+        runs: NDArray[np.intp],
+        base: FloatArray,
+        next_to: "Next | None" = None,
+    ) -> FloatArray:
+        """Return the error that is missing because less of the readings' noise is in a residual.
+
+        A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
         error that it removes so is put back.
 
         Args:
             part: Of the regression.
-            run: Number of the run.
-            declared: Amplitudes of the declared columns, whole ones, shape (..., declared).
+            runs: Numbers of the runs, shape (n,).
+            base: Parameters of the base, shape (n, causes, base).
+            next_to: Causes next to the base.
+
+        Returns:
+            Squared error, shape (n, causes).
         """
-        if part[1] == "between":
-            return np.zeros(declared.shape[:-1])
-        noise = self._noise[part][run]
+        name, kind = part
+        if kind == "between":
+            return np.zeros(base.shape[:-1])
+        noise, whole = self._noise[name][runs], self.whole(base)
+        if next_to is not None:
+            whole = whole - next_to.taken
+        target = np.full((*whole.shape[:-1], 1), -1.0)
+        now = np.concatenate([whole, base[..., self._declared_size :], target], axis=-1)
+        usual = np.concatenate([self.declared, np.zeros(len(self._added)), [-1.0]])
+        left = ((now @ noise) * now).sum(axis=-1)
+        if next_to is not None and name in next_to.laid.noise:
+            laid, amplitudes = next_to.laid, next_to.amplitudes
+            there = now[..., [*self._equations_at[name], -1]]
+            follows = (there[:, :, None] @ laid.noise[name][runs])[:, :, 0]
+            itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
+            left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
+        return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
 
-        def shown(own: FloatArray) -> FloatArray:
-            return np.asarray(((own @ noise[:-1, :-1]) * own).sum(-1) - 2.0 * own @ noise[:-1, -1])
-
-        return np.maximum(shown(self._declared) - shown(declared), 0.0)
-
-    def _whole(self, base: FloatArray) -> FloatArray:
+    def whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
 
         Args:
             base: Parameters of the base, shape (..., base).
         """
-        count = base.shape[-1] - self._taken.shape[1]
-        return np.asarray(base[..., :count] - base[..., count:] @ self._taken.T)
+        count = self._declared_size
+        return np.asarray(base[..., :count] - base[..., count:] @ self.taken.T)
 
-    def _taken_off(self, laid: Laid) -> FloatArray:
-        """Return how much of every declared column was taken off a cause's, (declared, k)."""
-        rows = []
-        for equation in self.layout.equations.values():
-            none = np.zeros((len(equation.of_channel), len(laid.size)))
-            rows.append(laid.taken.get(equation.name, none))
-        return np.vstack([*rows, np.zeros((len(self.layout.equations), len(laid.size)))])
-
-    def _noise_products(self) -> Mapping[Part, FloatArray]:
-        """Return the noise in the cross-products within runs; the target's own is left in."""
-        at, size = 0, self._declared_size + 1
-        out = {p: np.zeros((len(self.runs), size, size)) for p in self.parts}
-        for equation in self.layout.equations.values():
-            part = (equation.name, "within")
-            for r, run in enumerate(self.runs):
-                noise = equation.noise(run)[run.grid[run.used[equation.name]]]
-                noisy = np.flatnonzero(noise[:, :-1].any(axis=0))
-                noise = noise[:, [*noisy, -1]]
-                product = noise.T @ noise
-                product[-1, -1] = 0.0
-                inner = np.ix_(*[[*(at + noisy), size - 1]] * 2)
-                out[part][r][inner] = _at_most(product, self._gram[part][r][inner])
-            at += len(equation.of_channel)
+    def taken_off(self, laid: Laid) -> FloatArray:
+        """Return how much of every declared column was taken off causes' (causes, declared, k)."""
+        out = np.zeros((len(laid), self._declared_size, laid.size.shape[1]))
+        for name, taken in laid.taken.items():
+            out[:, self._equations_at[name]] = taken
         return out
 
-    def _weighted(self) -> FloatArray:
-        """Return the weighted cross-products of each run."""
-        weights = self.weights
-        return np.asarray(sum((weights[p] * self._gram[p] for p in self.parts), np.zeros(())))
+    def largest_linear(self) -> Mapping[str, int]:
+        """Return the place of each equation's largest term that is a channel times a constant."""
+        out = {}
+        for name, equation in self.layout.equations.items():
+            linear = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
+            power = np.diag(self.gram[name, "within"].sum(axis=0))[linear]
+            if len(linear):
+                out[name] = int(linear[np.argmax(self.declared[linear] ** 2 * power)])
+        return out
 
-    def _fitted(self, left_out: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
-        """Return the inverse of the base's normal matrix without some runs, and its parameters."""
-        key = tuple(left_out)
-        if key not in self._fits:
-            gram = self._whole_gram - self._run_grams[list(key)].sum(axis=0)
-            gram[np.diag_indices(self.size)] += self._prior
-            inverse = _inverse(gram[:-1, :-1])
-            self._fits[key] = inverse, np.asarray(inverse @ gram[:-1, -1])
-        return self._fits[key]
-
-    def _prepare(self) -> None:
-        """Work out what all fits of this base share."""
-        self._run_grams = self._weighted()
-        self._whole_gram = self._run_grams.sum(axis=0)
-        self._prior = self._prior_precision()
-        self._fits: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
-
-    def _prior_precision(self) -> FloatArray:
-        """Return the prior precision of the base: no term exceeds half of all signals.
-
-        A shape is known to within its own size.
-        """
-        weights = self.weights
-        whole = sum(
-            (weights[p] * self._gram[p].sum(axis=0) for p in self.parts), start=np.zeros(())
-        )
-        precision = 4.0 * np.diag(whole)[:-1] / float(whole[-1, -1])
-        shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
-        precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
-        precision[len(precision) - len(self._added) :] = self._added
-        return np.asarray(precision)
-
-    # ---- candidates
-
-    def laid(self, columns: Sequence[Mapping[str, FloatArray]], unit: Scale) -> Laid:
-        """Return a candidate's columns of every run, without what the declared columns explain.
-
-        The declared columns are those of the instrumented signals, so that a candidate does not
-        profit from reading a quieter sensor.
-
-        Args:
-            columns: Equation to the columns, one mapping a run.
-            unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
-        """
-        weights, out = self.weights, [dict[Part, FloatArray]() for _ in columns]
-        taken = {}
-        norm: FloatArray = np.zeros(())
-        for name in columns[0]:
-            within, between = weights[name, "within"], weights[name, "between"]
-            means = [c[name].mean(axis=0) for c in columns]
-            inner = [c[name] - m for c, m in zip(columns, means, strict=True)]
-            right: FloatArray = np.zeros(())
-            bases = []
-            for own, x, mean in zip(self._instrumented, inner, means, strict=True):
-                middle = own[name].mean(axis=0)
-                base = own[name] - middle
-                bases.append((base, np.append(middle, 1.0)))
-                part = np.vstack([base.T @ x, np.zeros((1, x.shape[1]))])
-                right = right + within * part + between * np.outer(bases[-1][1], mean)
-                norm = norm + within * (x * x).sum(axis=0) + between * mean * mean
-            slope = taken[name] = self._projector[name] @ right
-            for i, (base, middle) in enumerate(bases):
-                out[i][name, "within"] = inner[i] - base @ slope[:-1]
-                out[i][name, "between"] = (means[i] - middle @ slope)[None]
-        each = np.sqrt(norm) + TINY
-        size = {"each": each, "first": np.full_like(each, each[0]), "none": np.ones_like(each)}[
-            unit
-        ]
-        return Laid(
-            [{p: x / size for p, x in own.items()} for own in out],
-            {name: slope[:-1] / size for name, slope in taken.items()},
-            size,
-        )
-
-    def block(self, laid: Sequence[Laid]) -> Block:
-        """Return the cross-products of candidates that have as many columns each."""
-        candidates = [one.columns for one in laid]
-        count, runs, k = len(laid), len(self.runs), len(laid[0].size)
-        base, own, target = {}, {}, {}
-        for p in self.parts:
-            there = [j for j, c in enumerate(candidates) if p in c[0]]
-            if not there:
-                continue
-            base[p] = np.zeros((runs, count, self.size, k))
-            own[p] = np.zeros((runs, count, k, k))
-            target[p] = np.zeros((runs, count, k))
-            for r, table in enumerate(self._tables):
-                columns = np.stack([candidates[j][r][p] for j in there], axis=1)
-                flat = columns.reshape(len(columns), -1)
-                product = (table[p].T @ flat).reshape(self.size + 1, len(there), k)
-                base[p][r, there] = product[:-1].transpose(1, 0, 2)
-                target[p][r, there] = product[-1]
-                turned = columns.transpose(1, 2, 0)
-                own[p][r, there] = turned @ turned.transpose(0, 2, 1)
-        taken = np.array([self._taken_off(one) for one in laid])
-        return Block(base, own, target, taken)
-
-    def evaluate(
-        self,
-        block: Block,
-        folds: Folds,
-        precision: FloatArray,
-    ) -> Outcome:
-        """Fit every candidate together with the base and return its errors on what was left out.
-
-        Args:
-            block: The candidates.
-            folds: Families of folds.
-            precision: Prior precision of every amplitude, shape (candidates, k).
-        """
-        weights, there = self.weights, list(block.base)
-        sums = [
-            sum((weights[p] * kind[p] for p in there), start=np.zeros(()))
-            for kind in (block.base, block.own, block.target)
-        ]
-        wholes = [s.sum(axis=0) for s in sums]
-
-        def fitted(left_out: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-            inverse, alone = self._fitted(left_out)
-            cross, own, right = (
-                w - s[list(left_out)].sum(axis=0) if left_out else w
-                for w, s in zip(wholes, sums, strict=True)
-            )
-            through = np.matmul(inverse, cross)
-            eye = np.eye(own.shape[1])
-            spread = 1e-9 * np.einsum("ckk->ck", own) + precision
-            schur = own - np.matmul(cross.transpose(0, 2, 1), through) + spread[:, :, None] * eye
-            left = right - np.einsum("cik,i->ck", cross, alone)
-            amplitudes = np.linalg.solve(schur, left[..., None])[..., 0]
-            return alone - np.einsum("cik,ck->ci", through, amplitudes), amplitudes
-
-        errors = []
-        for family in folds:
-            found = {p: np.zeros((len(self.runs), len(precision))) for p in self.parts}
-            for left_out in family:
-                base, amplitudes = fitted(list(left_out))
-                for p in self.parts:
-                    for i in left_out:
-                        found[p][i] = self._squared(block, p, i, base, amplitudes)
-            errors.append(found)
-        base, amplitudes = fitted([])
-        inside, usual = [p for p in there if p[1] == "within"], self._fitted()[1]
-        cross, own, right = (
-            sum((weights[p] * kind[p] for p in inside), start=np.zeros(()))
-            for kind in (block.base, block.own, block.target)
-        )
-        return Outcome(
-            errors, amplitudes, base, right - np.einsum("rcik,i->rck", cross, usual), own
-        )
-
-    def _squared(
-        self, block: Block, p: Part, run: int, base: FloatArray, amplitudes: FloatArray
-    ) -> FloatArray:
-        gram = self._gram[p][run]
-        error = gram[-1, -1] - 2 * base @ gram[:-1, -1] + ((base @ gram[:-1, :-1]) * base).sum(1)
-        if p in block.base:
-            cross = np.einsum("ci,cik,ck->c", base, block.base[p][run], amplitudes)
-            own = np.einsum("ck,ckl,cl->c", amplitudes, block.own[p][run], amplitudes)
-            error = error + 2 * cross + own - 2 * (amplitudes * block.target[p][run]).sum(1)
-        declared = self._whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
-        return np.asarray(np.maximum(error, 0.0) + self._avoided(p, run, declared))
-
-    def replaces(self, laid: Laid, base: FloatArray, amplitudes: FloatArray) -> bool:
-        """Whether a cause stands in for the largest linear term of an equation.
-
-        A reading of the target through another sensor explains any equation, with no use for the
-        declared terms. A cause comes in addition to them.
-
-        Args:
-            laid: The cause.
-            base: Parameters of the base next to it, shape (base,).
-            amplitudes: Of the cause, shape (k,).
-        """
-        now = self._whole(base) - self._taken_off(laid) @ amplitudes
-        at = 0
-        for equation in self.layout.equations.values():
-            linear = at + np.flatnonzero(equation.of_channel)
-            at += len(equation.of_channel)
-            if equation.name not in laid.taken or not len(linear):
-                continue
-            power = np.diag(self._gram[equation.name, "within"].sum(axis=0))[linear]
-            largest = linear[int(np.argmax(self._declared[linear] ** 2 * power))]
-            change = float(now[largest] / (self._declared[largest] or 1.0))
-            if not 1.0 / MOST_CHANGE < change < MOST_CHANGE:
-                return True
-        return False
+    # ---- errors
 
     def base_errors(self, folds: Folds) -> Sequence[Mapping[Part, FloatArray]]:
         """Return the squared errors of the base on what was left out, one mapping a family."""
         out: list[Mapping[Part, FloatArray]] = []
         for family in folds:
+            fits = self.left_out(family)
+            base = fits.base[fits.fold]
+            vector = np.column_stack([base, np.full(len(base), -1.0)])
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
-            for left_out in family:
-                vector = np.append(self._fitted(left_out)[1], -1.0)
-                for p in self.parts:
-                    for i in left_out:
-                        value = max(float(vector @ self._gram[p][i] @ vector), 0.0)
-                        found[p][i] = value + float(self._avoided(p, i, self._whole(vector[:-1])))
+            for p in self.parts:
+                own = np.einsum("ri,rij,rj->r", vector, self.gram[p][fits.runs], vector)
+                avoided = self.avoided(p, fits.runs, base[:, None])[:, 0]
+                found[p][fits.runs] = np.maximum(own, 0.0) + avoided
             out.append(found)
         return out
+
+    def extrapolated(self, family: Family) -> Mapping[Part, float]:
+        """Return the squared error that the base's own uncertainty makes in what was left out."""
+        fits = self.left_out(family)
+        return {
+            p: float(np.sum(self.gram[p][fits.runs, :-1, :-1] * fits.inverse[fits.fold]))
+            for p in self.parts
+        }
 
     def score(
         self,
@@ -476,16 +378,6 @@ class Joint:
             by_family = [f + r for f, r in zip(by_family, ratios, strict=True)]
         return np.asarray(total), np.array(by_family)
 
-    def extrapolated(self, family: Sequence[Sequence[int]]) -> Mapping[Part, float]:
-        """Return the squared error that the base's own uncertainty makes in what was left out."""
-        out = dict.fromkeys(self.parts, 0.0)
-        for left_out in family:
-            inverse, _ = self._fitted(left_out)
-            for p in self.parts:
-                for i in left_out:
-                    out[p] += float(np.sum(self._gram[p][i][:-1, :-1] * inverse))
-        return out
-
     def log_ratio(self, part: Part, before: FloatArray, after: FloatArray) -> FloatArray:
         """Return the weighted log ratio of mean squared errors of a part, above its floor."""
         numbers, weight = self.numbers, 1.0
@@ -495,34 +387,39 @@ class Joint:
             floor += numbers.between * self.error[part[0], "within"]
         return np.asarray(weight * np.log((before + floor) / (after + floor)))
 
-    # ---- accepted causes
 
-    def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
-        """Return the regression with a cause's columns, of a prior precision each, in its base."""
-        made = object.__new__(Joint)
-        made.__dict__.update(self.__dict__)
-        made._added = np.append(self._added, precision)
-        made._taken = np.hstack([self._taken, self._taken_off(laid)])
-        k = len(laid.size)
-        made._tables = []
-        for table, columns in zip(self._tables, laid.columns, strict=True):
-            grown = {}
-            for p in self.parts:
-                added = columns.get(p, np.zeros((len(table[p]), k)))
-                grown[p] = np.hstack([table[p][:, :-1], added, table[p][:, -1:]])
-            made._tables.append(grown)
-        made._gram = made._products()
-        made._prepare()
-        return made
+def _places(layout: Layout) -> Mapping[str, range]:
+    """Return the places of each equation's parameters among all."""
+    out, at = {}, 0
+    for name, equation in layout.equations.items():
+        out[name] = range(at, at + len(equation.of_shape))
+        at += len(equation.of_shape)
+    return out
 
 
-def _first(run: RunSignals) -> Mapping[str, FloatArray]:
-    return {name: values[:8] for name, values in run.channels.items()}
+def _columns(laid: Laid, part: Part) -> FloatArray | None:
+    """Return causes' columns of a part, (runs, causes, samples, k); None where they have none."""
+    name, kind = part
+    if name not in laid.inner:
+        return None
+    return laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
+
+
+def _instrumented(equation: Equation, run: RunSignals) -> FloatArray:
+    """Return the declared columns with efforts predicted from other sensors, (n, declared)."""
+    seen = dict(run.channels)
+    for channel in equation.channels:
+        seen[channel] = run.channels[signal(run, channel, equation.name)]
+        if "_rate_" in channel:
+            source = channel.replace("_rate_n_m_s", "_n_m")
+            read = run.channels[signal(run, source, equation.name)]
+            seen[channel] = np.gradient(read) * run.rate_hz
+    return equation.columns(seen)[run.grid[run.used[equation.name]]]
 
 
 def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:
     """Return noise products of columns and target, less than the columns' own in any direction."""
-    scale = _scales(gram[:-1, :-1])
+    scale = 1.0 / np.sqrt(np.diag(gram)[:-1] + TINY)
     inner = gram[:-1, :-1] * np.outer(scale, scale) + 1e-8 * np.eye(len(scale))
     root = np.linalg.cholesky(inner)
     turned = np.linalg.solve(root, noise[:-1, :-1] * np.outer(scale, scale))
@@ -531,13 +428,3 @@ def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:
     out = noise.copy()
     out[:-1, :-1] = kept / np.outer(scale, scale)
     return out
-
-
-def _scales(gram: FloatArray) -> FloatArray:
-    return np.asarray(1.0 / np.sqrt(np.diag(gram) + TINY))
-
-
-def _inverse(gram: FloatArray) -> FloatArray:
-    scale = _scales(gram)
-    inner = gram * np.outer(scale, scale) + 1e-8 * np.eye(len(gram))
-    return np.asarray(np.linalg.inv(inner) * np.outer(scale, scale))

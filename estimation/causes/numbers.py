@@ -33,9 +33,9 @@ class Numbers:
     knot_sd: float = 2.0
     bend_share: float = 0.3
     sharpness: float = 12.0
-    choice_price: float = 0.04
+    choice_price: float = 0.02
     cause_cost: float = 0.08
-    function_cost: float = 0.08
+    function_cost: float = 0.16
     kept_evidence: float = 20.0
 
 

@@ -2,8 +2,8 @@
 
 The search reads signals predicted from other sensors. Here every channel is read as measured, as a
 model in use reads it, and the amplitudes are least squares within their bounds on the training
-runs. Shapes stay as they were found. Fits count the samples that the model counts; errors count all
-valid samples, at standstill too, unless the model declares otherwise.
+runs. Shapes stay as they were found. Fits and errors count the samples that the model counts: at
+standstill friction takes any value.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -20,7 +20,6 @@ from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
 from estimation.model import Estimate, Model, Term
 from estimation.predicted import without_unused
 from estimation.recording import FloatArray, Recording
-from estimation.signals import Samples
 from estimation.within_bounds import solve_within
 
 Unwritten = Callable[[str, FloatArray], FloatArray]
@@ -250,14 +249,18 @@ class Refit:
         held = self._runs.setdefault(key, {})
         if name not in held:
             model = replace(self.model, terms=(*self.model.terms, *terms))
-            counted: Samples = "closing" if model.samples == "closing" else "all"
             try:
                 (run,) = prepared(model, Campaign.of([self.recordings[name]]))
             except FitError:
                 held[name] = None
             else:
                 step = max(1, int(run.whole.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
-                held[name] = run, settled_places(run.whole, model.low_pass, step, counted)
+                held[name] = (
+                    run,
+                    settled_places(
+                        run.whole, model.low_pass, step, self.model.samples, model.signals
+                    ),
+                )
         return held[name]
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import Part, Refit, Solved
-from estimation.causes.search import Candidate
+from estimation.causes.refit import Errors, Part, Refit, Solved
 from estimation.causes.sources import Source
 from estimation.causes.terms import plain, term_of
 from estimation.diagnosis.result import Error
@@ -66,10 +66,9 @@ class Refits:
         """Return the equation with the causes added so far."""
         return self.of[name].solve(self.parts[name])
 
-    def rmse(self, name: str) -> tuple[float, dict[str, float]]:
-        """Return an equation's error on the test runs with the causes so far, whole and by run."""
-        found = self.of[name].errors(self.after(name), self.open)
-        return found.rmse, found.by_run
+    def test_errors(self, name: str) -> Errors:
+        """Return an equation's errors on the test runs with the causes so far."""
+        return self.of[name].errors(self.after(name), self.open)
 
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""

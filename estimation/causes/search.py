@@ -1,27 +1,21 @@
 """The search over hypotheses: sets of causes, scored together, extended one cause at a time."""
 
-import itertools
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimation.causes.blocks import block_of, evaluate
+from estimation.causes.candidates import Candidate, Claim, Group, candidates, groups_of
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
-from estimation.causes.functions import Function, functions_at
-from estimation.causes.joint import Columns, Joint, Laid, Part, Scale
+from estimation.causes.functions import Function
+from estimation.causes.joint import Joint
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.places import places_of
-from estimation.causes.sources import RELATIVE, Bend, Source, sources_at
+from estimation.causes.sources import RELATIVE, Bend
 from estimation.recording import FloatArray
 
-AT_ONCE = 3000
-"""Candidates times squared columns in one block: keeps its memory small."""
-
 MOST_CAUSES = 3
-NOTHING = 1e-12
-"""Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
@@ -34,46 +28,6 @@ PARTIAL, CHOICES = 24, 6
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A cause laid out on the runs.
-
-    Attributes:
-        cause: The named effect or smooth function.
-        laid: Its columns of every run, without what the declared columns explain.
-        precision: Prior precision of every amplitude.
-        acts: Runs in which it acts; in all when None.
-        choices: Forms that share the prior probability of a cause, times the points of its grid.
-    """
-
-    cause: Source | Function
-    laid: Laid
-    precision: FloatArray
-    acts: tuple[bool, ...] | None = None
-    choices: int = 1
-
-    @property
-    def name(self) -> tuple[str, str, tuple[str, ...]]:
-        """What is claimed: place, family, and the variables of a function."""
-        variables = self.cause.variables if isinstance(self.cause, Function) else ()
-        return self.cause.place.name, self.cause.family, variables
-
-    @property
-    def columns(self) -> Sequence[Columns]:
-        """Its columns of every run."""
-        return self.laid.columns
-
-    @property
-    def is_function(self) -> bool:
-        """Whether its form is unknown."""
-        return isinstance(self.cause, Function)
-
-    @property
-    def width(self) -> int:
-        """Number of columns."""
-        return int(next(iter(self.columns[0].values())).shape[1])
-
-
-@dataclass(frozen=True)
 class Scored:
     """A candidate with its score given a base.
 
@@ -82,6 +36,7 @@ class Scored:
         score: Mean of the families of folds, less the price of what was chosen.
         by_family: Score of each family of folds.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
+        by_run: Products of its columns with the base's residual and with themselves, of each run.
     """
 
     candidate: Candidate
@@ -115,21 +70,47 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
         train: The declared equations on the training runs, instruments added.
         numbers: What decides.
     """
-    joint, folds = Joint(train, numbers), folds_of(train)
-    pool = candidates(train, joint)
-    first = _ranked(joint, pool, folds, numbers)
+    joint = Joint(train, numbers)
+    ranking = Ranking(joint, candidates(joint), folds_of(train))
+    first = ranking.next_to([])
     if not first or first[0].score < 0.0:
         return Found([], [], joint, first[0].score if first else 0.0)
-    chains = [_chain(joint, start, pool, folds, numbers) for start in _starts(first)]
+    chains = [_chain(ranking, start) for start in _starts(first)]
     causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
     conditional = []
     for k, cause in enumerate(causes):
-        others = [c for c in causes if c is not cause]
-        # with the others there, noise may hide every candidate: the cause then stands by its chain
-        ranked = _ranked(_with(joint, others), pool, folds, numbers) or [cause]
+        # next to the others every candidate may be dropped: the cause then stands as it was found
+        ranked = ranking.next_to([c for c in causes if c is not cause]) or [cause]
         conditional.append(ranked)
         causes[k] = ranked[0]
     return Found(causes, conditional, joint, first[0].score)
+
+
+class Ranking:
+    """Candidates in the order of their scores next to causes that were accepted.
+
+    Args:
+        joint: The regression without causes.
+        pool: The candidates, with their products with it.
+        folds: What is left out.
+    """
+
+    def __init__(self, joint: Joint, pool: Sequence[Group], folds: Folds) -> None:
+        self.joint, self.folds, self.pool = joint, folds, pool
+        self._known: dict[frozenset[int], list[Scored]] = {}
+
+    def next_to(self, causes: Sequence[Scored]) -> list[Scored]:
+        """Return the best of each name: on the grid, refined, bent, and on some of the runs."""
+        key = frozenset(id(c.candidate) for c in causes)
+        if key not in self._known:
+            self._known[key] = _ranked(self._with(causes), self.pool, self.folds)
+        return self._known[key]
+
+    def _with(self, causes: Sequence[Scored]) -> Joint:
+        joint = self.joint
+        for cause in causes:
+            joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
+        return joint
 
 
 def _starts(ranked: Sequence[Scored]) -> list[Scored]:
@@ -141,38 +122,15 @@ def _starts(ranked: Sequence[Scored]) -> list[Scored]:
     return [ranked[0], other] if other is not None and worth else [ranked[0]]
 
 
-def _chain(
-    joint: Joint, start: Scored, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
-) -> list[Scored]:
+def _chain(ranking: Ranking, start: Scored) -> list[Scored]:
     """Return a set of causes, extended one at a time while another one is worth its price."""
     causes = [start]
     while len(causes) < MOST_CAUSES:
-        ranked = _ranked(_with(joint, causes), pool, folds, numbers)
+        ranked = ranking.next_to(causes)
         if not ranked or ranked[0].score < 0.0:
             break
         causes.append(ranked[0])
     return causes
-
-
-def candidates(train: Layout, joint: Joint) -> list[Candidate]:
-    """Return every candidate cause, laid out."""
-    out = []
-    for place in places_of(train):
-        named: Iterable[Source | Function] = sources_at(train, place)
-        for cause in itertools.chain(named, functions_at(train, place)):
-            laid = laid_out(train, joint, cause)
-            if laid is not None:
-                out.append(laid)
-    for run in train.runs:
-        run.memo.clear()  # columns of the whole run, many times as large as those on the grid
-    count = Counter(_form(c) for c in out)
-    return [replace(c, choices=count[_form(c)] * len(count)) for c in out]
-
-
-def _form(candidate: Candidate) -> tuple[str, str]:
-    """Return the key of one prior probability: a form of an effect, or all smooth functions."""
-    cause = candidate.cause
-    return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id
 
 
 def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
@@ -202,60 +160,22 @@ def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
     return sorted(best.values(), key=lambda s: -s.score)
 
 
-def evaluate(
-    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
-) -> list[Scored]:
+def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     """Return the score of each candidate given the base; those of a wrong sign are left out."""
-    base = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
-    by_width: dict[int, list[Candidate]] = {}
-    for candidate in pool:
-        by_width.setdefault(candidate.width, []).append(candidate)
+    before, spreads = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
     out = []
-    for width, group in by_width.items():
-        size = max(1, AT_ONCE // (width * width)) if width > 2 else 400
-        for start in range(0, len(group), size):
-            part = group[start : start + size]
-            out += _evaluated(joint, part, folds, base, numbers)
+    for group in pool:
+        block = block_of(joint, group.laid, group.block)
+        outcome = evaluate(joint, block, folds, group.precision)
+        scores, by_family = joint.score(spreads, before, outcome.errors)
+        for k, candidate in enumerate(group.candidates):
+            amplitudes = outcome.amplitudes[k]
+            if outcome.replaces[k] or _sign_is_wrong(candidate, amplitudes):
+                continue
+            score = float(scores[k]) - _price(candidate, joint.numbers)
+            by_run = outcome.cross[:, k], outcome.own[:, k]
+            out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
     return out
-
-
-def _evaluated(
-    joint: Joint,
-    part: list[Candidate],
-    folds: Folds,
-    base: tuple[Sequence[Mapping[Part, FloatArray]], Sequence[Mapping[Part, float]]],
-    numbers: Numbers,
-) -> list[Scored]:
-    precision = np.vstack([c.precision for c in part])
-    outcome = joint.evaluate(joint.block([c.laid for c in part]), folds, precision)
-    before, spreads = base
-    scores, by_family = joint.score(spreads, before, outcome.errors)
-    out = []
-    for k, candidate in enumerate(part):
-        amplitudes = outcome.amplitudes[k]
-        if _sign_is_wrong(candidate, amplitudes):
-            continue
-        if joint.replaces(candidate.laid, outcome.base[k], amplitudes):
-            continue
-        score = float(scores[k]) - _price(candidate, numbers)
-        by_run = outcome.cross[:, k], outcome.own[:, k]
-        out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
-    return out
-
-
-def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> FloatArray:
-    """Return the prior precision of each amplitude.
-
-    A named effect, scaled to norm one, is not larger than half of all signals; a smooth function's
-    knots have a standard deviation of so many declared errors.
-    """
-    everything = np.full(len(size), 4.0 / joint.power)
-    if isinstance(cause, Function):
-        knot = [e.gain**2 / joint.error[e.equation, "within"] for e in cause.place.enters]
-        return np.asarray(everything + np.mean(knot) / joint.numbers.knot_sd**2)
-    if cause.bend is not None:
-        everything[1:] += 1.0 / (cause.bend.sd * size[1:]) ** 2
-    return everything
 
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
@@ -263,7 +183,7 @@ def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
     if isinstance(cause, Function) or not cause.is_bounded:
         return False
     count = len(cause.parts)  # a bend comes after them
-    return float(np.sum(amplitudes[:count] / candidate.laid.size[:count])) < 0.0
+    return float(np.sum(amplitudes[:count] / candidate.size[:count])) < 0.0
 
 
 def _price(candidate: Candidate, numbers: Numbers) -> float:
@@ -283,40 +203,33 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
     return numbers.cause_cost + more + numbers.choice_price * choices
 
 
-def _ranked(
-    joint: Joint, pool: Sequence[Candidate], folds: Folds, numbers: Numbers
-) -> list[Scored]:
-    """Return the best of each name: on the grid, refined, and on some of the runs."""
-    everything = evaluate(joint, pool, folds, numbers)
+def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    everything = assessed(joint, pool, folds)
     best = best_of_each(everything)
-    if not best:
-        return []
-    near = [c for s in best[:REFINED] for c in _neighbours(joint, s.candidate)]
-    finer = evaluate(joint, near, folds, numbers) if near else []
-    best = best_of_each([*best, *finer])
-    bent = [c for s in best[:BENT] if (c := _bent(joint, s, numbers)) is not None]
-    some = _on_some_runs(joint, everything, folds, numbers)
-    return best_of_each([*best, *evaluate(joint, bent, folds, numbers), *some])
+    near = [c for s in best[:REFINED] for c in _neighbours(s.candidate)]
+    best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
+    bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
+    more = groups_of(joint, [*bent, *_on_some_runs(joint, everything)])
+    return best_of_each([*best, *assessed(joint, more, folds)])
 
 
-def _bent(joint: Joint, scored: Scored, numbers: Numbers) -> Candidate | None:
+def _bent(joint: Joint, one: Scored) -> Claim | None:
     """Return a named effect of one column with a form that deviates from its equation."""
-    candidate, cause = scored.candidate, scored.candidate.cause
-    if isinstance(cause, Function) or candidate.width != 1:
+    candidate, cause = one.candidate, one.candidate.cause
+    if isinstance(cause, Function) or len(candidate.size) != 1:
         return None
     signals = [cause.signal(run, cause.place.home) for run in joint.runs]
     values = np.concatenate([x[:, 0] for x in signals if x is not None])
     low, high = np.percentile(values, (1.0, 99.0))
-    amplitude = abs(float(scored.amplitudes[0] / candidate.laid.size[0]))
+    amplitude = abs(float(one.amplitudes[0] / candidate.size[0]))
     if not high > low or amplitude == 0.0:
         return None
     knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
-    bent = replace(cause, bend=Bend(knots, numbers.bend_share * amplitude))
-    laid = laid_out(joint.layout, joint, bent, candidate.acts)
-    return None if laid is None else replace(laid, choices=candidate.choices)
+    bend = Bend(knots, joint.numbers.bend_share * amplitude)
+    return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
 
 
-def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
+def _neighbours(candidate: Candidate) -> list[Claim]:
     """Return a named effect at shapes between the points of the grid."""
     cause = candidate.cause
     if isinstance(cause, Function):
@@ -334,97 +247,52 @@ def _neighbours(joint: Joint, candidate: Candidate) -> list[Candidate]:
                 else cause.shape[k] * ratio**step
             )
             shape = (*cause.shape[:k], float(moved), *cause.shape[k + 1 :])
-            laid = laid_out(joint.layout, joint, replace(cause, shape=shape))
-            if laid is not None:
-                out.append(replace(laid, choices=candidate.choices))
+            out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
     return out
 
 
-def _on_some_runs(
-    joint: Joint, scored: Sequence[Scored], folds: Folds, numbers: Numbers
-) -> list[Scored]:
-    """Return named effects that act in some of the runs.
+def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
+    """Return named effects that act in some of the runs, as promising as there are.
 
     Every effect is tried on cuts of two orders of the runs: of recording, and of the error that it
-    removes in each of them. The choices of runs that promise most are scored like all others.
+    removes in each of them.
     """
     count = len(joint.runs)
     if count < 6:
         return []
-    promise = []
-    for one in scored:
-        if one.candidate.is_function:
-            continue
-        cross, own = one.by_run
-        gains = _removed(cross, own)
-        for order in (np.arange(count), np.argsort(gains)[::-1]):
-            for part in (order, order[::-1]):
-                sums = [np.cumsum(x[part], axis=0)[1:-1] for x in (cross, own)]
-                removed = _removed(*sums)
+    named: dict[int, list[Scored]] = {}
+    for one in everything:
+        if not one.candidate.is_function:
+            named.setdefault(len(one.amplitudes), []).append(one)
+    promise: list[tuple[float, Candidate, tuple[int, ...]]] = []
+    for group in named.values():
+        cross, own = (np.stack([s.by_run[i] for s in group]) for i in (0, 1))
+        order = np.broadcast_to(np.arange(count), (len(group), count))
+        gains = np.argsort(_removed(cross, own), axis=1)[:, ::-1]
+        for runs in (order, order[:, ::-1], gains, gains[:, ::-1]):
+            every = np.arange(len(group))[:, None]
+            sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own)]
+            for one, chosen, removed in zip(group, runs, _removed(*sums), strict=True):
                 promise += [
-                    (float(r), one.candidate, tuple(int(i) for i in sorted(part[: k + 2])))
+                    (float(r), one.candidate, tuple(sorted(chosen[: k + 2].tolist())))
                     for k, r in enumerate(removed)
                 ]
     promise.sort(key=lambda p: -p[0])
     tried, seen = [], dict[object, set[tuple[int, ...]]]()
-    for _, candidate, chosen in promise:
+    for _, candidate, acting in promise:
         if candidate.name not in seen and len(seen) == PARTIAL:
             continue
         known = seen.setdefault(candidate.name, set())
-        if len(known) == CHOICES or chosen in known:
-            continue
-        known.add(chosen)
-        acts = tuple(k in chosen for k in range(count))
-        laid = laid_out(joint.layout, joint, candidate.cause, acts)
-        if laid is not None:
-            tried.append(replace(laid, choices=candidate.choices))
-    return evaluate(joint, tried, folds, numbers)
+        if len(known) < CHOICES and acting not in known:
+            known.add(acting)
+            acts = tuple(k in acting for k in range(count))
+            tried.append(Claim(candidate.cause, acts, candidate.choices))
+    return tried
 
 
 def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the error that amplitudes remove, from products (n, k) and (n, k, k)."""
-    size = np.einsum("nkk->n", own)[:, None, None]
-    steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[1])
-    return np.asarray(
-        np.einsum("nk,nk->n", cross, np.linalg.solve(steady, cross[..., None])[..., 0])
-    )
-
-
-def _with(joint: Joint, causes: Sequence[Scored]) -> Joint:
-    for cause in causes:
-        joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
-    return joint
-
-
-def laid_out(
-    layout: Layout, joint: Joint, cause: Source | Function, acts: tuple[bool, ...] | None = None
-) -> Candidate | None:
-    """Return a cause laid out on the runs in which it acts; None where it shows nowhere.
-
-    Args:
-        layout: The runs.
-        joint: The regression of these runs.
-        cause: The cause.
-        acts: Whether it acts in each run; in all when None.
-    """
-    columns = []
-    for k, run in enumerate(layout.runs):
-        own = cause.columns(run)
-        if own is None:
-            return None
-        if acts is not None and not acts[k]:
-            own = {name: np.zeros_like(values) for name, values in own.items()}
-        columns.append(own)
-    unit: Scale = "none" if isinstance(cause, Function) else "first" if cause.bend else "each"
-    laid = joint.laid(columns, unit)
-    if float(laid.size.min()) < NOTHING:
-        return None
-    if acts is not None:  # what starts between runs also shifts their means, by its own offset
-        laid = replace(
-            laid,
-            columns=[
-                {p: np.zeros_like(v) if p[1] == "between" else v for p, v in own.items()}
-                for own in laid.columns
-            ],
-        )
-    return Candidate(cause, laid, _precision(joint, cause, laid.size), acts)
+    """Return the error that amplitudes remove, from products (..., k) and (..., k, k)."""
+    size = np.einsum("...kk->...", own)[..., None, None]
+    steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[-1])
+    solved = np.linalg.solve(steady, cross[..., None])[..., 0]
+    return np.asarray((cross * solved).sum(axis=-1))

@@ -112,6 +112,11 @@ class Source:
         return self.effect.family
 
     @property
+    def reads(self) -> tuple[str, ...]:
+        """Channels that its columns come from, before instruments."""
+        return tuple(channel for role, channel in self.channels if role not in CLOCKS)
+
+    @property
     def side(self) -> int:
         """Sign of a loss that its amplitudes are bounded for: an actuator's, and lost motion."""
         if self.place.kind == "actuator":
@@ -183,7 +188,7 @@ def _follows_noise(
     An angle has so little noise that only a linear filter shows it.
     """
     readings = [c for _, c in channels if c in layout.measured]
-    if effect.id.startswith("hysteresis.") and place.kind == "deflection":
+    if effect.id.startswith(LOOPS) and effect.start() and place.kind == "deflection":
         readings = [c for c in readings if not c.endswith(ANGLES)]
     elif not effect.id.startswith(FILTERS):
         return False
@@ -293,13 +298,13 @@ RELATIVE: Mapping[object, Sequence[float]] = {
     "width": tuple(np.geomspace(0.005, 0.05, 3)),
     "time": (0.15, 0.5, 1.5),
     "time_constant": (0.15, 0.5, 1.5),
-    ("sensor.lag", "time_constant"): tuple(np.geomspace(1e-4, 1e-2, 5)),
+    ("sensor.lag", "time_constant"): tuple(np.geomspace(2e-4, 5e-2, 6)),
     ("motor.electrical", "time_constant"): tuple(np.geomspace(1e-4, 5e-3, 4)),
     ("transmission.relaxation", "time"): tuple(np.geomspace(0.01, 0.7, 6)),
     ("transmission.relaxation.prony", "time"): (0.01, 0.05),
     ("friction.dwell", "time"): (0.03, 0.2),
     ("friction.dwell", "way"): (0.05, 0.5),
-    "delay": (2e-4, 6e-4, 2e-3),
+    "delay": tuple(np.geomspace(2e-4, 5e-2, 6)),
     "since": tuple(np.linspace(0.08, 0.92, 12)),
     "onset": (0.3, 0.42, 0.54, 0.66, 0.78, 0.9),
     ("spring.end_stop.opening", "onset"): (0.1, 0.22, 0.34, 0.46, 0.58, 0.7),

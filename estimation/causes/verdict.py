@@ -8,18 +8,18 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, lay_out, on_one_clock
 from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function, names
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Part
+from estimation.causes.refit import Errors, Part
 from estimation.causes.refits import Refits
-from estimation.causes.search import Candidate, Found, Scored, posterior, search
+from estimation.causes.search import Found, Scored, posterior, search
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
@@ -142,6 +142,8 @@ def answer(
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
     layout = lay_out(models, timed, sealed.discover)
+    timed = [r for r in timed if r.name not in layout.left_out]
+    sealed = sealed.without(layout.left_out)
     add_instruments(layout, sealed.discover)
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
@@ -194,8 +196,8 @@ def _judged(
         likely = family_probabilities(ranked, numbers)
         scored = likely[0].best
         cause = scored.candidate.cause
-        gain = held_out.gain([k.scored.candidate for k in kept], scored.candidate)
-        if float(np.exp(min(numbers.sharpness * gain, 300.0))) < numbers.kept_evidence:
+        evidence = held_out.evidence([k.scored.candidate for k in kept], scored.candidate)
+        if evidence < numbers.kept_evidence:
             notes.append(
                 f"{cause.family} ({cause.place.name}) was found in the training runs and not"
                 " confirmed on the test runs."
@@ -212,11 +214,10 @@ def _judged(
         home = cause.place.home
         entered = dict.fromkeys(e.equation for e in cause.place.enters)
         known, refits.open = dict(refits.parts), refits.open | {*open_runs}
-        before = {name: refits.rmse(name) for name in entered}
+        before = {name: refits.test_errors(name) for name in entered}
         refits.add(scored.candidate, acts_in)
-        after = {name: refits.rmse(name) for name in entered}
-        least = math.sqrt(1.0 - numbers.form_floor)
-        if all(after[name][0] > least * before[name][0] for name in entered):
+        after = {name: refits.test_errors(name) for name in entered}
+        if not any(_is_lower(before[name], after[name], numbers) for name in entered):
             refits.parts = known
             notes.append(
                 f"{cause.family} ({cause.place.name}) was found in the training runs and does not"
@@ -227,10 +228,12 @@ def _judged(
         findings.append(
             replace(
                 finding,
-                rmse_before=before[home][0],
-                rmse_after=after[home][0],
-                runs_improved=sum(after[home][1][n] < x for n, x in before[home][1].items()),
-                runs_total=len(before[home][1]),
+                rmse_before=before[home].rmse,
+                rmse_after=after[home].rmse,
+                runs_improved=sum(
+                    after[home].by_run[n] < x for n, x in before[home].by_run.items()
+                ),
+                runs_total=len(before[home].by_run),
                 runs_affected=tuple(name for name, acts in acts_in.items() if acts),
             )
         )
@@ -239,6 +242,14 @@ def _judged(
         if not part.is_written:
             notes.append(_unwritten(scored.candidate))
     return kept, findings, notes
+
+
+def _is_lower(before: Errors, after: Errors, numbers: Numbers) -> bool:
+    """Whether an error on the test runs falls, with each run's mean removed or left in."""
+    least = math.sqrt(1.0 - numbers.form_floor)
+    return (
+        after.rmse <= least * before.rmse or after.rmse_with_means <= least * before.rmse_with_means
+    )
 
 
 def _unwritten(candidate: Candidate) -> str:
@@ -353,6 +364,7 @@ def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> 
             f"{len(sealed.discover)} training runs: with fewer than {LEAST_TO_NAME} no effect is"
             " named."
         )
+    found += [f"Left out: {reason}" for reason in layout.left_out.values()]
     found += [
         f"All training runs are at one level of {condition}: an effect that depends on it cannot"
         " be distinguished from one that does not."

@@ -1,17 +1,27 @@
-"""Two recorded paths only: one trains, cross-validated by its whole periods, the other tests.
+"""Few recordings: pieces of them stand for runs.
 
 Where a motion was recorded along two paths and no more, no run can be held out. A path that repeats
 itself is cut into its periods, which take the place of runs; the other path, cut in the same way,
-is opened once.
+is opened once. Other recordings of too small a number are cut into equal parts, some of which test.
 """
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.split import Sealed, SplitError, check_one_rig, data_hash, seal
+from estimation.diagnosis.split import (
+    LEAST_TO_NAME,
+    SHARE,
+    Sealed,
+    SplitError,
+    check_one_rig,
+    data_hash,
+    seal,
+    split,
+)
 from estimation.recording import FloatArray, Recording
 
 PATHS = 2
@@ -21,7 +31,9 @@ ALIKE = 0.7
 
 AS_GOOD = 0.02
 SHORTEST_S = 1.0
-MARK = ", period "
+MARK, PART = ", period ", ", part "
+PARTS, SHORTEST_PART_S = 10, 2.0
+"""Parts that few recordings are cut into, and the shortest part."""
 
 
 def split_paths(
@@ -51,13 +63,54 @@ def split_paths(
     return [*cut[0], *cut[1]], sealed
 
 
+def split_few(
+    recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()
+) -> tuple[list[Recording], Sealed]:
+    """Choose the test runs; too few recordings are cut into equal parts, which stand for runs.
+
+    Args:
+        recordings: Any number.
+        seed: Seed of the choice.
+        seen: Names of recordings that an earlier diagnosis held.
+
+    Returns:
+        The runs, and their split.
+
+    Raises:
+        SplitError: The recordings are too few or of different rigs, and too short to be cut.
+    """
+    number = len(recordings)
+    each = math.ceil(PARTS / max(1, number))
+    longest = min((float(np.ptp(r.time_s)) for r in recordings), default=0.0)
+    if number - number // SHARE >= LEAST_TO_NAME or longest < each * SHORTEST_PART_S:
+        return [*recordings], split(recordings, seed, seen)
+    check_one_rig(recordings)
+    pieces = [
+        _piece(recording, places, k, PART)
+        for recording in recordings
+        for k, places in enumerate(np.array_split(np.arange(len(recording)), each), start=1)
+    ]
+    known = {piece.name for piece in pieces if path_of(piece.name) in seen}
+    return pieces, split(pieces, seed, known)
+
+
 def path_of(name: str) -> str:
-    """Return the name of the path a period was cut from; of a run its own name."""
-    return name.rpartition(MARK)[0] or name
+    """Return the name of the recording a piece was cut from; of a run its own name."""
+    return name.rpartition(MARK)[0] or name.rpartition(PART)[0] or name
 
 
-def claim(sealed: Sealed) -> str:
-    """Return the limit of the evidence of two paths, in words."""
+def claim(sealed: Sealed) -> str | None:
+    """Return the limit of the evidence of pieces, in words; None where whole runs were split."""
+    names = (*sealed.discover, *sealed.confirm)
+    whole = {path_of(name) for name in names}
+    if whole == {*names}:
+        return None
+    if any(PART in name for name in names):
+        return (
+            f"Only {len(whole)} recording{'s' * (len(whole) > 1)}, cut into {len(names)} parts that"
+            f" stand for runs: {len(sealed.discover)} trained and {len(sealed.confirm)} tested."
+            " Parts of one recording are less apart than runs."
+        )
     return (
         f"Two recorded paths only: {path_of(sealed.discover[0])} trained, cross-validated by its"
         f" {len(sealed.discover)} periods, and {path_of(sealed.confirm[0])} tested."
@@ -74,7 +127,7 @@ def periods(path: Recording) -> list[Recording]:
     length = period_samples(path)
     starts = range(0, len(path) - length // 2, length)
     return [
-        _piece(path, np.arange(start, min(start + length, len(path))), number)
+        _piece(path, np.arange(start, min(start + length, len(path))), number, MARK)
         for number, start in enumerate(starts, start=1)
     ]
 
@@ -128,5 +181,5 @@ def _likeness(x: FloatArray) -> FloatArray:
     return likeness
 
 
-def _piece(path: Recording, places: NDArray[np.intp], number: int) -> Recording:
-    return replace(path.at(places), name=f"{path.name}{MARK}{number}")
+def _piece(path: Recording, places: NDArray[np.intp], number: int, mark: str) -> Recording:
+    return replace(path.at(places), name=f"{path.name}{mark}{number}")

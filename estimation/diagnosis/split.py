@@ -7,7 +7,7 @@ but not the last one of the least or greatest load, speed or other condition.
 
 import hashlib
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,25 @@ class Sealed:
     def may_name(self) -> bool:
         """Whether there are enough training runs to name an effect."""
         return len(self.discover) >= LEAST_TO_NAME
+
+    def without(self, names: Collection[str]) -> "Sealed":
+        """Return the split without runs that cannot be used; the seal is of all.
+
+        Raises:
+            SplitError: No training run or no test run is left.
+        """
+        kept = replace(
+            self,
+            discover=tuple(n for n in self.discover if n not in names),
+            confirm=tuple(n for n in self.confirm if n not in names),
+        )
+        if not kept.discover or not kept.confirm:
+            raise SplitError(
+                f"{len(names)} runs are too short for the equations.",
+                "No training run or no test run is left.",
+                "Record longer runs, or more of them.",
+            )
+        return kept
 
 
 def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()) -> Sealed:

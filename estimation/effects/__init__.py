@@ -1,4 +1,4 @@
-"""Physical effects, one file each. To add an effect, add a file to this folder."""
+"""Physical effects, one file each: of this folder, or of other packages by entry point."""
 
 import difflib
 import importlib
@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 
 from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
@@ -31,7 +32,11 @@ class UnknownEffectError(UnknownNameError):
 
 @cache
 def catalogue() -> Mapping[str, Effect]:
-    """Return every effect of this folder by id."""
+    """Return every effect by id: of this folder, and of the entry points `rig.effects`.
+
+    Raises:
+        UnknownEffectError: An entry point does not load, is not an effect, or takes a known id.
+    """
     found: dict[str, Effect] = {}
     for module in pkgutil.iter_modules(__path__):
         content = importlib.import_module(f"{__name__}.{module.name}")
@@ -42,7 +47,31 @@ def catalogue() -> Mapping[str, Effect]:
                 and "id" in vars(kind)
             ):
                 found[kind.id] = kind()
+    for entry in entry_points(group="rig.effects"):
+        own = _loaded(entry)
+        if own.id in found:
+            raise _unusable(entry, f"its id {own.id} is taken")
+        found[own.id] = own
     return MappingProxyType(dict(sorted(found.items())))
+
+
+def _loaded(entry: EntryPoint) -> Effect:
+    try:
+        kind = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise _unusable(entry, str(error)) from error
+    if not (inspect.isclass(kind) and issubclass(kind, Effect)):
+        raise _unusable(entry, f"{entry.value} is not a class of effect")
+    return kind()
+
+
+def _unusable(entry: EntryPoint, why: str) -> UnknownEffectError:
+    package = entry.dist.name if entry.dist else entry.module
+    return UnknownEffectError(
+        f"The effect {entry.name!r} of {package} cannot be used: {why}.",
+        f"Its entry point is {entry.value}.",
+        f"Correct {package}, or remove it.",
+    )
 
 
 def families() -> tuple[str, ...]:

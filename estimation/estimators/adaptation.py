@@ -14,14 +14,15 @@ The stiffnesses of states were chosen on two instruments of the public data set
 MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryland_L_2.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.bank.beyond import Visits
 from estimation.bank.fitting import Normal, pull
-from estimation.bank.interval import rescaled
+from estimation.bank.interval import Interval, scaled, with_scores
 from estimation.bank.states import LAGS, Bank
 from estimation.closing import is_closing, processed
 from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
@@ -35,6 +36,9 @@ Adaptable = BankEstimator | NetworkEstimator
 
 POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
+
+NORMAL_95 = 1.96
+"""Half widths of 95 % are so many standard deviations of a normal distribution."""
 
 OUTPUT, NODE_SPREAD = 0.1, 0.3
 """Stiffness of the weights of a network's output layer, and the spread it is relative to: that of a
@@ -73,11 +77,12 @@ class Evidence:
         return estimator.network(self.rows)[:, 0]
 
     def covered(self, estimator: Adaptable) -> NDArray[np.bool_] | None:
-        """Return for which samples the interval covers the sensor, shape (n,); None without one."""
+        """Return whether the interval covers the sensor, of the samples with one; None without."""
         if not isinstance(estimator, BankEstimator) or estimator.interval is None:
             return None
         found = estimator.of_rows(self.rows)
-        return np.asarray(np.abs(found.value - self.truth) <= found.half_width)
+        inside = np.abs(found.value - self.truth) <= found.half_width
+        return np.asarray(inside[np.isfinite(found.half_width)])
 
 
 def _channels(estimator: Adaptable) -> tuple[str, ...]:
@@ -104,8 +109,7 @@ def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
 def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
     """Return the source's estimator adapted to the runs of another instrument.
 
-    Its interval is the source's, widened so that it covers the runs, each by weights adapted with
-    the others where there are several; a network has none.
+    Its interval is the source's, wider away from the conditions of the runs; a network has none.
 
     Args:
         source: Fitted on another instrument.
@@ -154,19 +158,61 @@ def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEs
     def pulled(part: Sequence[RunEvidence]) -> FloatArray:
         return pull([run.normal for run in part], source.weights, source.scale, stiff)
 
-    weights, interval = pulled(runs), None
-    if source.interval is not None:
-        others = [[other for other in runs if other is not run] or [run] for run in runs]
-        residuals = [
-            run.design @ pulled(part) - run.truth for run, part in zip(runs, others, strict=True)
-        ]
-        interval = rescaled(source.interval, [run.design for run in runs], residuals)
+    weights = pulled(runs)
+    interval = None if source.interval is None else _interval(source.interval, runs, pulled)
     lowest = np.min([source.ranges[0], *(run.ranges[0] for run in runs)], axis=0)
     highest = np.max([source.ranges[1], *(run.ranges[1] for run in runs)], axis=0)
     ranges = np.array([lowest, highest])
     return replace(
         source, weights=weights, interval=interval, ranges=ranges, instrument="", origin=None
     )
+
+
+def _interval(
+    source: Interval,
+    runs: Sequence[RunEvidence],
+    pulled: Callable[[Sequence[RunEvidence]], FloatArray],
+) -> Interval:
+    """Return the source's interval, wider away from the runs adapted with.
+
+    Conditions that no run of the new instrument has cost what unfitted conditions cost on the
+    source. Where several runs are given, each by weights adapted with the others shows if that is
+    enough; the interval is never narrower.
+    """
+    visits = Visits([run.places for run in runs], source.beyond)
+    found = with_scores(source, visits.scores(np.arange(len(runs))).values)
+    ratios = []
+    for k, run in enumerate(runs if len(runs) > 1 else []):
+        others = [j for j in range(len(runs)) if j != k]
+        wide = with_scores(source, visits.scores(np.array(others)).values)
+        error = run.design @ pulled([runs[j] for j in others]) - run.truth
+        one_sigma = wide.half_width(run.design, run.places) / NORMAL_95
+        ratios.append(np.nanmean((error / one_sigma) ** 2))
+    return scaled(found, max(float(np.mean(ratios)), 1.0) ** 0.5) if ratios else found
+
+
+def spread_out(source: BankEstimator, runs: Sequence[RunEvidence], count: int) -> list[int]:
+    """Return the runs to adapt with: those that leave the others closest to them.
+
+    One after another, the run is taken after which the mean score of all runs by those taken is
+    least. Only the conditions of the samples are used, not the target.
+
+    Args:
+        source: The estimator to be adapted.
+        runs: Runs of the new instrument to choose from.
+        count: How many, at most all.
+
+    Raises:
+        NetworkError: The source has no interval, so no grid of conditions.
+    """
+    if source.interval is None:
+        raise NetworkError("The estimator has no interval, so runs cannot be chosen by it.")
+    visits = Visits([run.places for run in runs], source.interval.beyond)
+    taken: list[int] = []
+    for _ in range(min(count, len(runs))):
+        left = [k for k in range(len(runs)) if k not in taken]
+        taken.append(min(left, key=lambda k: visits.mean_by(np.array([*taken, k]))))
+    return taken
 
 
 def _adapted_network(source: NetworkEstimator, runs: Sequence[Evidence]) -> NetworkEstimator:

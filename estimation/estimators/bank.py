@@ -8,21 +8,21 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.bank.edges import edges
+from estimation.bank.beyond import coordinates
 from estimation.bank.fitting import Pool, Settings, chosen, solve
-from estimation.bank.interval import COVERAGE, Interval, calibrate, widened
+from estimation.bank.interval import COVERAGE, Interval
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
+from estimation.estimators.left_out_runs import INNER_FOLDS, interval_of
 from estimation.estimators.origin import Origin
 from estimation.estimators.run_evidence import RunEvidence
 from estimation.filters import PAPER, LowPass
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.recording import FloatArray, Recording, read_only
 
-INNER_FOLDS = 5
 EVERY = 4
 """Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
 
@@ -33,7 +33,8 @@ class Estimates:
 
     Attributes:
         value: The estimate, in the target's unit.
-        half_width: Half the width of the interval that covers 95 %, NaN where unknown.
+        half_width: Half the width of the interval that covers 95 %; NaN where unknown: far from the
+            fitted conditions, opening, at rest, or on another instrument.
         inside: Whether position, load, speed and acceleration lie in the range fitted on.
     """
 
@@ -58,7 +59,7 @@ class BankEstimator:
         origin: Where it comes from; None where nobody stated it.
     """
 
-    SCHEMA: ClassVar[str] = "rig.bank/3"
+    SCHEMA: ClassVar[str] = "rig.bank/4"
 
     bank: Bank
     target: str
@@ -116,14 +117,18 @@ class BankEstimator:
         """Return the estimates for a design of the bank and the rows it was made of."""
         width = np.full(len(rows), np.nan)
         if self.interval is not None:
-            width = self.interval.half_width(design)
+            width = self.interval.half_width(design, coordinates(self.bank, rows))
         judged = rows[:, : self.bank.judged]
         within = (judged >= self.ranges[0]) & (judged <= self.ranges[1])
         return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
 
     def for_any_instrument(self) -> "BankEstimator":
-        """Return the estimator for use on instruments it was not fitted on."""
-        return replace(self, instrument="")
+        """Return the estimator for use on instruments it was not fitted on.
+
+        Nothing states how wrong it is there: it has no interval, and no sample is inside its range.
+        """
+        nowhere = np.outer([np.inf, -np.inf], np.ones(self.bank.judged))
+        return replace(self, instrument="", interval=None, ranges=nowhere)
 
     def stepper(self, sample_rate_hz: float) -> "BankStepper":
         """Return the estimator as it runs live."""
@@ -186,10 +191,12 @@ class BankStepper:
 
     Attributes:
         inside: Whether each of the last samples lay in the range fitted on, shape (n,).
+        half_width: Half the interval's width of each of them, shape (n,); NaN where unknown.
     """
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
         self.inside: NDArray[np.bool_] = np.empty(0, np.bool_)
+        self.half_width: FloatArray = np.empty(0)
         self._estimator = estimator
         self._source = CausalChannels(
             estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
@@ -203,7 +210,7 @@ class BankStepper:
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
         found = self.estimate(time_s, measured)
-        self.inside = found.inside
+        self.inside, self.half_width = found.inside, found.half_width
         return found.value
 
     def estimate(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> Estimates:
@@ -244,34 +251,11 @@ def fit_runs(
     if len(runs) >= INNER_FOLDS:
         folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
         settings = settings or chosen(whole, folds, bank.shape)
-        held_out = [solve(whole.without(part), bank.shape, settings)[:, 0] for part in folds]
-        residuals = [
-            run.design @ held_out[k % INNER_FOLDS] - run.truth for k, run in enumerate(runs)
-        ]
-        interval = calibrate(bank, [run.design for run in runs], residuals, coverage)
-        interval = _beyond_edges(interval, runs, whole, bank, settings, coverage)
+        interval = interval_of(runs, whole, bank, settings, coverage)
     lowest = np.min([run.ranges[0] for run in runs], axis=0)
     highest = np.max([run.ranges[1] for run in runs], axis=0)
     weights = solve(whole, bank.shape, settings or Settings())[:, 0]
     return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
-
-
-def _beyond_edges(
-    interval: Interval,
-    runs: Sequence[RunEvidence],
-    whole: Pool,
-    bank: Bank,
-    settings: Settings,
-    coverage: float,
-) -> Interval:
-    """Return the interval raised to the errors on extreme levels left out in turn."""
-    designs, residuals = [], []
-    for level in edges([run.conditions for run in runs], INNER_FOLDS):
-        rest = whole.without(Pool.of([runs[k].normal for k in level]))
-        weights = solve(rest, bank.shape, settings)[:, 0]
-        designs += [runs[k].design for k in level]
-        residuals += [runs[k].design @ weights - runs[k].truth for k in level]
-    return widened(interval, designs, residuals, coverage) if designs else interval
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.bank import states
+from estimation.bank.beyond import STANDING_RAD_S, Beyond
 from estimation.derived import (
     AGO,
     FALL,
@@ -215,6 +216,8 @@ def _bank(estimator: BankEstimator) -> str:
     parents, factors = bank.tables
     columns = interval.columns if interval is not None else np.zeros(1, np.int64)
     widths = interval.weights if interval is not None else np.zeros(1)
+    unknown = Beyond(np.zeros(1), np.ones(1), np.zeros(2))
+    table = interval.beyond if interval is not None else unknown
     text = BANK
     for mark, value in {
         "PRODUCTS": str(len(bank.products)),
@@ -228,7 +231,14 @@ def _bank(estimator: BankEstimator) -> str:
         "WIDTH_COUNT": str(len(columns)),
         "WIDTH_COLUMNS": _ints(columns),
         "WIDTH_WEIGHTS": _floats(widths),
-        "LEAST": f"{interval.least:.9g}f" if interval is not None else "NAN",
+        "LEAST": f"{interval.least:.9g}f" if interval is not None else "0.0f",
+        "AXES": str(len(table.step)),
+        "LOWEST_NODE": _floats(table.lowest) if interval is not None else "NAN",
+        "NODE_STEP": _floats(table.step),
+        "NODES": _ints(table.values.shape),
+        "BEYOND": _floats(table.values),
+        "STANDING": f"{STANDING_RAD_S}f",
+        "POSE_PLACE": f", row[{states.JUDGED}]" if bank.pose else "",
         "CENTRE": f"{states.POSITION_CENTRE_RAD}f",
         "SCALE": f"{states.POSITION_SCALE_RAD}f",
         "LOAD": f"{states.LOAD_SCALES[bank.surrogate]}f",

@@ -4,8 +4,8 @@ HEADER = """\
 /* Estimates @TARGET@ from @MEASURED_LIST@. Made by rig export; not to be edited.
  *
  * name_start(&s); then every 1 / @RATE@ s: name_step(&s, measured), measured in SI units in the
- * order above, finite. half_width is that of the interval that covers 95 %, NAN where not known;
- * valid is 0 outside the range that was fitted.
+ * order above, finite. half_width is that of the interval that covers 95 %, NAN where not known:
+ * far from the fitted conditions, opening and at rest. valid is 0 outside the fitted range.
  */
 #ifndef NAME_H
 #define NAME_H
@@ -107,7 +107,7 @@ static inline name_estimate name_step(name_state *s, const double *measured) {
 BANK = """\
 enum {
     NAME_PRODUCTS = @PRODUCTS@, NAME_ORDERS = @ORDERS@, NAME_WRIST_ORDERS = @WRIST_ORDERS@,
-    NAME_WIDTHS = @WIDTH_COUNT@
+    NAME_WIDTHS = @WIDTH_COUNT@, NAME_AXES = @AXES@
 };
 
 static const uint16_t name_parent[NAME_PRODUCTS] = { @PARENTS@ };
@@ -117,6 +117,34 @@ static const float name_lowest[@JUDGED@] = { @LOWEST@ };
 static const float name_highest[@JUDGED@] = { @HIGHEST@ };
 static const uint16_t name_width_column[NAME_WIDTHS] = { @WIDTH_COLUMNS@ };
 static const float name_width_weight[NAME_WIDTHS] = { @WIDTH_WEIGHTS@ };
+
+static const float name_lowest_node[NAME_AXES] = { @LOWEST_NODE@ };
+static const float name_node_step[NAME_AXES] = { @NODE_STEP@ };
+static const int name_nodes[NAME_AXES] = { @NODES@ };
+static const float name_beyond[] = { @BEYOND@ };
+
+/* what is added to the squared half width by angle, load, speed in octaves and pose */
+static inline float name_added(const float *row) {
+    float speed = log2f(fmaxf(row[2] / @GEAR@, @STANDING@)), total = 0.0f;
+    const float place[] = { row[0], row[1], speed@POSE_PLACE@ };
+    float x[NAME_AXES];
+    for (int k = 0; k < NAME_AXES; k++) {
+        x[k] = (place[k] - name_lowest_node[k]) / name_node_step[k];
+        if (!(x[k] >= 0.0f && x[k] <= (float)(name_nodes[k] - 1))) return NAN;
+    }
+    for (int corner = 0; corner < 1 << NAME_AXES; corner++) {
+        float share = 1.0f;
+        int at = 0;
+        for (int k = 0; k < NAME_AXES; k++) {
+            int low = (int)x[k], up = corner >> k & 1;
+            if (low > name_nodes[k] - 2) low = name_nodes[k] - 2;
+            share *= up ? x[k] - (float)low : 1.0f - (x[k] - (float)low);
+            at = at * name_nodes[k] + low + up;
+        }
+        total += share * name_beyond[at];
+    }
+    return total;
+}
 
 static inline name_estimate name_model(const float *row) {
     float state[@STATES@], product[NAME_PRODUCTS];
@@ -170,8 +198,8 @@ static inline name_estimate name_model(const float *row) {
     int valid = 1;
     for (int k = 0; k < @JUDGED@; k++)
         valid &= row[k] >= name_lowest[k] && row[k] <= name_highest[k];
-    float least = @LEAST@;
-    name_estimate found = { total, isnan(least) ? NAN : fmaxf(width, least), valid };
+    width = fmaxf(width, @LEAST@);
+    name_estimate found = { total, sqrtf(width * width + name_added(row)), valid };
     return found;
 }"""
 

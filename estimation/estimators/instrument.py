@@ -15,6 +15,11 @@ def instrument_of(recording: Recording) -> str:
     return " ".join(part for part in (own.model, own.serial, mounting) if part)
 
 
+def is_own(instrument: str, recording: Recording) -> bool:
+    """Return whether a recording is of an instrument, as far as both are known."""
+    return not instrument or instrument_of(recording) in ("", instrument)
+
+
 def require_own(instrument: str, recording: Recording) -> None:
     """Refuse a recording of another instrument; an instrument that is not known is not refused.
 
@@ -25,8 +30,8 @@ def require_own(instrument: str, recording: Recording) -> None:
     Raises:
         InstrumentError: The recording is of another instrument.
     """
-    other = instrument_of(recording)
-    if instrument and other and other != instrument:
+    if not is_own(instrument, recording):
+        other = instrument_of(recording)
         raise InstrumentError(
             f"The estimator was fitted on {instrument}, the recording is of {other}.",
             "Another instrument has other friction and another zero.",

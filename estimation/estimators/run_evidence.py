@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimation.bank.beyond import coordinates
 from estimation.bank.fitting import Normal
 from estimation.bank.states import Bank
 from estimation.recording import FloatArray
@@ -19,6 +20,7 @@ class RunEvidence:
         truth: The target without lag, shape (n,).
         normal: The run's share in the normal equations.
         ranges: Lowest and highest value of each judged channel, shape (2, judged).
+        places: Conditions of each sample, shape (n, d); see `estimation.bank.beyond`.
         conditions: What was held constant in the run; the interval looks beyond their levels.
     """
 
@@ -26,6 +28,7 @@ class RunEvidence:
     truth: FloatArray
     normal: Normal
     ranges: FloatArray
+    places: FloatArray
     conditions: Mapping[str, float | str] = field(default_factory=dict)
 
     @classmethod
@@ -47,8 +50,8 @@ class RunEvidence:
         design = bank.design(rows)
         judged = rows[:, : bank.judged]
         ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
-        whole = Normal.of(design, truths)
+        whole, places = Normal.of(design, truths), coordinates(bank, rows)
         return [
-            cls(design, truth, whole.only(k), ranges, conditions or {})
+            cls(design, truth, whole.only(k), ranges, places, conditions or {})
             for k, truth in enumerate(np.ascontiguousarray(truths.T))
         ]

@@ -71,6 +71,16 @@ class Board {
     // Whether motors are, or may at any tick be, given current.
     bool in_force() const { return armed() || holding(); }
 
+    // What it has tripped over, until that is cleared.
+    Trip trip() const { return first_.code; }
+
+    // A trip from before this start, where somebody else has kept it: it is to be cleared here as well.
+    void restore(Trip code) {
+        if (code == kNoTrip) return;
+        first_.code = code;
+        status_ = static_cast<std::uint16_t>((status_ & kReferenced) | latched(code));
+    }
+
     // Ticks that were not run: their samples are lost and their setpoints played.
     void skip(std::uint32_t ticks) {
         sequence_ += ticks;
@@ -130,6 +140,11 @@ class Board {
         }
     }
 
+    static unsigned latched(Trip code) {
+        const unsigned kind = code == kHostSilent ? kWatchdogTripped : kLimitTripped;
+        return static_cast<unsigned>(code) << kTripShift | kind;
+    }
+
     // Goes to the safe state; the first cause stays.
     void trip(const Crossing& crossing, const Inputs& inputs) {
         const bool holdable = crossing.code == kHostSilent || crossing.code == kStalled ||
@@ -142,8 +157,7 @@ class Board {
         if (first_.code == kNoTrip) {
             first_ = crossing;
             first_us_ = now_us_;
-            status |= static_cast<unsigned>(crossing.code) << kTripShift;
-            status |= crossing.code == kHostSilent ? kWatchdogTripped : kLimitTripped;
+            status |= latched(crossing.code);
         }
         const bool doubtful = crossing.code == kEncodersDisagree || crossing.code == kEncoderJump ||
                               crossing.code == kEncoderFrozen;

@@ -22,6 +22,8 @@ class HostBoard {
     virtual bool limit_to(const std::uint8_t* settings) = 0;
     virtual void stop(bool stopped) = 0;
     virtual bool in_force() const = 0;
+    virtual rig::Trip trip() const = 0;
+    virtual void restore(rig::Trip code) = 0;
     virtual void skip(std::uint32_t ticks) = 0;
     virtual void receive(const std::uint8_t* data, std::size_t size) = 0;
     virtual void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) = 0;
@@ -74,6 +76,8 @@ class ProfileBoard final : public HostBoard {
     }
     void stop(bool stopped) override { stopped_ = stopped; }
     bool in_force() const override { return board_.in_force(); }
+    rig::Trip trip() const override { return board_.trip(); }
+    void restore(rig::Trip code) override { board_.restore(code); }
     void skip(std::uint32_t ticks) override { board_.skip(ticks); }
     void receive(const std::uint8_t* data, std::size_t size) override {
         board_.template receive<rig::NoLock>(data, size);
@@ -158,6 +162,12 @@ void rig_board_stop(void* board, std::int32_t stopped) { board_of(board)->stop(s
 
 // Whether motors are, or may at any tick be, given current.
 std::int32_t rig_board_in_force(void* board) { return board_of(board)->in_force() ? 1 : 0; }
+
+// What it has tripped over, 0 for nothing; and a trip from before this start.
+std::int32_t rig_board_trip(void* board) { return board_of(board)->trip(); }
+void rig_board_restore(void* board, std::int32_t code) {
+    board_of(board)->restore(static_cast<rig::Trip>(code));
+}
 
 // Lets ticks pass that were not run.
 void rig_board_skip(void* board, std::uint32_t ticks) { board_of(board)->skip(ticks); }

@@ -1,17 +1,15 @@
 // Sequences from seeds against the core, with the rules of world.hpp held at every tick.
 //
-//   hunt SETTINGS commands|faults FIRST COUNT
+//   hunt SETTINGS commands|faults FIRST COUNT [MOST]
 //
 // SETTINGS: gains and limits as in an arm command behind its session; they are the board's own limits, too.
 // commands: hosts that send anything at any time. faults: one honest host, and a rig and a link that fail.
 // Each seed that breaks a rule is printed with its events, shrunk to as few as still break it. The last line
-// has the figures. Exit code 1 where a rule was broken.
+// has the figures. MOST: ends behind so many broken sequences. Exit code 1 where a rule was broken.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "world.hpp"
 
@@ -327,7 +325,7 @@ struct Sums {
     double farthest_rad = 0;
 };
 
-std::string outcome(bool faults, std::uint64_t seed, const Bytes& settings,
+std::string outcome(bool faults, std::uint64_t seed, const proofs::Settings& settings,
                     const std::vector<Event>& events, Sums* sums) {
     World world(seed, settings);
     faults ? ride(world, seed, events) : play(world, events);
@@ -342,7 +340,7 @@ std::string outcome(bool faults, std::uint64_t seed, const Bytes& settings,
 }
 
 // Leaves out events as long as the same rule is broken without them.
-std::vector<Event> shrunk(bool faults, std::uint64_t seed, const Bytes& settings,
+std::vector<Event> shrunk(bool faults, std::uint64_t seed, const proofs::Settings& settings,
                           std::vector<Event> events, const std::string& rule) {
     for (std::size_t piece = events.size(); piece > 0; piece /= 2) {
         for (std::size_t at = 0; at + piece <= events.size();) {
@@ -362,15 +360,15 @@ std::vector<Event> shrunk(bool faults, std::uint64_t seed, const Bytes& settings
 }  // namespace
 
 int main(int count, char** words) {
-    if (count != 5) return std::fprintf(stderr, "hunt SETTINGS commands|faults FIRST COUNT\n"), 2;
-    std::ifstream file(words[1], std::ios::binary);
-    const Bytes settings((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    if (settings.size() != rig::ReferenceProfile::kArmSize) return std::fprintf(stderr, "no settings\n"), 2;
+    if (count < 5) return std::fprintf(stderr, "hunt SETTINGS commands|faults FIRST COUNT\n"), 2;
+    proofs::Settings settings;
+    if (!proofs::read_settings(words[1], settings)) return std::fprintf(stderr, "no settings\n"), 2;
     const bool faults = std::strcmp(words[2], "faults") == 0;
     const std::uint64_t first = std::strtoull(words[3], nullptr, 10);
     const std::uint64_t last = first + std::strtoull(words[4], nullptr, 10);
+    const std::uint64_t most = count > 5 ? std::strtoull(words[5], nullptr, 10) : ~std::uint64_t{0};
     Sums sums;
-    for (std::uint64_t seed = first; seed < last; ++seed) {
+    for (std::uint64_t seed = first; seed < last && sums.broken < most; ++seed) {
         const std::vector<Event> events = faults ? faults_of(seed) : commands_of(seed);
         const std::string rule = outcome(faults, seed, settings, events, &sums);
         if (rule.empty()) continue;

@@ -2,8 +2,10 @@
 // at every tick whatever happens. Positions are true angles, closing positive; counts are the reference rig's.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -13,7 +15,8 @@
 namespace proofs {
 
 using Bytes = std::vector<std::uint8_t>;
-using TestBoard = rig::Board<rig::ReferenceProfile, 65536>;
+using TestBoard = rig::Board<rig::ReferenceProfile, 4096>;
+using Settings = std::array<std::uint8_t, rig::ReferenceProfile::kArmSize>;
 
 class Random {
   public:
@@ -41,6 +44,12 @@ inline Bytes wire_of(const Bytes& payload) {
     wire[length++] = 0;
     wire.resize(length);
     return wire;
+}
+
+// Gains and limits, as in an arm command behind its session; false where the file does not hold them.
+inline bool read_settings(const char* path, Settings& settings) {
+    std::ifstream file(path, std::ios::binary);
+    return static_cast<bool>(file.read(reinterpret_cast<char*>(settings.data()), settings.size()));
 }
 
 inline void put(Bytes& bytes, std::uint64_t value, int size) {
@@ -92,7 +101,7 @@ class Plant {
 // A board with a plant, everything a host can send it, and the rules that no host and no fault may break.
 class World {
   public:
-    World(std::uint64_t seed, const Bytes& settings)
+    World(std::uint64_t seed, const Settings& settings)
         : random(seed), settings_(settings), board_("PROOF") {
         rig::Reader reader(settings_.data());
         own_.read(reader);
@@ -107,6 +116,7 @@ class World {
     std::uint64_t trips = 0;
     double farthest_rad = 0;
     bool estop = false;
+    std::uint16_t number = 100;  // of the newest command
     SensorFault faults[kChannels];
     int swapped = -1;  // an encoder that is at the spindle's plug, and the other way round
     const rig::ReferenceFields& limits() const { return own_.limits; }
@@ -320,7 +330,7 @@ class World {
         }
     }
 
-    Bytes settings_;
+    Settings settings_;
     rig::ReferenceProfile::Settings own_;
     TestBoard board_;
     Plant plant_;

@@ -1,4 +1,4 @@
-"""Hidden torque of an arm's joints by families of effects, each joint with a form drawn anew.
+"""Hidden torque of an arm's joints by families of effects, each joint with a form of its own.
 
 The forms are random tables and banks of elements with memory (`rig.simulation.varied`), so the form
 of a hidden effect is drawn, not written.

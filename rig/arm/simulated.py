@@ -110,7 +110,7 @@ def draw_arm(rng: np.random.Generator, family: str = OWN) -> SimulatedArm:
 
 
 def hidden_torque(arm: SimulatedArm, motion: Motion) -> FloatArray:
-    """Return what no model declares, along a motion, shape (n, joints)."""
+    """Return the torque that no model declares, along a motion, shape (n, joints)."""
     if arm.form is not None:
         return arm.form(motion)
     friction = bouc_wen(motion.position, arm.slip)

@@ -15,6 +15,7 @@ from drivers.transport.python_can import open_can
 from rig.bench.logger import VIRTUAL_CAN_URL, open_logger
 from rig.bench.trips import WORDS
 from rig.configuration.config import Config
+from rig.logic.latch import TripLatch
 from rig.machines.choose import machine_of
 
 
@@ -54,7 +55,13 @@ def _clear_drive(config: Config) -> Latch:
         code = drive.clear_fault()
     finally:
         drive.close()
-    return Latch(explain(code)[0] if code else "", code, "")
+    found = [explain(code)[0]] if code else []
+    latch = TripLatch(config.logger.url)
+    trip = latch.code
+    if trip:  # of the logic in this computer, which ends with its process
+        latch.keep(0)
+        found.append(WORDS[Trip(trip)][0])
+    return Latch("; ".join(found), code or trip, "")
 
 
 def _bus(config: Config) -> CanBus:

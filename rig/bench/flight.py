@@ -45,7 +45,7 @@ class FlightRecorder:
         self._way.write(data)
 
     def rows(self, since: int) -> tuple[NDArray[np.void], int]:
-        """Return what was sent as rows of the log's stream, and how many sendings there are.
+        """Return the sendings as rows of the log's stream, and how many sendings there are.
 
         Args:
             since: Number of the first sending to return.

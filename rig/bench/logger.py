@@ -6,6 +6,7 @@ from drivers.transport import Transport, open_transport
 from rig.bench.sensor_logger import SensorWay
 from rig.configuration.config import Config
 from rig.errors import UsageError
+from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
 
 PTY_URL = "sim://pty"
@@ -87,7 +88,12 @@ def _open_any(config: Config, pace: float | None) -> Transport:
             )
         rate_hz = device.channels[0].rate_hz
         return LogicLink(
-            device, section.url, rate_hz=rate_hz, is_cold=config.is_simulated, pace=paced
+            device,
+            section.url,
+            rate_hz=rate_hz,
+            is_cold=config.is_simulated,
+            pace=paced,
+            latch=None if config.is_simulated else TripLatch(section.url),
         )
     except BaseException:
         device.close()

@@ -19,6 +19,7 @@ from drivers.epos4.drive import Epos4
 from drivers.errors import DriverError
 from drivers.transport.python_can import open_can
 from rig.configuration.config import Config
+from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
 
 PERIOD_S = 0.002
@@ -72,7 +73,8 @@ def _opened(config: Config) -> Iterator[LogicLink]:
         bus.close()
         raise
     try:
-        yield LogicLink(device, bus.url, late_s=late_s, is_cold=config.is_simulated)
+        latch = None if config.is_simulated else TripLatch(config.logger.url)
+        yield LogicLink(device, bus.url, late_s=late_s, is_cold=config.is_simulated, latch=latch)
     finally:
         device.close()
 

@@ -6,13 +6,17 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
+from rig.cli.new_file import require_new
 from rig.output.console import JsonFlag, emit_json, progress, results, to_json
 
 
 def adapt(
     source: Annotated[Path, typer.Argument(help="Estimator of the source, from rig fit.")],
     path: Annotated[Path, typer.Argument(help="Recordings of the other instrument.")],
-    runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")],
+    runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")] = "",
+    choose: Annotated[
+        int, typer.Option(min=1, help="Without --runs: how many, those nearest to all others.")
+    ] = 1,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File of the adapted estimator.")
     ] = None,
@@ -33,22 +37,25 @@ def adapt(
     from estimation.files import write_text_atomic
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
-    from rig.models.adapt import open_source, run_adaptation
+    from rig.models.adapt import open_source, run_adaptation, runs_by_rule
     from rig.models.origins import with_origin
     from rig.output.table import to_rich
     from rig.reports import adapt as shown
 
+    require_new(out)
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)
     say_left_out(path, campaign)
     campaign, steps = with_one_zero(campaign, estimator.target)
+    named = [name.strip() for name in runs.split(",") if name.strip()]
     with progress() as bar:
         task = bar.add_task("runs", total=len(campaign))
+        named = named or runs_by_rule(estimator, campaign, choose)
         result, new = run_adaptation(
             estimator,
             source,
             campaign,
-            [name.strip() for name in runs.split(",") if name.strip()],
+            named,
             from_scratch=scratch,
             seed=seed,
             on_run=lambda run: bar.advance(task),

@@ -1,4 +1,4 @@
-"""`rig calibrate check`: do the encoders of recordings that exist agree with each other?"""
+"""`rig calibrate check`: do recordings that exist agree with the calibrations of the sensors?"""
 
 from math import degrees
 from pathlib import Path
@@ -11,6 +11,7 @@ from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
     from calibration.agreement import Agreement
+    from rig.calibrate.zeros import ZeroMotion
 
 
 def check(
@@ -25,26 +26,50 @@ def check(
     ] = None,
     json: JsonFlag = False,
 ) -> int:
-    """Verify the encoders' calibrations on recordings that exist; nothing moves.
+    """Verify the calibrations of sensors on recordings that exist; nothing moves.
 
-    Compares each encoder with the one before it: scale and offset, with the scatter over runs as
-    uncertainty. Exit code 1 when one is off.
+    Compares the spindle's encoder with the motor's: scale and offset, with the scatter over runs as
+    uncertainty. Of every sensor that is tared: how far its zero moved. Exit code 1 when one is off.
+    The scale of a torque or current sensor needs weights: rig calibrate.
     """
-    from calibration.agreement import agreements
+    from calibration.agreement import NoPairError, agreements
+    from rig.calibrate.zeros import zero_motions
     from rig.cli.left_out import say_left_out
     from rig.importers.registry import open_campaign
+    from rig.log.attempts import heads_of
 
     campaign = open_campaign(path, format_)
     say_left_out(path, campaign)
-    found = agreements(handle.recording() for handle in campaign.runs if not handle.excluded)
+    kept = campaign.evidence.runs
+    logs = [run.source for run in kept if run.source and run.source.suffix == ".mcap"]
+    zeros = zero_motions(heads_of(logs))
+    try:
+        found = agreements(handle.recording() for handle in kept)
+    except NoPairError:
+        if not zeros:
+            raise
+        found = []
     screen = results(json)
-    for one in found:
-        for line in lines_of(one):
-            screen.print(line, markup=False)
+    for line in (*(line for one in found for line in lines_of(one)), *map(zero_line, zeros)):
+        screen.print(line, markup=False)
     wrong = [one.encoder for one in found if one.scale_is_wrong or one.offset_is_wrong]
+    wrong += [one.channel for one in zeros if one.is_wrong]
     if json:
-        emit_json({"agreements": found, "wrong": wrong})
+        emit_json({"agreements": found, "zeros": zeros, "wrong": wrong})
     return 1 if wrong else 0
+
+
+def zero_line(one: "ZeroMotion") -> str:
+    """Return the motion of a zero in words."""
+    from rig.calibrate.shown import with_unit
+
+    word = "ALARM" if one.is_wrong else "noted" if one.limit is None else "good"
+    limit = "no limit" if one.limit is None else f"limit {with_unit(one.limit, one.unit)}"
+    return (
+        f"{word}: zero of {one.channel}, {one.runs} runs: moved by at most"
+        f" {with_unit(one.within_run, one.unit)} within a run ({limit}), by"
+        f" {with_unit(one.over_all, one.unit)} over all runs."
+    )
 
 
 def lines_of(one: "Agreement") -> list[str]:

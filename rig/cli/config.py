@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.help import GroupedHelp
+from rig.cli.new_file import require_new
 from rig.cli.rig_options import SimFlag
 from rig.cli.shipped import complete_config, config_names
 from rig.output.console import JsonFlag, emit_json, results
@@ -58,8 +59,7 @@ def init(
             f"There are: {', '.join(config_names())}.",
             f"Did you mean {near[0]!r}?" if near else "",
         )
-    if out.exists():
-        raise UsageError(f"{out} is there already.", fix="Name another file.")
+    require_new(out)
     boards = [port for port in serial_ports() if port.usb.startswith(TEENSY)]
     text = (SHIPPED / f"{like}.toml").read_text()
     if len(boards) == 1:

@@ -7,6 +7,7 @@ import typer
 
 from rig.cli.left_out import SkipBad, say_left_out
 from rig.cli.machine_option import MachineOption
+from rig.cli.new_file import require_new
 from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
@@ -163,6 +164,7 @@ def fit(
     from rig.output.table import to_rich
     from rig.reports.first_look import held_out_sentence, parameter_table
 
+    require_new(out)
     screen = results(json_)
     campaign = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, campaign)

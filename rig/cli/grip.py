@@ -56,7 +56,7 @@ def grip(
     late = held[len(held) // 2 :]
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
-    allowed = estimator.half_width
+    allowed = estimator.usual_half_width
     has_load = late[-1].load_a < most_a
     is_reached = has_load and abs(estimate_n_m - torque) <= REACHED_RATIO * torque
     if not has_load:

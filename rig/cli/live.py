@@ -64,7 +64,7 @@ def live(
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
     from rig.errors import ExitCode, UsageError
-    from rig.live.estimator import estimators_of, half_widths_of, shown_channels
+    from rig.live.estimator import HalfWidths, estimators_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import HELP, no_keys, pressed_keys
     from rig.live.model_status import with_model_status
@@ -114,7 +114,7 @@ def live(
             lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
             plain=plain,
             json=json_,
-            half_widths=half_widths_of(estimators),
+            half_widths=HalfWidths(estimators),
             footer=HELP if keys else "Ctrl-C quits",
         )
         if page:

@@ -23,14 +23,24 @@ log_app = typer.Typer(
 )
 
 LogOrFolder = Annotated[Path, typer.Argument(help="A log, or a folder of logs.")]
+AnyRecording = Annotated[
+    Path, typer.Argument(help="A log, a folder of logs, or recordings of any format.")
+]
 OneLog = Annotated[Path, typer.Argument(help="A log.")]
 
 
 @log_app.command()
-def info(path: LogOrFolder, json: JsonFlag = False) -> None:
-    """Show what a log lost, then run, conditions, streams, rates, marks and attachments."""
+def info(path: AnyRecording, json: JsonFlag = False) -> None:
+    """Show what a log lost, then run, conditions, streams, rates, marks and attachments.
+
+    Of recordings of another format: a line for each run.
+    """
+    from rig.cli.log_runs import is_of_another_format, show_runs
     from rig.log.reader import read_log
 
+    if is_of_another_format(path):
+        show_runs(path, json)
+        return
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
     if json:
         emit_json({"logs": found})

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.new_file import require_new
 from rig.cli.shipped import complete_machine, machine_names
 from rig.output.console import JsonFlag, emit_json, results
 
@@ -136,10 +137,8 @@ def new(
     """
     from estimation.plant_file import write
     from rig.cli.machine_new import Answers, asked, data_text, plant_of
-    from rig.errors import UsageError
 
-    if out.exists():
-        raise UsageError(f"{out} exists.", fix="Name another file, or delete it.")
+    require_new(out)
     answers = Answers(axis or [], transmission or [], actuator or [], sensor or [])
     if answers.is_empty:
         answers = asked()

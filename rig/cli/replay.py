@@ -56,7 +56,7 @@ def replay(
     if core:
         return _core(log, config, json_)
     from rig.errors import ExitCode, UsageError
-    from rig.live.estimator import half_widths_of, shown_channels
+    from rig.live.estimator import HalfWidths, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
     from rig.live.keys import pressed_keys
     from rig.live.model_status import with_model_status
@@ -77,7 +77,7 @@ def replay(
     options = ShowOptions(
         title=f"rig replay {recording.name}",
         channels=shown_channels(estimators, usual),
-        half_widths=half_widths_of(estimators),
+        half_widths=HalfWidths(estimators),
         lever_m=lever_mm / 1e3,
         plain=plain,
         json=json_,

@@ -299,6 +299,34 @@ def instruments(
         emit_json(study)
 
 
+@study_app.command()
+def intervals(
+    data: Annotated[Path, typer.Option(help="Folder of the measured data's folders or archives.")],
+    instrument: Annotated[
+        list[str] | None, typer.Option(help="Instrument to use; may be repeated.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Measure how often intervals hold, on levels left out and on other instruments."""
+    from rig.importers.registry import open_campaign
+    from rig.studies.instruments import intervals_page as shown
+    from rig.studies.instruments.intervals import run_intervals
+    from rig.studies.oneill.study import part_of
+
+    names = instrument or ["Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
+    campaigns = {name: open_campaign(part_of(data, name)) for name in names}
+    with progress() as bar:
+        task = bar.add_task("intervals", total=None)
+        study = run_intervals(
+            campaigns, seed, on_step=lambda what: bar.update(task, description=what)
+        )
+    show_result(shown.lead(study), shown.tables(study), out, lambda: shown.markdown(study), json)
+    if json:
+        emit_json(study)
+
+
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
     from rig.studies.oneill.study import Source

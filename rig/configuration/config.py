@@ -50,6 +50,9 @@ class Config(Section):
     """The whole configuration.
 
     Attributes:
+        name: Name of the rig, written into each log.
+        lever_arm_m: Lever arm from the jaw's axis to its tip, for the force that is shown.
+        model: Fitted model of `rig live`: a file, or a shipped one by name.
         calibration: Calibration set: a TOML file, or a shipped one by name.
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.

@@ -81,7 +81,15 @@ class DeviceSection(Section):
 
 
 class ControllerSection(Section):
-    """Gains of the logger's position controller, in its own ticks: see `drivers.teensy.control`."""
+    """Gains of the logger's position controller, in its own ticks of 1e-4 of full scale.
+
+    Attributes:
+        kp: Command ticks a spindle count.
+        ki: Command ticks a spindle count and tick.
+        kd: Command ticks a motor count and tick.
+        velocity_filter: Weight of the newest velocity.
+        limit: Largest command, ticks.
+    """
 
     kp: Number
     ki: Number

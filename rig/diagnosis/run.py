@@ -14,9 +14,9 @@ from estimation.campaign import Campaign
 from estimation.causes.equations import on_one_clock
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.clock import steady
-from estimation.diagnosis.paths import PATHS, claim, path_of, split_paths
+from estimation.diagnosis.paths import PATHS, claim, path_of, split_few, split_paths
 from estimation.diagnosis.result import Diagnosis
-from estimation.diagnosis.split import Sealed, evidence, split
+from estimation.diagnosis.split import Sealed, evidence
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
@@ -88,10 +88,8 @@ def run_diagnosis(
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
-    if len(whole) == PATHS:
-        recordings, sealed = split_paths(whole, seed, known)
-    else:
-        recordings, sealed = whole, split(whole, seed, known)
+    choose = split_paths if len(whole) == PATHS else split_few
+    recordings, sealed = choose(whole, seed, known)
     seen = tuple(name for name in sealed.confirm if path_of(name) in known)
     of_arm = any(model.balance.startswith("joint.") for model in models)
     arm = balances_of(recordings[0]) if of_arm else None
@@ -105,8 +103,8 @@ def run_diagnosis(
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
     notes = [*lost, *found.diagnosis.notes]
-    if len(whole) == PATHS:
-        notes.insert(0, claim(sealed))
+    if limit := claim(sealed):
+        notes.insert(0, limit)
     if seen:
         notes.append(f"Exploratory: used by an earlier diagnosis: {', '.join(seen)}.")
     diagnosis = replace(

@@ -33,7 +33,8 @@ _RATIO, _ARM, _OFFSET, _CURRENT_NOISE, _FORCE_NOISE = 0, 11, 12, 13, 14
 
 
 @numba.njit(cache=True)
-def _sample(state, axes, currents, seed, tick, row):  # type: ignore[no-untyped-def]
+def _sample(state, rig, tick, row):  # type: ignore[no-untyped-def]
+    axes, currents, seed = rig
     for k in range(MOTORS):
         p, angle = axes[k], state[k, grasper_plant.ANGLE]
         row[k] = np.floor(angle * p[_RATIO] * _COUNTS_A_RADIAN)
@@ -50,12 +51,14 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
 
     @numba.njit(cache=True)
     def with_controllers(  # type: ignore[no-untyped-def]
-        state, axes, currents, seed, first_tick, targets, board, control_state, gains, rows
+        state, rig, first_tick, targets, drive, rows
     ):
         _ = source
+        axes, currents, _seed = rig
+        board, control_state, gains = drive
         for k in range(rows.shape[0]):
             row = rows[k]
-            _sample(state, axes, currents, seed, first_tick + k, row)
+            _sample(state, rig, first_tick + k, row)
             grasper_board.grasper_tick(row, targets[k], board, control_state, gains)
             for motor in range(MOTORS):
                 command_e4 = row[grasper_board.COMMAND_E4 + motor]
@@ -64,13 +67,16 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
-        state, axes, currents, seed, first_tick, ticks, period_us, function, board, tick_us
+        state, rig, first_tick, ticks, call, clock_us
     ):
         _ = source
+        axes, currents, _seed = rig
+        function, board = call
+        tick_us, period_us = clock_us
         inputs = np.zeros(INPUTS, np.int32)
         outputs = np.zeros(MOTORS, np.int32)
         for k in range(ticks):
-            _sample(state, axes, currents, seed, first_tick + k, inputs)
+            _sample(state, rig, first_tick + k, inputs)
             now_us = np.uint32(tick_us + period_us * k)
             call_board_tick(function, board, now_us, inputs.ctypes.data, outputs.ctypes.data)
             for motor in range(MOTORS):
@@ -106,8 +112,8 @@ class GrasperBench:
         varied = [vary(axis, seed + k, spread) for k, axis in enumerate((yaw, jaw_1, jaw_2))]
         self._axes: NDArray[np.float64] = np.array([axis.values for axis in varied])
         self._state = np.zeros((MOTORS, 3))
-        self._currents = np.zeros(MOTORS)
-        self._seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
+        noise_seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
+        self._rig = (self._axes, np.zeros(MOTORS), noise_seed)
         self._ticks = 0
 
     @property
@@ -125,8 +131,9 @@ class GrasperBench:
         assert isinstance(drive, Drive)  # noqa: S101
         rows = np.zeros((ticks, COLUMNS), np.int32)
         wanted = np.ascontiguousarray(np.stack(targets, axis=1), np.int32)
-        shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
-        _run_with_controllers(*shared, wanted, *drive.arrays, rows)
+        _run_with_controllers(
+            self._state, self._rig, self._ticks, wanted, tuple(drive.arrays), rows
+        )
         self._ticks += ticks
         return rows
 
@@ -134,6 +141,6 @@ class GrasperBench:
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         """Run ticks with a board in the loop; see `drivers.teensy.core.FirmwareBench`."""
-        shared = (self._state, self._axes, self._currents, self._seed, self._ticks)
-        _run_with_board(*shared, ticks, GRASPER.tick_us, tick_address, board_address, tick_us)
+        call, clock_us = (tick_address, board_address), (tick_us, GRASPER.tick_us)
+        _run_with_board(self._state, self._rig, self._ticks, ticks, call, clock_us)
         self._ticks += ticks

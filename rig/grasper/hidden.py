@@ -1,4 +1,4 @@
-"""Hidden friction of the simulated grasper by families, each axis with a form drawn anew.
+"""Hidden friction of the simulated grasper by families, each axis with a form of its own.
 
 A family is a factor on an axis' level of friction: a random table over one variable, of mean 1 over
 its usual range. Functions of the simulated rigs (`rig.simulation.varied`) make the tables.

@@ -1,6 +1,6 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +34,7 @@ class ModelEstimator:
                 at this rate.
         """
         self.model: Model | None = None  # only a physical model has effects to watch
-        self.half_width: float | None = None
+        self.usual_half_width: float | None = None
         self.instrument = ""  # a physical model has none
         self._stream: Stepper
         if path.suffix == ".npz":
@@ -43,7 +43,7 @@ class ModelEstimator:
             if isinstance(estimator, BankEstimator | NetworkEstimator):
                 self.instrument = estimator.instrument
             if isinstance(estimator, BankEstimator) and estimator.interval is not None:
-                self.half_width = estimator.interval.typical
+                self.usual_half_width = estimator.interval.typical
             return
         models = model_file.read_all(path)
         model = next((m for m in models if m.balance == balance), models[0])
@@ -52,7 +52,18 @@ class ModelEstimator:
         self.model = model
         # two standard errors of the runs it was fitted on, their means left in: what a person at
         # the bench has to reckon with, in motion, on a rig that is as it was then
-        self.half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
+        self.usual_half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
+
+    @property
+    def half_width(self) -> float | None:
+        """Half the 95 % interval of the newest sample; None where it is not known.
+
+        A state estimator's differs from sample to sample, as in its C header.
+        """
+        if not isinstance(self._stream, BankStepper):
+            return self.usual_half_width
+        newest = self._stream.half_width[-1:]
+        return float(newest[0]) if np.isfinite(newest).any() else None
 
     @property
     def inside(self) -> NDArray[np.bool_] | None:
@@ -112,10 +123,24 @@ def models_in_use(path: Path) -> list[Model]:
     return of_axes or models[:1]
 
 
-def half_widths_of(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
-    """Return half of the 95 % interval of each channel that is estimated and has one known."""
-    known = {e.target_channel: e.half_width for e in estimators if e.half_width is not None}
-    return interval_of_joints(known)
+class HalfWidths(Mapping[str, float]):
+    """Half of the 95 % interval of each channel that is estimated, as of the newest sample."""
+
+    def __init__(self, estimators: Sequence[ModelEstimator]) -> None:
+        self._estimators = estimators
+
+    def _known(self) -> dict[str, float]:
+        found = {e.target_channel: e.half_width for e in self._estimators}
+        return interval_of_joints({k: width for k, width in found.items() if width is not None})
+
+    def __getitem__(self, channel: str) -> float:
+        return self._known()[channel]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known())
+
+    def __len__(self) -> int:
+        return len(self._known())
 
 
 def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:

@@ -107,7 +107,7 @@ class PageServer:
             (r"/stream", Viewer, {"token": self._token, "server": self}),
             (r"/(live\.js|plotly\.js)", File),
         ]
-        server = HTTPServer(Application(routes, websocket_ping_interval=10))
+        server = HTTPServer(Application(routes))
         self._socket.setblocking(False)
         server.add_socket(self._socket)
         self._started.set_result(asyncio.get_running_loop())

@@ -20,6 +20,7 @@ from drivers.device import Channel, Drive
 from drivers.errors import LinkLostError
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
+from rig.logic.latch import TripLatch
 from rig.logic.pace import Pace
 
 READ_S = 0.02
@@ -121,6 +122,7 @@ class LogicLink:
         is_cold: Whether the motor is known to be cold, as a simulated one; a real one may be warm
             from the session before.
         pace: Simulated seconds a real second; None for as fast as possible.
+        latch: Where a trip is kept from one process to the next; None to forget it.
     """
 
     def __init__(
@@ -132,6 +134,7 @@ class LogicLink:
         late_s: float = 0.0,
         is_cold: bool = True,
         pace: float | None = None,
+        latch: TripLatch | None = None,
     ) -> None:
         self.url = url
         self._device = device
@@ -148,6 +151,9 @@ class LogicLink:
         self.bench.board = self._board
         if not is_cold:
             self._board.assume_hot()
+        self._latch = latch
+        self._kept_trip = latch.code if latch else 0
+        self._board.restore_trip(self._kept_trip)
         self._began_s = device.now_s
         self._late = round(late_s * 1e6) // self._period_us
         self._ticks = 0
@@ -186,6 +192,7 @@ class LogicLink:
         self._require_link()
         before = self._board.in_force
         self._board.receive(data)
+        self._keep_trip()
         after = self._board.in_force
         if after != before:
             self.bench.follow(after)
@@ -225,7 +232,15 @@ class LogicLink:
         self._board.set_clock(self._newest_us)
         self._ticks += 1
         self._board.advance(1)
+        self._keep_trip()
         self._pace.keep(self._device.now_s)
+
+    def _keep_trip(self) -> None:
+        """Keep a new trip, and forget one that was cleared."""
+        trip = self._board.trip
+        if trip != self._kept_trip and self._latch is not None:
+            self._kept_trip = trip
+            self._latch.keep(trip)
 
     def _missed_while_busy(self) -> None:
         """Number the ticks that are too late to be run; they are lost."""

@@ -1,15 +1,24 @@
 """An estimator of one instrument, adapted to another one with some of its runs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.estimator import Estimator
-from estimation.estimators.adaptation import Adaptable, Evidence, adapted, evidence, scratch
+from estimation.estimators.adaptation import (
+    Adaptable,
+    Evidence,
+    adapted,
+    evidence,
+    reduced,
+    scratch,
+    spread_out,
+)
 from estimation.estimators.bank import BankEstimator
+from estimation.estimators.instrument import instrument_of, only_one
 from estimation.scores import Score, score
 from rig.errors import UsageError
 from rig.output.provenance import Provenance
@@ -67,6 +76,32 @@ def open_source(estimator: Estimator) -> Adaptable:
     )
 
 
+def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]:
+    """Return the names of the runs to adapt with, by their conditions alone.
+
+    The rule is that of `estimation.estimators.adaptation.spread_out`; flagged runs are left out.
+
+    Args:
+        source: The estimator to be adapted.
+        campaign: Runs of the new instrument.
+        count: How many.
+
+    Raises:
+        UsageError: It is a network, whose runs must be named, or too few runs are there.
+        NetworkError: The estimator has no interval.
+    """
+    if not isinstance(source, BankEstimator):
+        raise UsageError("Runs are chosen for state estimators only.", fix="Name them with --runs.")
+    whole = {run.name: evidence(source, run) for run in campaign.evidence}
+    usable = {name: run for name, run in whole.items() if run is not None and run.flagged == 0}
+    if len(usable) <= count:
+        raise UsageError(
+            f"{len(usable)} usable runs are there, too few to choose {count} and report on others."
+        )
+    names = list(usable)
+    return [names[k] for k in spread_out(source, reduced(source, list(usable.values())), count)]
+
+
 def run_adaptation(
     source: Adaptable,
     name: Path,
@@ -108,6 +143,8 @@ def run_adaptation(
             f"Usable are: {', '.join(found) or 'none'}.",
         )
     new = adapted(source, [found[run] for run in chosen])
+    instruments = {instrument_of(run) for run in campaign.select(chosen).evidence}
+    new = replace(new, instrument=only_one(instruments))
     scores = [_score(estimator, [found[run] for run in unused]) for estimator in (source, new)]
     result = Adaptation(
         schema="rig.study.adapt/1",

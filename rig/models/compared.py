@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wilcoxon
 
+from estimation.bank.interval import covered_share
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.estimator import Estimator
 from estimation.estimators.bank import BankEstimator
+from estimation.estimators.instrument import is_own
 from estimation.estimators.network import NetworkEstimator
 from estimation.estimators.origin import Origin, data_hash
 from estimation.filters import FilterError
@@ -50,7 +52,7 @@ class RunErrors:
         samples: Samples compared on.
         rmse: Root mean square errors.
         mean: Mean errors, estimate less truth.
-        covered: Share of the samples inside the interval of 95 %; None without one.
+        covered: Share of the samples inside the interval of 95 %, of those with one; None without.
         conditions: The run's conditions that are numbers.
     """
 
@@ -120,10 +122,9 @@ def compare(
             f"The estimators estimate different channels: {target} and {estimators[1].target}.",
             fix="Compare two of the same channel.",
         )
-    asked = [e.for_any_instrument() if isinstance(e, Stated) else e for e in estimators]
     found, left_out, squares, hashes = [], [], [], {}
     for recording in campaign.evidence:
-        errors = _on_run(asked, recording, target)
+        errors = _on_run(estimators, recording, target)
         if errors is None:
             left_out.append(recording.name)
         else:
@@ -163,13 +164,12 @@ def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) 
         return None
     truth = run[target][kept]
     rmse, mean, covered = [], [], []
-    for estimator in estimators:
-        share = None
+    for own in estimators:
+        estimator, share = _allowed(own, recording), None
         if isinstance(estimator, BankEstimator):
             whole = estimator.estimate(recording)
             error = whole.value[kept] - truth
-            if estimator.interval is not None:
-                share = float(np.mean(np.abs(error) <= whole.half_width[kept]))
+            share = covered_share(error, whole.half_width[kept])
         else:
             error = estimator.predict(recording)[kept] - truth
         rmse.append(float(np.sqrt(np.mean(error**2))))
@@ -184,6 +184,13 @@ def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) 
         (covered[0], covered[1]),
         conditions,
     )
+
+
+def _allowed(estimator: Estimator, recording: Recording) -> Estimator:
+    """Return the estimator, without interval where the recording is of another instrument."""
+    if not isinstance(estimator, Stated) or is_own(estimator.instrument, recording):
+        return estimator
+    return estimator.for_any_instrument()
 
 
 def _side(file: Path, estimator: Estimator, hashes: dict[str, str]) -> Side:

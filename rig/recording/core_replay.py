@@ -56,7 +56,7 @@ def replay_core(path: Path, config: Config | None = None) -> CoreReplay:
 
     Args:
         path: The log.
-        config: Configuration in place of the log's, which leaves hidden effects out.
+        config: Configuration in place of the log's, which states no hidden effects.
 
     Raises:
         DataError: The log has no commands, or no configuration.

@@ -161,8 +161,9 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
         "Error on the held-out test runs",
         [*columns, "after/before (95 %)", "noise floor"],
         rows,
-        "Root mean square over all valid samples, those at standstill too; each run's mean"
-        " removed, then with the means left in. Interval: bootstrap over runs.",
+        "Root mean square over the samples that the equation counts, those in motion where it"
+        " declares friction; each run's mean removed, then with the means left in."
+        " Interval: bootstrap over runs.",
     )
 
 

@@ -178,7 +178,7 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
         f"errors-{name}",
         title,
         judgement,
-        "Root mean square over all valid samples of a run, its mean removed.",
+        "Root mean square over a run's samples that the equation counts, its mean removed.",
         layout,
         lines,
         table=TextTable(f"{title}, {unit}", ["run", "before", "after"], rows),

@@ -11,7 +11,7 @@ from rig.output.table import TextTable
 NOTE = (
     "Error of ours over that of the paper's method on the same arm, median over its arms; below 1"
     " ours is better. The simulation's own form is the one whose size was set so that the paper's"
-    " method lands near the paper. Every other family has forms drawn anew for each joint (random"
+    " method lands near the paper. Every other family has forms drawn for each joint (random"
     " tables and banks of elements with memory), of the same size. Last: cells, arm by arm, in"
     " which ours has the smaller error."
 )

@@ -16,10 +16,15 @@ pytestmark = [
 SANITIZED = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-def built(folder: Path, flags: tuple[str, ...] = ("-O1",), firmware: Path = FIRMWARE) -> Path:
-    program = folder / "hunt"
+def built(
+    folder: Path,
+    flags: tuple[str, ...] = ("-O1",),
+    firmware: Path = FIRMWARE,
+    name: str = "hunt",
+) -> Path:
+    program = folder / name
     words = ["g++", "-std=c++17", "-ffp-contract=off", *flags, "-o", str(program)]
-    subprocess.run([*words, str(firmware / "proofs" / "hunt.cpp")], check=True)
+    subprocess.run([*words, str(firmware / "proofs" / f"{name}.cpp")], check=True)
     return program
 
 
@@ -117,4 +122,20 @@ def test_a_core_that_breaks_a_rule_is_found_with_few_events(
 def test_a_known_case_is_known_with_whatever_else_happens() -> None:
     assert is_known(["host pauses at 3 ms", "all encoders dead at 7 ms"])
     assert not is_known(["encoder frozen at 7 ms"])
+    assert not is_known(["encoder loses counts at 7 ms"])
+    assert is_known(["encoder loses counts at 7 ms", "encoder loses counts at 9 ms"])
     assert not is_known([])
+
+
+@pytest.mark.long
+def test_every_small_input_and_every_short_sequence_of_commands(
+    settings: Path, tmp_path: Path
+) -> None:
+    program = built(tmp_path, SANITIZED, name="small")
+    done = subprocess.run(
+        [str(program), str(settings), "3"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout[-500:] + done.stderr[-2000:]
+    cases = dict(line.rsplit(": ", 1) for line in done.stdout.splitlines())
+    assert all(int(count) > 1000 for count in cases.values())
+    assert int(cases["commands and events"]) == 2 * 15**3

@@ -7,7 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.diagnosis.paths import claim, path_of, period_samples, periods, split_paths
+from estimation.diagnosis.paths import (
+    claim,
+    path_of,
+    period_samples,
+    periods,
+    split_few,
+    split_paths,
+)
 from estimation.diagnosis.split import SplitError
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
@@ -73,3 +80,31 @@ def test_the_measured_paths_of_the_arm_repeat_themselves() -> None:
     for run in open_campaign(data):
         assert period_samples(run) / run.sample_rate_hz == pytest.approx(6.48, rel=0.01)
         assert len(periods(run)) == 5
+
+
+@pytest.mark.parametrize("number", [1, 3, 4, 6])
+def test_few_recordings_are_cut_into_parts_that_stand_for_runs(number: int) -> None:
+    few = [path(f"run {k}", seed=k, seconds=25.0) for k in range(number)]
+    pieces, sealed = split_few(few)
+    assert sum(map(len, pieces)) == sum(map(len, few))
+    assert {path_of(piece.name) for piece in pieces} == {r.name for r in few}
+    assert len(sealed.discover) >= 6
+    assert sealed.confirm
+    said = claim(sealed)
+    assert said is not None
+    assert f"{number} recording" in said
+
+
+def test_enough_or_too_short_recordings_stay_whole() -> None:
+    for recordings in (
+        [path(f"run {k}", seed=k) for k in range(8)],
+        [path(f"run {k}", seed=k, seconds=6.0) for k in range(3)],
+    ):
+        runs, sealed = split_few(recordings)
+        assert [r.name for r in runs] == [r.name for r in recordings]
+        assert claim(sealed) is None
+
+
+def test_a_recording_too_short_to_cut_is_refused() -> None:
+    with pytest.raises(SplitError, match="too few"):
+        split_few([path("one", seconds=9.0)])

@@ -6,13 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimation.campaign import Campaign
 from estimation.estimator import load
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.network import NetworkEstimator
 from estimation.networks.network import Network
 from estimation.recording import Instrument, Recording
 from rig.cli.main import main
+from rig.errors import UsageError
+from rig.importers.registry import open_campaign
 from rig.log.convert import write_recording
+from rig.models.adapt import runs_by_rule
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.integration
@@ -68,7 +72,36 @@ def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states
     assert result["scratch"]["rmse"] < result["as_it_is"]["rmse"]
     by_run = np.array(list(result["rmse_by_run"].values()))
     assert by_run.min() <= result["adapted"]["rmse"] <= by_run.max()
-    assert isinstance(load(new), BankEstimator)
+    kept = load(new)
+    assert isinstance(kept, BankEstimator)
+    assert kept.instrument == "Maryland 2"
+
+
+def test_runs_to_adapt_with_are_chosen_by_their_conditions_alone(folders, states, tmp_path):
+    estimator, campaign = load(states), open_campaign(folders[1])
+    chosen = runs_by_rule(estimator, campaign, 3)
+    assert len(set(chosen)) == 3
+    assert chosen[:1] == runs_by_rule(estimator, campaign, 1)
+    other_truth = Campaign.of([run.with_columns(**{TARGET: -run[TARGET]}) for run in campaign])
+    assert runs_by_rule(estimator, other_truth, 3) == chosen
+    found = tmp_path / "a.json"
+    words = ["adapt", str(states), str(folders[1]), "--choose", "3", "--no-scratch"]
+    assert main([*words, "--json-out", str(found)]) == 0
+    assert set(json.loads(found.read_text())["used"]) == set(chosen)
+    with pytest.raises(UsageError, match="too few to choose 9"):
+        runs_by_rule(estimator, campaign, 9)
+
+
+def test_a_fit_and_an_adaptation_refuse_to_write_over_a_file(folders, states, capsys):
+    before = states.read_bytes()
+    for words in (
+        ["fit", str(folders[0]), "--model", "states"],
+        ["fit", str(folders[0]), "--model", "linear"],
+        ["adapt", str(states), str(folders[1]), "--runs", "01"],
+    ):
+        assert main([*words, "--out", str(states)]) == 2
+        assert "is there already" in capsys.readouterr().err
+    assert states.read_bytes() == before
 
 
 def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path, capsys):

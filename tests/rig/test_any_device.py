@@ -16,6 +16,8 @@ from drivers.errors import DisarmUnconfirmedError, DriverError
 from drivers.moteus.driver import Moteus
 from drivers.moteus.fake import MoteusFake
 from drivers.registry import fakes
+from drivers.teensy.driver import TeensyLogger
+from drivers.teensy.protocol import Trip
 from drivers.transport.faulty import Faults
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.logger import open_logger
@@ -25,6 +27,8 @@ from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError, UsageError
 from rig.log.reader import read_log
 from rig.log.streams import SAMPLE
+from rig.logic.latch import TripLatch
+from rig.logic.link import LogicLink
 
 pytestmark = pytest.mark.integration
 
@@ -236,3 +240,43 @@ def test_the_drives_of_the_registry_are_drives() -> None:
         device = fakes()[name](Faults())
         assert isinstance(device, Drive)
         device.close()
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_a_trip_stays_over_processes_until_it_is_cleared_by_its_name(
+    name: str, tmp_path: Path
+) -> None:
+    rig = Rig(name, safety={"continuous_current_a": 0.001, "heat_a2_s": 1e-6})
+    latch = TripLatch("/dev/serial/by-id/some", tmp_path)
+
+    def link() -> LogicLink:
+        device = DRIVES[name][1](SimulatedTransport(rig.fake))  # type: ignore[arg-type]
+        rate_hz = device.channels[0].rate_hz
+        return LogicLink(device, "some", rate_hz=rate_hz, latch=latch)
+
+    hot = pytest.raises(SafetyTripError, match="too high for too long")
+    with hot, Session(rig.config, link()) as session:
+        next(session.rest(0.1))
+        list(moving(session, 1.0, 0.5))
+    assert latch.code == Trip.OVERHEATED
+    again = pytest.raises(SafetyTripError, match="tripped before")
+    with again, Session(rig.config, link()) as session:
+        next(session.rest(0.1))
+        next(moving(session))
+    assert not rig.in_force
+    with TeensyLogger(link()) as logger:
+        with pytest.raises(DriverError):
+            logger.clear(int(Trip.STALLED))
+        assert latch.code == Trip.OVERHEATED
+        logger.clear(int(Trip.OVERHEATED))
+    assert latch.code == 0
+
+
+def test_a_latch_that_cannot_be_read_is_a_trip(tmp_path: Path) -> None:
+    latch = TripLatch("a", tmp_path)
+    latch.keep(9)
+    (file,) = tmp_path.iterdir()
+    assert TripLatch("a", tmp_path).code == 9
+    assert TripLatch("b", tmp_path).code == 0
+    file.write_text("{")
+    assert latch.code != 0

@@ -117,6 +117,11 @@ def test_recordings_that_exist_verify_an_encoder(tmp_path, capsys):
     out = json.loads(capsys.readouterr().out)
     assert out["wrong"] == []
     assert [one["encoder"] for one in out["agreements"]] == ["spindle"]
+    tared = {"proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"}
+    assert {one["channel"] for one in out["zeros"]} == tared
+    for one in out["zeros"]:
+        assert one["runs"] == 12
+        assert 0 < one["within_run"] <= one["limit"]
     (tmp_path / "off").mkdir()
     for handle in open_campaign(folder).runs:
         run = handle.recording()
@@ -289,3 +294,16 @@ def test_hysteresis_is_identified_in_the_residual_of_a_curve(
     found = json.loads(capsys.readouterr().out)["findings"]
     possible = {name for f in found for name in (f["family"], *f["alternatives"])}
     assert ("hysteresis.presliding" in possible) == bool(hysteresis)
+
+
+def test_a_zero_that_moves_within_a_run_is_an_alarm(tmp_path, capsys):
+    assert main(["config", "show", "--sim"]) == 0
+    tight = tmp_path / "tight.toml"
+    text = capsys.readouterr().out
+    tight.write_text(re.sub(r"(\[drift\][^[]*motor_current_a = )\S+", r"\g<1>1e-6", text))
+    folder = tmp_path / "logs"
+    assert main(["record", "-c", str(tight), "--protocol", "quick", "-o", str(folder)]) == 1
+    assert main(["calibrate", "check", str(folder)]) == 1
+    said = capsys.readouterr().out
+    assert "ALARM: zero of motor_current_a" in said
+    assert "good: zero of distal_torque_n_m" in said

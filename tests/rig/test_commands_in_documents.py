@@ -14,7 +14,8 @@ import typer
 from rig.cli.main import app, main
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES += sorted((ROOT / "docs/results").glob("*.md"))
 PAGES += [*sorted((ROOT / "drivers").glob("*/README.md")), ROOT / "firmware/README.md"]
 
 SPAN = re.compile(r"`([^`\n]+)`")

@@ -92,7 +92,7 @@ def test_intervals_cover_frequencies_and_loads_left_out(reference):
             for conditions, run in evidence:
                 if conditions[condition] == level:
                     error = np.abs(run.design @ fitted.weights - run.truth)
-                    inside.append(error <= fitted.interval.half_width(run.design))
+                    inside.append(error <= fitted.interval.half_width(run.design, run.places))
         assert 0.93 <= np.concatenate(inside).mean() <= 0.98
 
 

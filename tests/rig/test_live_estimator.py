@@ -10,7 +10,7 @@ from estimation.estimators.bank import BankRecipe
 from estimation.fitting import fit
 from estimation.model import predict
 from estimation.recording import MissingChannelError, Recording
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import HalfWidths, ModelEstimator
 from rig.live.model_status import with_model_status
 from rig.live.replay import replay_blocks
 from tests.estimation.synthetic import campaign
@@ -64,9 +64,17 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     estimator = ModelEstimator(path, runs[0].sample_rate_hz)
     assert estimator.model is None
     assert estimator.target_channel == SPINDLE
-    blocks = list(replay_blocks(runs[0], [estimator], speed=None))
-    live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
-    np.testing.assert_allclose(live, fitted.predict(runs[0], causal=True), atol=1e-9)
+    shown, live, widths = HalfWidths([estimator]), [], []
+    for block in replay_blocks(runs[0], [estimator], speed=None):
+        live.append(block.estimates[SPINDLE])
+        widths.append((sum(map(len, live)) - 1, shown.get(SPINDLE, np.nan)))
+    offline = fitted.estimate(runs[0], causal=True)
+    np.testing.assert_allclose(np.concatenate(live), offline.value, atol=1e-9)
+    # the display shows the newest sample's own interval, and none while the jaw opens
+    newest, half_widths = np.array(widths).T
+    np.testing.assert_allclose(half_widths, offline.half_width[newest.astype(int)], rtol=1e-6)
+    assert 0 < np.isnan(half_widths).mean() < 1
+    assert len(set(half_widths[np.isfinite(half_widths)])) > 1
 
 
 def test_a_state_estimator_outside_what_it_was_fitted_on_is_suspect(tmp_path):

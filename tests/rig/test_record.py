@@ -6,7 +6,6 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from drivers.teensy.core import firmware_library
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
 from rig.cli.main import main
@@ -110,15 +109,6 @@ def test_one_seed_gives_one_campaign(folder, tmp_path):
         first = read_log(log).topics[COUNTS].rows
         second = read_log(tmp_path / "again" / log.name).topics[COUNTS].rows
         np.testing.assert_array_equal(first, second)
-
-
-@pytest.mark.skipif(firmware_library() is None, reason="the firmware library is not built")
-def test_the_firmware_and_the_fake_record_the_same_counts(folder, tmp_path):
-    record(tmp_path / "firmware", simulated(firmware=True))
-    for log in sorted(folder.glob("*.mcap")):
-        fake = read_log(log).topics[COUNTS].rows
-        firmware = read_log(tmp_path / "firmware" / log.name).topics[COUNTS].rows
-        np.testing.assert_array_equal(fake, firmware)
 
 
 def test_an_aborted_campaign_resumes_and_loses_nothing(tmp_path):

@@ -123,27 +123,6 @@ def test_a_short_run_leaves_the_committed_table_alone(
     assert not (tmp_path / "state").exists()
 
 
-def test_a_full_run_writes_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pages = measured(["kills"], tmp_path, monkeypatch)
-    assert "200 recorders killed" in str(pages["table"])
-    assert pages["short_table"] is None
-
-
-def test_a_fuzz_run_that_is_not_done_keeps_the_rows_of_the_table(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(fuzz, "STATE", tmp_path / "fuzz.json")
-    tallies = fuzz.load(fuzz.STATE)
-    tallies[TARGETS[0].name].inputs = 3000
-    fuzz.save(fuzz.STATE, tallies)
-    earlier = page.TABLE.read_text()
-    rows = [line for line in earlier.splitlines() if line.startswith("| ")]
-    assert [line for line in page.written({}, earlier).splitlines() if line in rows] == rows
-    tallies[TARGETS[0].name].failures.append((1, "00", "x"))
-    fuzz.save(fuzz.STATE, tallies)
-    assert "3000 inputs" in page.written({}, earlier)
-
-
 @pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="needs /proc (Linux)")
 def test_listening_sockets_are_distinguished_from_others() -> None:
     before = listening.listening(os.getpid())

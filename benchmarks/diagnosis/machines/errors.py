@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.diagnosis.case import Report
+from estimation.diagnosis.paths import path_of
 from estimation.recording import Recording
 
 
@@ -28,7 +29,8 @@ def errors(
     runs: Sequence[Recording], target: str, report: Report, equation: str = "motor"
 ) -> Errors:
     """Return the errors an answer states, relative to the target; not a number where none is."""
-    test = [run[target] for run in runs if run.name in report["runs"]["confirm"]]
+    names = {path_of(name) for name in report["runs"]["confirm"]}  # of parts, the whole recordings
+    test = [run[target] for run in runs if run.name in names]
     size = math.sqrt(float(np.mean(np.concatenate(test) ** 2)))
     stated = [report[f"rmse_with_means_{when}"].get(equation) for when in ("before", "after")]
     return Errors(*(math.nan if error is None else error / size for error in stated))

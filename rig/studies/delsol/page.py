@@ -55,7 +55,7 @@ ADJUSTED = TextTable(
         ["noise of the pressures as torque, N m", "not recorded", "0.8, 5, 2, 3.3, 1.1"],
         ["sliding force, N", "not recorded", "30"],
     ],
-    "So a landing within 25 % is no evidence for the simulation.",
+    "So a landing within 25 % does not confirm the simulation.",
 )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimation.bank.interval import covered_share
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.estimator import Recipe
@@ -176,6 +177,7 @@ def _drawn_row(
         error = design @ new.weights - truth
         errors.append(float(np.sqrt(np.mean(error**2))))
         if new.interval is not None:
-            shares.append(float(np.mean(np.abs(error) <= new.interval.half_width(design))))
+            places = np.concatenate([run.places for run in rest])
+            shares.append(covered_share(error, new.interval.half_width(design, places)) or 0.0)
     covered = float(np.mean(shares)) if shares else None
     return DrawnRow(instrument, len(choices[0]), tuple(sorted(errors)), covered)

@@ -59,7 +59,7 @@ ADJUSTED = TextTable(
         ["largest torsion passed on, N m", "no limit", "0.055"],
         ["largest forces and torsion in contact", "not recorded", f"{PUSHED}, {TWISTED}"],
     ],
-    "Found in several rounds; so a landing within 25 % is no evidence for the simulation.",
+    "Found in several rounds; so a landing within 25 % does not confirm the simulation.",
 )
 
 

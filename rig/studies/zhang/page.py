@@ -57,7 +57,7 @@ ADJUSTED = TextTable(
         ["pull of the gripper's cables on joint 4", "0.006", "0.004"],
         ["noise, other pulls, rub, vibration, coupling error", "not recorded", "decision 55"],
     ],
-    "So a landing within 25 % is no evidence for the simulation.",
+    "So a landing within 25 % does not confirm the simulation.",
 )
 
 

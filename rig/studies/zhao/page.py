@@ -39,7 +39,7 @@ ADJUSTED = TextTable(
         ["zero of the yaw's current, mA", "0", "-1.08"],
     ],
     "The first values are those of an axis as declared. Nothing was measured, so a landing within"
-    " 25 % is no evidence for the simulation.",
+    " 25 % does not confirm the simulation.",
 )
 
 

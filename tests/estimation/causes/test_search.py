@@ -50,6 +50,24 @@ def test_an_asymmetric_loss_is_identified_and_lowers_the_error_on_test_runs() ->
     assert answer.errors["motor"].after < answer.errors["motor"].before
 
 
+def test_a_run_with_too_few_samples_is_left_out_with_a_note() -> None:
+    runs = recordings(_asymmetric)
+    runs[3] = runs[3].slice_time(0.0, 0.3)
+    answer = diagnose(runs, [motor()], split(runs))
+    assert [f.family for f in answer.findings] == ["friction.viscous_asymmetry"]
+    assert any("Left out" in note and "'03'" in note for note in answer.notes)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_counts_of_a_coarse_encoder_are_no_cause(seed: int) -> None:
+    count_rad = 0.02
+    coarse = [
+        run.with_columns(motor_angle_rad=np.round(run["motor_angle_rad"] / count_rad) * count_rad)
+        for run in recordings(seed=seed)
+    ]
+    assert diagnose(coarse, [motor()], split(coarse)).verdict == "nothing_missing"
+
+
 def test_nothing_is_found_where_nothing_is_missing() -> None:
     runs = recordings()
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"

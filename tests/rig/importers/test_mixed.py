@@ -95,3 +95,31 @@ def test_a_folder_without_recordings_is_described(tmp_path, capsys):
     (tmp_path / "bench.png").write_bytes(b"\x89PNG")
     assert main(["fit", str(tmp_path)]) == 5
     assert "1 .png" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_an_exported_campaign_is_read_back(tmp_path, capsys, ending):
+    pytest.importorskip("pyarrow")
+    folder, table = tmp_path / "runs", tmp_path / f"all.{ending}"
+    folder.mkdir()
+    flags = np.zeros(2000, np.uint8)
+    flags[7] = 1
+    made = [run("a", conditions={"load_command_a": 0.2}, notes="oiled"), run("b", flags=flags)]
+    for recording in made:
+        write_recording(folder / f"{recording.name}.mcap", recording)
+    export = ["log", "export", str(folder), "--format", ending, "--out", str(table)]
+    assert main(export) == 0
+    for before, after in zip(made, open_campaign(table), strict=True):
+        assert after.name == before.name
+        assert after.instrument == before.instrument
+        assert dict(after.conditions) == dict(before.conditions)
+        assert after.notes == before.notes
+        np.testing.assert_array_equal(after.flags, before.flags)
+        for name, values in before.columns.items():
+            np.testing.assert_allclose(after[name], values, rtol=1e-12, atol=1e-15)
+    capsys.readouterr()
+    assert main(["log", "info", str(table)]) == 0
+    said = capsys.readouterr().out
+    assert "2 runs. Channels: motor_current_a" in said
+    assert "a  1.999 s, 1000 Hz  load_command_a = 0.2" in said
+    assert "flagged samples: 1" in said

@@ -1,0 +1,248 @@
+"""Damage the firmware's core on purpose and see which tests notice.
+
+    python -m benchmarks.core_mutants [--count N] [--list]
+
+Each mutant is one change of one line of `firmware/core`: a comparison, a logical operator, a sign,
+a constant, a result, or a statement left out. `--count` of them are drawn over all files by a fixed
+seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`) and against
+random sequences (`proofs/hunt.cpp`); one that passes both against every small input
+(`proofs/small.cpp`), and one that passes that too against the contract tests in Python. A mutant
+that does not compile is no mutant. What was found is kept in `build/core_mutants.json` for this
+core; the command goes on where it stopped, and writes `docs/results/core-mutants.md`.
+"""
+
+import argparse
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.hunt import FIRMWARE, write_settings
+from estimation.files import write_text_atomic
+from rig.bench.firmware import source_hash
+from rig.output.provenance import Provenance
+
+ROOT = FIRMWARE.parent
+STATE = Path("build/core_mutants.json")
+PAGE = Path("docs/results/core-mutants.md")
+SEED = 0
+LONGEST_S = 120.0
+CONTRACTS = ("test_guards.py", "test_sessions.py", "test_teensy_reference.py")
+RULES = (
+    ("<=", "<"),
+    (">=", ">"),
+    ("==", "!="),
+    ("!=", "=="),
+    ("&&", "||"),
+    ("||", "&&"),
+    ("<", "<="),
+    (">", ">="),
+    ("+", "-"),
+    ("-", "+"),
+    ("true", "false"),
+    ("false", "true"),
+    ("0", "1"),
+)
+_STATEMENT = re.compile(r"\s+[\w.\[\]>()*-]+(\s*[-+*|&]?=\s|\(|\+\+|--).*;(\s*//.*)?")
+_NO_CODE = re.compile(r"\s*(//|#|\"|static_assert|using|template|constexpr char|namespace|\}|$)")
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One change of one file of the core.
+
+    Attributes:
+        file: Name of the file.
+        line: Its line, from 1.
+        before: The line.
+        after: The line in its place.
+    """
+
+    file: str
+    line: int
+    before: str
+    after: str
+
+    @property
+    def name(self) -> str:
+        """The change in one line."""
+        return (
+            f"{self.file}:{self.line}: {self.before.strip()} -> {self.after.strip() or 'nothing'}"
+        )
+
+
+def mutants_of(file: Path) -> Iterator[Mutant]:
+    """Yield every change of a file that the rules know."""
+    for number, line in enumerate(file.read_text().splitlines(), 1):
+        code = line.split("//")[0]
+        if _NO_CODE.match(line):
+            continue
+        for old, new in RULES:
+            pattern = rf"(?<=\s){re.escape(old)}(?=\s)"
+            if old.isalnum():
+                pattern = rf"(?<![\w.'-]){old}(?![\w.'])"
+            for match in re.finditer(pattern, code):
+                after = f"{code[: match.start()]}{new}{code[match.end() :]}"
+                yield Mutant(file.name, number, line, after)
+        if _STATEMENT.fullmatch(line) and "return" not in code:
+            yield Mutant(file.name, number, line, "")
+
+
+def drawn(count: int) -> list[Mutant]:
+    """Return that many mutants, of every file in turn, in an order that a longer draw keeps."""
+    order = random.Random(SEED)
+    files = []
+    for file in sorted((FIRMWARE / "core").glob("*.hpp")):
+        if file.name in ("contract.hpp", "can_segments.hpp", "profile_grasper.hpp"):
+            continue  # generated; not of this board
+        found = list(mutants_of(file))
+        order.shuffle(found)
+        # a file has as many mutants as it has places for them, in shares of the whole
+        files += [((k + 0.5) / len(found), one) for k, one in enumerate(found)]
+    files.sort(key=lambda pair: (pair[0], pair[1].name))
+    return [one for _, one in files[:count]]
+
+
+def killers_of(mutant: Mutant, settings: Path) -> dict[str, bool] | None:
+    """Return which tests notice a mutant, None where it does not compile."""
+    with tempfile.TemporaryDirectory() as name:
+        firmware = Path(name) / "firmware"
+        for part in ("core", "boards", "host", "proofs", "tests"):
+            shutil.copytree(FIRMWARE / part, firmware / part)
+        source = firmware / "core" / mutant.file
+        lines = source.read_text().splitlines()
+        lines[mutant.line - 1] = mutant.after
+        source.write_text("\n".join(lines) + "\n")
+        hunt = _built(firmware, "proofs/hunt.cpp", "-O0")
+        if hunt is None:
+            return None
+        known = {"hunt": not all(_passes(hunt, settings, *w) for w in _HUNTS)}
+        unit = _built(firmware, "tests/core_test.cpp", *_UNIT)
+        known["unit"] = unit is None or not _passes(unit)
+        if any(known.values()):
+            return known
+        small = _built(firmware, "proofs/small.cpp", "-O1")
+        known["small"] = small is None or not _passes(small, settings, "3")
+        if not known["small"]:
+            known["contract"] = not _contracts_pass(firmware)
+        return known
+
+
+_HUNTS = (("commands", "0", "400", "1"), ("faults", "100", "40", "1"))
+_UNIT = ("-O0", "-Itests/arduino", "-DARDUINO_TEENSY41")
+
+
+def _built(firmware: Path, source: str, *flags: str) -> Path | None:
+    program = firmware / "program"
+    program.unlink(missing_ok=True)
+    words = ["g++", "-std=c++17", "-w", "-ffp-contract=off", *flags, "-o", str(program), source]
+    done = subprocess.run(words, cwd=firmware, capture_output=True, check=False)  # noqa: S603
+    return program if done.returncode == 0 else None
+
+
+def _passes(program: Path, *words: object) -> bool:
+    """Whether a program ends well; one that does not end is noticed."""
+    try:
+        done = subprocess.run(  # noqa: S603
+            [str(program), *map(str, words)], capture_output=True, check=False, timeout=LONGEST_S
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def _contracts_pass(firmware: Path) -> bool:
+    """Run the contract tests in Python with the library of a changed core."""
+    library = _built(firmware, "host/rig_board.cpp", "-O2", "-fPIC", "-shared")
+    if library is None:
+        return False
+    tests = [str(ROOT / "tests" / "drivers" / test) for test in CONTRACTS]
+    words = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", *tests]
+    own = {"RIG_FIRMWARE_LIBRARY": str(library)}
+    try:
+        done = subprocess.run(  # noqa: S603
+            words, cwd=ROOT, capture_output=True, check=False, env=os.environ | own,
+            timeout=LONGEST_S,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
+    """Return the page of which tests noticed which mutants."""
+    tried = {name: found for name, found in results.items() if found is not None}
+    killed = {name: [test for test, hit in found.items() if hit] for name, found in tried.items()}
+    count = Counter(test for tests in killed.values() for test in tests)
+    alone = Counter(tests[0] for tests in killed.values() if len(tests) == 1)
+    lived = [name for name, tests in killed.items() if not tests]
+    total = max(1, len(tried))
+    asked = Counter(test for found in tried.values() for test in found)
+    lines = [
+        "# Mutants of the core",
+        "",
+        "Written by `make mutants-core`, which goes on where it stopped. Each mutant is one change",
+        "of one line of `firmware/core`, drawn by a fixed seed. Unit tests and random sequences",
+        "see every mutant, every small input those that passed both, the contract tests the rest.",
+        "",
+        f"{len(tried)} mutants, {len(tried) - len(lived)} noticed"
+        f" ({(len(tried) - len(lived)) / total:.0%}); {len(results) - len(tried)} did not compile.",
+        "",
+        "| tests | mutants seen | noticed | share of those seen | noticed by nothing before |",
+        "|---|---:|---:|---:|---:|",
+    ]
+    names = {
+        "unit": "unit tests in C++",
+        "hunt": "random sequences",
+        "small": "every small input",
+        "contract": "contract tests in Python",
+    }
+    for test, title in names.items():
+        share = count[test] / asked[test] if asked[test] else 0.0
+        lines.append(f"| {title} | {asked[test]} | {count[test]} | {share:.0%} | {alone[test]} |")
+    lines += ["", "Noticed by no test:", ""]
+    lines += [f"- `{name}`" for name in sorted(lived)] or ["- none"]
+    now = Provenance.now(SEED)
+    lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, seed {SEED}."]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Try the mutants that have not been tried on this core."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.core_mutants", description=__doc__)
+    parser.add_argument("--count", type=int, default=200, help="mutants drawn")
+    parser.add_argument("--list", action="store_true", help="name them and try none")
+    options = parser.parse_args()
+    mutants = drawn(options.count)
+    if options.list:
+        sys.stdout.write("".join(f"{mutant.name}\n" for mutant in mutants))
+        return 0
+    core = f"{source_hash() or 0:08x}"
+    state = json.loads(STATE.read_text()) if STATE.is_file() else {}
+    results = state.get("results", {}) if state.get("core") == core else {}
+    STATE.parent.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        settings = Path(folder) / "settings.bin"
+        write_settings(settings)
+        for mutant in mutants:
+            if mutant.name in results:
+                continue
+            results[mutant.name] = killers_of(mutant, settings)
+            write_text_atomic(STATE, json.dumps({"core": core, "results": results}) + "\n")
+            found = results[mutant.name]
+            said = "does not compile" if found is None else ", ".join(k for k in found if found[k])
+            sys.stderr.write(f"{mutant.name}: {said or 'NOT NOTICED'}\n")
+            write_text_atomic(PAGE, page(results, core))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""Candidates next to a regression's base: fitted together with it, and judged on what was left out.
+
+Candidates of one place with as many columns each share every step, so a search over thousands of
+them costs a few large products.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.causes.folds import Folds
+from estimation.causes.joint import Joint, Next, Part
+from estimation.causes.laid import Laid
+from estimation.recording import FloatArray
+
+MOST_CHANGE = 2.0
+"""Factor by which the largest linear term of an equation may change next to a cause."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cross-products of causes with a regression's base, run by run.
+
+    Attributes:
+        laid: The causes.
+        base: Part to the base's columns times the causes', shape (runs, causes, base, k).
+        own: Part to the causes' columns times themselves, shape (runs, causes, k, k).
+        target: Part to the causes' columns times the target, shape (runs, causes, k).
+        taken: How much of each declared column was taken off them, (causes, declared, k).
+    """
+
+    laid: Laid
+    base: Mapping[Part, FloatArray]
+    own: Mapping[Part, FloatArray]
+    target: Mapping[Part, FloatArray]
+    taken: FloatArray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Causes of one block, fitted and left out.
+
+    Attributes:
+        errors: For each family of folds, part to squared error, shape (runs, causes).
+        amplitudes: On all runs, shape (causes, k).
+        replaces: Whether a cause stands in for the largest linear term of an equation: a reading of
+            the target through another sensor explains any equation, with no use for the declared
+            terms, but a cause comes in addition to them. Shape (causes,).
+        cross: Products of the columns with the base's residual within runs, weighted, shape
+            (runs, causes, k).
+        own: Products of the columns with themselves, shape (runs, causes, k, k).
+    """
+
+    errors: Sequence[Mapping[Part, FloatArray]]
+    amplitudes: FloatArray
+    replaces: NDArray[np.bool_]
+    cross: FloatArray
+    own: FloatArray
+
+
+def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
+    """Return the cross-products of causes with a regression.
+
+    Args:
+        joint: The regression.
+        laid: The causes.
+        known: Their products with a regression of which this one is an extension.
+    """
+    base, own, target = {}, {}, {}
+    runs, k = len(joint.runs), laid.size.shape[1]
+    for p in joint.parts:
+        name, kind = p
+        if name not in laid.inner:
+            continue
+        columns = laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
+        table, places = joint.tables[p], [*joint.at[p]]
+        base[p] = np.zeros((runs, len(laid), joint.size, k))
+        if known is None:
+            product = table.transpose(0, 2, 1)[:, None] @ columns
+            base[p][:, :, places] = product[:, :, :-1]
+            target[p], own[p] = product[:, :, -1], columns.transpose(0, 1, 3, 2) @ columns
+            continue
+        before = known.base[p].shape[2]
+        base[p][:, :, :before] = known.base[p]
+        new = [i for i, place in enumerate(places) if place >= before]
+        if new:
+            added = table[:, :, new].transpose(0, 2, 1)[:, None] @ columns
+            base[p][:, :, [places[i] for i in new]] = added
+        target[p], own[p] = known.target[p], known.own[p]
+    return Block(laid, base, own, target, joint.taken_off(laid) if known is None else known.taken)
+
+
+def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) -> Outcome:
+    """Fit every cause together with the base and return its errors on what was left out.
+
+    Args:
+        joint: The regression.
+        block: The causes.
+        folds: Families of folds.
+        precision: Prior precision of every amplitude, shape (causes, k).
+    """
+    weights, zero = joint.weights, np.zeros(())
+    sums = [
+        np.asarray(sum((weights[p] * kind[p] for p in block.base), zero))
+        for kind in (block.base, block.own, block.target)
+    ]
+
+    def fitted(family: Sequence[Sequence[int]]) -> tuple[FloatArray, FloatArray]:
+        """Return the base and the amplitudes without each fold, (folds, causes, .) each."""
+        fits = joint.left_out(family)
+        cross, own, right = (x.sum(axis=0) - np.tensordot(fits.left, x, 1) for x in sums)
+        through = fits.inverse[:, None] @ cross
+        eye = np.eye(own.shape[-1])
+        spread = 1e-9 * np.einsum("fckk->fck", own) + precision
+        schur = own - cross.swapaxes(2, 3) @ through + spread[..., None] * eye
+        left = right - (fits.base[:, None, None] @ cross)[:, :, 0]
+        amplitudes = np.linalg.solve(schur, left[..., None])
+        return fits.base[:, None] - (through @ amplitudes)[..., 0], amplitudes[..., 0]
+
+    errors = []
+    for family in folds:
+        fits = joint.left_out(family)
+        base, amplitudes = (x[fits.fold] for x in fitted(family))
+        found = {}
+        for p in joint.parts:
+            found[p] = np.zeros((len(joint.runs), len(precision)))
+            found[p][fits.runs] = _squared(joint, block, p, fits.runs, base, amplitudes)
+        errors.append(found)
+    (base,), (amplitudes,) = fitted([[]])
+    inside, usual = [p for p in block.base if p[1] == "within"], joint.left_out([[]]).base[0]
+    cross, own, right = (
+        np.asarray(sum((weights[p] * kind[p] for p in inside), zero))
+        for kind in (block.base, block.own, block.target)
+    )
+    declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
+    entered = {name for name, _ in block.base}
+    changes = [
+        declared[:, at] / (joint.declared[at] or 1.0)
+        for name, at in joint.largest_linear().items()
+        if name in entered
+    ]
+    kept = [(change > 1.0 / MOST_CHANGE) & (change < MOST_CHANGE) for change in changes]
+    replaces = ~np.logical_and.reduce(kept) if kept else np.zeros(len(base), dtype=np.bool_)
+    residual = right - np.einsum("rcik,i->rck", cross, usual)
+    return Outcome(errors, amplitudes, replaces, residual, own)
+
+
+def _squared(
+    joint: Joint,
+    block: Block,
+    p: Part,
+    runs: NDArray[np.intp],
+    base: FloatArray,
+    amplitudes: FloatArray,
+) -> FloatArray:
+    """Return squared errors of runs, (n, causes), of parameters (n, causes, .)."""
+    gram = joint.gram[p][runs]
+    error = ((base @ gram[:, :-1, :-1]) * base).sum(axis=2) + gram[:, None, -1, -1]
+    error -= 2.0 * (base @ gram[:, :-1, -1:])[..., 0]
+    if p in block.base:
+        across = (base[:, :, None] @ block.base[p][runs])[:, :, 0]
+        own = (amplitudes[:, :, None] @ block.own[p][runs])[:, :, 0]
+        error += ((2.0 * (across - block.target[p][runs]) + own) * amplitudes).sum(axis=2)
+    next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
+    return np.asarray(np.maximum(error, 0.0) + joint.avoided(p, runs, base, next_to))

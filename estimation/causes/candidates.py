@@ -1,0 +1,260 @@
+"""The candidate causes of a search, laid out on the runs."""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.causes.blocks import Block, block_of
+from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.functions import Function, functions_at
+from estimation.causes.instruments import signal
+from estimation.causes.joint import Joint
+from estimation.causes.laid import Laid, Scale
+from estimation.causes.places import places_of
+from estimation.causes.sources import Source, sources_at
+from estimation.recording import FloatArray
+
+QUIET = 0.002
+"""Noise of a channel over its range below which no column follows it."""
+
+AT_ONCE = 40_000
+"""Causes times squared columns in one group: keeps its memory small."""
+
+NOTHING = 1e-12
+"""Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A cause and the runs in which it acts.
+
+    Attributes:
+        cause: The named effect or smooth function.
+        acts: Whether it acts in each run; in all when None.
+        choices: Forms that share the prior probability of a cause, times the points of its grid.
+    """
+
+    cause: Source | Function
+    acts: tuple[bool, ...] | None = None
+    choices: int = 1
+
+    @property
+    def name(self) -> tuple[str, str, tuple[str, ...]]:
+        """What is claimed: place, family, and the variables of a function."""
+        variables = self.cause.variables if isinstance(self.cause, Function) else ()
+        return self.cause.place.name, self.cause.family, variables
+
+    @property
+    def is_function(self) -> bool:
+        """Whether its form is unknown."""
+        return isinstance(self.cause, Function)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate(Claim):
+    """A claim laid out on the runs.
+
+    Attributes:
+        laid: Its columns of every run, without what the declared columns explain.
+        precision: Prior precision of every amplitude.
+    """
+
+    laid: Laid
+    precision: FloatArray
+
+    @property
+    def size(self) -> FloatArray:
+        """What its columns were divided by, shape (k,)."""
+        return np.asarray(self.laid.size[0])
+
+
+OfRuns = Sequence[Mapping[str, FloatArray]]
+"""Columns of every run: equation to (samples, k)."""
+
+Raw = tuple[Claim, OfRuns, OfRuns | None]
+"""A claim, its columns in every run, and those of the shaken runs where it follows noise."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Candidates of one place with as many columns each.
+
+    Attributes:
+        candidates: The candidates.
+        laid: Their columns.
+        precision: Prior precision of their amplitudes, shape (candidates, k).
+        block: Their products with the regression that they were laid out for.
+    """
+
+    candidates: Sequence[Candidate]
+    laid: Laid
+    precision: FloatArray
+    block: Block | None = None
+
+
+def candidates(joint: Joint) -> list[Group]:
+    """Return every candidate cause, laid out."""
+    train = joint.layout
+    causes: Iterable[Source | Function] = itertools.chain.from_iterable(
+        itertools.chain(sources_at(train, place), functions_at(train, place))
+        for place in places_of(train)
+    )
+    pool = groups_of(joint, map(Claim, causes))
+    for run in (*train.runs, *train.shaken):
+        run.memo.clear()  # columns of the whole run, many times as large as those on the grid
+    count = Counter(_form(c) for group in pool for c in group.candidates)
+    return [
+        replace(
+            group,
+            candidates=[replace(c, choices=count[_form(c)] * len(count)) for c in group.candidates],
+            block=block_of(joint, group.laid),
+        )
+        for group in pool
+    ]
+
+
+def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
+    """Return causes laid out; those that show nowhere are left out.
+
+    Args:
+        joint: The regression without causes, or with some.
+        wanted: The causes, those of one place after one another.
+    """
+    out: list[Group] = []
+    for _, at_one in itertools.groupby(wanted, lambda one: one.cause.place.name):
+        waiting: dict[object, list[Raw]] = {}
+        for one in at_one:
+            columns = _columns(one, joint.runs)
+            if columns is None:
+                continue
+            noisy = _is_noisy(joint.layout, one)
+            shaken = _columns(one, joint.layout.shaken) if noisy else None
+            width = next(iter(columns[0].values())).shape[1]
+            key = (width, _unit(one.cause), one.acts is None, shaken is None)
+            held = waiting.setdefault(key, [])
+            held.append((one, columns, shaken))
+            if len(held) * width**2 >= AT_ONCE:
+                out += _laid(joint, waiting.pop(key))
+        for held in waiting.values():
+            out += _laid(joint, held)
+    return out
+
+
+def laid_out(joint: Joint, claim: Claim) -> Candidate | None:
+    """Return a cause laid out on the runs of a regression; None where it shows nowhere."""
+    groups = groups_of(joint, [claim])
+    return groups[0].candidates[0] if groups else None
+
+
+def _columns(one: Claim, runs: Sequence[RunSignals]) -> list[Mapping[str, FloatArray]] | None:
+    """Return a cause's columns of every run; None where one is not finite."""
+    columns = []
+    for k, run in enumerate(runs):
+        own = one.cause.columns(run)
+        if own is None:
+            return None
+        if one.acts is not None and not one.acts[k]:
+            own = {name: np.zeros_like(values) for name, values in own.items()}
+        columns.append(own)
+    return columns
+
+
+def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
+    first = held[0][0]
+    columns = _stacked(joint, [raw[1] for raw in held])
+    shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
+    laid = joint.projection.laid(columns, shaken, _unit(first.cause))
+    if first.acts is not None:
+        # what starts between runs also shifts their means, by its own offset
+        laid = laid.without_means()
+    shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
+    if len(shown) < len(held):
+        laid = laid.only(shown)
+    if len(shown):
+        chosen = [held[int(c)][0] for c in shown]
+        precision = np.array(
+            [_precision(joint, c.cause, s) for c, s in zip(chosen, laid.size, strict=True)]
+        )
+        whole = [
+            Candidate(
+                one.cause,
+                one.acts,
+                one.choices,
+                laid=laid.only(slice(c, c + 1)),
+                precision=precision[c],
+            )
+            for c, one in enumerate(chosen)
+        ]
+        yield Group(whole, laid, precision)
+
+
+def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, FloatArray]:
+    """Return equation to the columns of causes, shape (runs, causes, samples, k)."""
+    out = {}
+    for name in columns[0][0] if columns else ():
+        most, k = int(joint.samples[name, "within"].max()), columns[0][0][name].shape[1]
+        out[name] = np.zeros((len(joint.runs), len(columns), most, k))
+        for c, runs in enumerate(columns):
+            for r, own in enumerate(runs):
+                out[name][r, c, : len(own[name])] = own[name]
+    return out
+
+
+def _is_noisy(layout: Layout, claim: Claim) -> bool:
+    """Whether what a cause reads, or its derivative in some equation, has noise that counts."""
+    if not layout.shaken:
+        return False
+    if any(entry.order for entry in claim.cause.place.enters):
+        return True
+    names = {
+        signal(layout.runs[0], channel, entry.equation)
+        for channel in claim.cause.reads
+        for entry in claim.cause.place.enters
+    }
+    return any(_noise_share(layout, name) > QUIET for name in names)
+
+
+def _noise_share(layout: Layout, channel: str) -> float:
+    """Return the noise of a channel over its range in all runs."""
+    known = layout.runs[0].memo
+    key = ("noise share", channel)
+    if key not in known:
+        values = [run.on_grid(channel) for run in layout.runs]
+        noise = [
+            float(np.mean((shaken.on_grid(channel) - own) ** 2))
+            for shaken, own in zip(layout.shaken, values, strict=True)
+        ]
+        span = max(x.max() for x in values) - min(x.min() for x in values)
+        known[key] = np.array(np.sqrt(np.mean(noise)) / (span or 1.0))
+    found = known[key]
+    return 0.0 if found is None else float(found)
+
+
+def _unit(cause: Source | Function) -> Scale:
+    if isinstance(cause, Function):
+        return "none"
+    return "first" if cause.bend else "each"
+
+
+def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> FloatArray:
+    """Return the prior precision of each amplitude.
+
+    A named effect, scaled to norm one, is not larger than half of all signals; a smooth function's
+    knots have a standard deviation of so many declared errors.
+    """
+    everything = np.full(len(size), 4.0 / joint.power)
+    if isinstance(cause, Function):
+        knot = [e.gain**2 / joint.error[e.equation, "within"] for e in cause.place.enters]
+        return np.asarray(everything + np.mean(knot) / joint.numbers.knot_sd**2)
+    if cause.bend is not None:
+        everything[1:] += 1.0 / (cause.bend.sd * size[1:]) ** 2
+    return everything
+
+
+def _form(candidate: Claim) -> tuple[str, str]:
+    """Return the key of one prior probability: a form of an effect, or all smooth functions."""
+    cause = candidate.cause
+    return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id

@@ -1,0 +1,178 @@
+"""Candidate causes laid out on the runs, without what the declared columns explain."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.causes.equations import Layout
+from estimation.recording import FloatArray
+
+Scale = Literal["each", "first", "none"]
+"""Of which columns the norm is one: of each, of the first, or of none."""
+
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Causes that enter the same equations, with as many columns each.
+
+    Attributes:
+        inner: Equation to the columns less each run's mean, shape (runs, causes, samples, k); zero
+            after a run's last sample.
+        means: Equation to the runs' means, shape (runs, causes, k).
+        taken: Equation to how much of each declared column was taken off, (causes, declared, k).
+        size: What the columns were divided by, shape (causes, k).
+        noise: Equation to the products of the noise that the columns follow with that of the
+            declared columns and, last, of the target: shape (runs, causes, declared + 1, k).
+        own_noise: Equation to the products of that noise with itself, (runs, causes, k, k).
+    """
+
+    inner: Mapping[str, FloatArray]
+    means: Mapping[str, FloatArray]
+    taken: Mapping[str, FloatArray]
+    size: FloatArray
+    noise: Mapping[str, FloatArray]
+    own_noise: Mapping[str, FloatArray]
+
+    def __len__(self) -> int:
+        return len(self.size)
+
+    def only(self, chosen: slice | NDArray[np.intp]) -> "Laid":
+        """Return some of the causes."""
+        return Laid(
+            {name: x[:, chosen] for name, x in self.inner.items()},
+            {name: x[:, chosen] for name, x in self.means.items()},
+            {name: x[chosen] for name, x in self.taken.items()},
+            self.size[chosen],
+            {name: x[:, chosen] for name, x in self.noise.items()},
+            {name: x[:, chosen] for name, x in self.own_noise.items()},
+        )
+
+    def without_means(self) -> "Laid":
+        """Return the same causes with no effect on the means of runs."""
+        return replace(self, means={n: np.zeros_like(x) for n, x in self.means.items()})
+
+
+class Stacks:
+    """The samples that each equation counts, of all runs in one array that zeros fill up.
+
+    Args:
+        layout: The runs.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.counts = {
+            name: np.array([len(run.used[name]) for run in layout.runs])
+            for name in layout.equations
+        }
+
+    def stacked(self, name: str, columns: Sequence[FloatArray]) -> FloatArray:
+        """Return an equation's columns of every run, (n, k) each, as (runs, samples, k)."""
+        counts = self.counts[name]
+        out = np.zeros((len(counts), counts.max(), columns[0].shape[1]))
+        for own, values in zip(out, columns, strict=True):
+            own[: len(values)] = values
+        return out
+
+    def centred(self, name: str, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return columns less each run's mean, in place, and the means.
+
+        Args:
+            name: Equation.
+            stacked: Shape (runs, ..., samples, k).
+        """
+        counts = self.counts[name]
+        means = stacked.sum(axis=-2) / counts.reshape(-1, *[1] * (stacked.ndim - 2))
+        for own, mean, count in zip(stacked, means, counts, strict=True):
+            own[..., :count, :] -= mean[..., None, :]
+        return stacked, means
+
+
+class Projection:
+    """What the declared columns explain, read from the sensors that the equation does not use.
+
+    A candidate does not profit from reading a quieter sensor.
+
+    Args:
+        samples: How samples are stacked.
+        declared: Equation to the declared columns of instrumented signals, of every run.
+        noise: Equation to the noise of the declared columns and of the target, of every run.
+        weights: Equation to the weights of one squared residual within runs and between them.
+    """
+
+    def __init__(
+        self,
+        samples: Stacks,
+        declared: Mapping[str, Sequence[FloatArray]],
+        noise: Mapping[str, FloatArray],
+        weights: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.samples, self.noise, self.weights = samples, noise, weights
+        self._inner, self._means, self._inverse = {}, {}, {}
+        for name, columns in declared.items():
+            stacked = samples.stacked(name, columns)
+            inner, means = samples.centred(name, stacked)
+            means = np.column_stack([means, np.ones(len(means))])
+            within, between = weights[name]
+            gram = between * means.T @ means
+            gram[:-1, :-1] += within * np.tensordot(inner, inner, ([0, 1], [0, 1]))
+            self._inner[name], self._means[name] = inner, means
+            self._inverse[name] = inverse(gram)
+
+    def laid(
+        self, columns: Mapping[str, FloatArray], shaken: Mapping[str, FloatArray], unit: Scale
+    ) -> Laid:
+        """Return causes without what the declared columns explain.
+
+        Args:
+            columns: Equation to the causes' columns, shape (runs, causes, samples, k), changed in
+                place.
+            shaken: The same with each reading's noise added a second time, changed in place.
+            unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
+        """
+        inners, middles, taken = {}, {}, {}
+        norm: FloatArray = np.zeros(())
+        for name, stacked in shaken.items():
+            stacked -= columns[name]
+            self.samples.centred(name, stacked)
+        for name, stacked in columns.items():
+            within, between = self.weights[name]
+            inner, means = self.samples.centred(name, stacked)
+            if unit != "none":
+                norm = norm + within * np.einsum("rcnk,rcnk->ck", inner, inner)
+                norm = norm + between * np.einsum("rck,rck->ck", means, means)
+            base, middle = self._inner[name], self._means[name]
+            right = between * np.einsum("ri,rck->cik", middle, means)
+            right[:, :-1] += within * (base.transpose(0, 2, 1)[:, None] @ inner).sum(axis=0)
+            slope = self._inverse[name] @ right
+            inner -= base[:, None] @ slope[None, :, :-1]
+            inners[name], taken[name] = inner, slope[:, :-1]
+            middles[name] = means - np.einsum("ri,cik->rck", middle, slope)
+        if unit == "none":
+            first = next(iter(columns.values()))
+            size = np.ones((first.shape[1], first.shape[3]))
+        else:
+            size = np.sqrt(norm) + TINY
+        if unit == "first":
+            size = np.repeat(size[:, :1], size.shape[1], axis=1)
+        if unit != "none":
+            for name, inner in inners.items():
+                inner /= size[:, None]
+                middles[name] /= size
+                taken[name] = taken[name] / size[:, None]
+        for noise in shaken.values():
+            noise /= size[:, None]
+        across = {n: self.noise[n].transpose(0, 2, 1)[:, None] @ x for n, x in shaken.items()}
+        own = {n: x.transpose(0, 1, 3, 2) @ x for n, x in shaken.items()}
+        return Laid(inners, middles, taken, size, across, own)
+
+
+def inverse(gram: FloatArray) -> FloatArray:
+    """Return the inverse of a normal matrix, or of several, whose columns differ in scale."""
+    scale = 1.0 / np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1) + TINY)
+    outer = scale[..., :, None] * scale[..., None, :]
+    return np.asarray(np.linalg.inv(gram * outer + 1e-8 * np.eye(gram.shape[-1])) * outer)

@@ -1,0 +1,203 @@
+"""How often the intervals of state estimators hold, where they were not fitted."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.bank.interval import covered_share
+from estimation.bank.states import Bank
+from estimation.campaign import Campaign
+from estimation.closing import is_closing, processed
+from estimation.estimators.adaptation import adapted_states, spread_out
+from estimation.estimators.bank import EVERY, BankEstimator, fit_runs, rows_of
+from estimation.estimators.run_evidence import RunEvidence
+from rig.importers.jaw_steps import JAW, with_one_zero
+from rig.output.provenance import Provenance
+from rig.studies.oneill.paper import DISTAL, PROXIMAL
+from rig.studies.oneill.state_rows import CONDITIONS
+
+TARGETS = (PROXIMAL, DISTAL, JAW)
+BANK = Bank("motor_current_a")
+FOLDS = 5
+COUNTS = (1, 3)
+"""Runs adapted with."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """The interval on runs that were not fitted, each run alike, in the target's SI unit.
+
+    Attributes:
+        instrument: Whose runs; of an adapted estimator `source -> other`.
+        target: Channel that is estimated.
+        left_out: `run`, `between` or `edge` of the levels of a condition, or the runs adapted with.
+        runs: Runs held out; a run counts for each condition whose level was left out.
+        rmse: Error of the estimates.
+        covered: Mean over runs of the share of samples inside their interval.
+        median: Median over runs of that share.
+        worst_run: Smallest share of a run.
+        worst_level: Smallest mean share of one fit.
+        half_width: Mean half width.
+        no_width: Share of the samples for which none is stated.
+        rmse_ratio: Adapted: the error over the median of every other choice of as many runs.
+    """
+
+    instrument: str
+    target: str
+    left_out: str
+    runs: int
+    rmse: float
+    covered: float
+    median: float
+    worst_run: float
+    worst_level: float
+    half_width: float
+    no_width: float
+    rmse_ratio: float = float("nan")
+
+
+@dataclass(frozen=True)
+class IntervalStudy:
+    """Results."""
+
+    schema: str
+    levels: tuple[Held, ...]
+    adapted: tuple[Held, ...]
+    provenance: Provenance
+
+
+def run_intervals(
+    campaigns: Mapping[str, Campaign],
+    seed: int = 0,
+    on_step: Callable[[str], None] = lambda what: None,
+) -> IntervalStudy:
+    """Hold the intervals against runs that were not fitted.
+
+    Args:
+        campaigns: Runs of each instrument; those with flagged closing samples are left out.
+        seed: Seed of the folds.
+        on_step: Called with what is done next.
+
+    Raises:
+        MissingChannelError: A run lacks a channel.
+    """
+    evidence = {}
+    for name, campaign in campaigns.items():
+        on_step(f"reads {name}")
+        evidence[name] = _reduced(campaign)
+    levels: list[Held] = []
+    moved: list[Held] = []
+    for name, by_target in evidence.items():
+        for target, runs in by_target.items():
+            on_step(f"{name}, {target}")
+            levels += _left_out(name, target, runs, seed)
+            source = fit_runs(runs, BANK, target)
+            for other, others in evidence.items():
+                if other != name:
+                    label = f"{name} -> {other}"
+                    moved += [_adapted(label, source, others[target], n) for n in COUNTS]
+    return IntervalStudy("rig.study.intervals/1", tuple(levels), tuple(moved), Provenance.now(seed))
+
+
+def _reduced(campaign: Campaign) -> dict[str, list[RunEvidence]]:
+    whole, _ = with_one_zero(campaign, JAW)
+    found: dict[str, list[RunEvidence]] = {target: [] for target in TARGETS}
+    for recording in whole.evidence:
+        run = processed(recording, [*BANK.channels, *TARGETS])
+        closing = is_closing(run)
+        if (closing & ~run.valid).any() or not closing.any():
+            continue
+        kept = np.flatnonzero(closing)[::EVERY]
+        truths = np.column_stack([run[target][kept] for target in TARGETS])
+        parts = RunEvidence.of_rows(BANK, rows_of(run, BANK)[kept], truths, recording.conditions)
+        for target, part in zip(TARGETS, parts, strict=True):
+            found[target].append(part)
+    return found
+
+
+def _splits(runs: Sequence[RunEvidence], seed: int) -> Iterator[tuple[str, NDArray[np.int_]]]:
+    """Yield what is left out and its runs."""
+    order = np.random.default_rng(seed).permutation(len(runs))
+    for fold in range(FOLDS):
+        yield "run", order[fold::FOLDS]
+    for condition in CONDITIONS.values():
+        values = np.array([float(run.conditions[condition]) for run in runs])
+        levels = np.unique(values)
+        for level in levels:
+            edge = level in (levels[0], levels[-1])
+            yield "edge" if edge else "between", np.flatnonzero(values == level)
+
+
+def _left_out(name: str, target: str, runs: Sequence[RunEvidence], seed: int) -> list[Held]:
+    found: dict[str, list[list[_Run]]] = {}
+    for kind, at in _splits(runs, seed):
+        fitted = fit_runs([runs[k] for k in range(len(runs)) if k not in at], BANK, target)
+        found.setdefault(kind, []).append([_on_run(fitted, runs[k]) for k in at])
+    return [_held(name, target, kind, parts) for kind, parts in found.items()]
+
+
+def _adapted(label: str, source: BankEstimator, runs: Sequence[RunEvidence], count: int) -> Held:
+    """Adapt with the runs that the rule takes, and compare with other choices of as many."""
+    draw = np.random.default_rng(0)
+    at_random = [draw.choice(len(runs), count, replace=False) for _ in range(len(runs))]
+    choices = [np.array([k]) for k in range(len(runs))] if count == 1 else at_random
+    scored = [
+        _on_others(source, runs, choice)
+        for choice in [np.array(spread_out(source, runs, count)), *choices]
+    ]
+    errors = [np.sqrt(np.mean([run.square for run in part])) for part in scored]
+    ratio = float(errors[0] / np.median(errors[1:]))
+    left_out = f"{count} run{'s' if count > 1 else ''}"
+    return _held(label, source.target, left_out, scored[:1], ratio)
+
+
+def _on_others(
+    source: BankEstimator, runs: Sequence[RunEvidence], choice: NDArray[np.int_]
+) -> "list[_Run]":
+    new = adapted_states(source, [runs[k] for k in choice])
+    return [_on_run(new, run) for k, run in enumerate(runs) if k not in choice]
+
+
+@dataclass(frozen=True)
+class _Run:
+    square: float
+    covered: float | None
+    half_width: float
+    no_width: float
+
+
+def _on_run(fitted: BankEstimator, run: RunEvidence) -> _Run:
+    assert fitted.interval is not None  # noqa: S101  enough runs were fitted
+    error = run.design @ fitted.weights - run.truth
+    width = fitted.interval.half_width(run.design, run.places)
+    stated = np.isfinite(width)
+    return _Run(
+        float(np.mean(error**2)),
+        covered_share(error, width),
+        float(width[stated].mean()) if stated.any() else float("nan"),
+        float(1.0 - stated.mean()),
+    )
+
+
+def _held(
+    name: str, target: str, left_out: str, fits: Sequence[Sequence[_Run]], ratio: float = np.nan
+) -> Held:
+    runs = [run for part in fits for run in part]
+    shares = [run.covered for run in runs if run.covered is not None]
+    by_fit = [[run.covered for run in part if run.covered is not None] for part in fits]
+    return Held(
+        name,
+        target,
+        left_out,
+        len(runs),
+        float(np.sqrt(np.mean([run.square for run in runs]))),
+        float(np.mean(shares)),
+        float(np.median(shares)),
+        min(shares),
+        min(float(np.mean(part)) for part in by_fit if part),
+        float(np.nanmean([run.half_width for run in runs])),
+        float(np.mean([run.no_width for run in runs])),
+        ratio,
+    )
