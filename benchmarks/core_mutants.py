@@ -6,8 +6,8 @@ Each mutant is one change of one line of `firmware/core`: a comparison, a logica
 a constant, a result, or a statement left out. `--count` of them are drawn over all files by a fixed
 seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`) and against
 random sequences (`proofs/hunt.cpp`); one that passes both against every small input
-(`proofs/small.cpp`), and one that passes that too against the contract tests in Python. Changes
-that do not compile do not count. What was found is kept in `build/core_mutants.json` for this
+(`proofs/small.cpp`), and one that passes that too against the contract tests in Python. A mutant
+that does not compile does not count. What was found is kept in `build/core_mutants.json` for this
 core; the command goes on where it stopped, and writes `docs/results/core-mutants.md`.
 """
 

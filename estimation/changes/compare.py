@@ -141,7 +141,7 @@ def compare(
         changes=tuple(_change(step, fitted, is_b) for step in steps),
         runs={"a": tuple(r.name for r in a), "b": tuple(r.name for r in b)},
         predicted=_predicted(layout, steps) if on else {},
-        notes=(*_notes(conditions), *_not_identified(regression)),
+        notes=(*_notes(conditions), *_not_identified(regression, is_b)),
         seed=seed,
     )
 
@@ -165,11 +165,11 @@ def _notes(conditions: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _not_identified(regression: Regression) -> list[str]:
+def _not_identified(regression: Regression, is_b: FloatArray) -> list[str]:
     return [
         f"Changes of the equation {equation} are not judged: its {parameter} comes out beyond its"
         " bounds, so its parameters are not identifiable from these runs."
-        for equation, parameter in impossible(regression).items()
+        for equation, parameter in impossible(regression, is_b).items()
     ]
 
 

@@ -82,7 +82,8 @@ class Step:
         best: The change.
         p: Share of random choices of runs with as large a gain of any candidate.
         shares: Name to its weight over resampled sets of runs, largest first. A name that explains
-            less than the best by `FORM` of it has 1/e of its weight: forms are not exact.
+            less than the best by `FORM` of it has 1/e of its weight: forms are not exact. Where a
+            parameter that moved explains most, effects have none.
         spread: Amplitudes in the resampled sets, shape (replicates, k).
         alternatives: Name to its best candidate.
     """
@@ -100,13 +101,19 @@ class _Held:
     laid: Laid
 
 
-def impossible(regression: Regression) -> dict[str, str]:
+def impossible(regression: Regression, is_b: FloatArray) -> dict[str, str]:
     """Return equations with a declared amplitude beyond its bounds, and which one it is.
 
     Such an equation's parameters are not identifiable from these runs: a change of one would be
-    attributed to another.
+    attributed to another. Each campaign is fitted on its own, since a change distorts a fit of
+    both; an equation is left out where neither fit is within its bounds.
     """
-    parameters = solved(regression.gram())
+    first, second = (_beyond(regression, counts) for counts in (1 - is_b, is_b))
+    return {name: what for name, what in first.items() if name in second}
+
+
+def _beyond(regression: Regression, counts: FloatArray) -> dict[str, str]:
+    parameters = solved(regression.gram(counts))
     out = {}
     for name, equation in regression.layout.equations.items():
         column = 0
@@ -137,7 +144,7 @@ def search(
     """
     random = np.random.default_rng(seed)
     choices = _choices(is_b, strata, random)
-    without = impossible(regression)
+    without = impossible(regression, is_b)
     pool = [h for h in _laid_out(regression) if h.candidate.equation not in without]
     steps: list[Step] = []
     declared = squared_error(regression.gram())
@@ -234,6 +241,7 @@ def _resampled(
     near = _best_of_each(ranked, best.gain)
     laid = [(one, regression.products(held.laid)) for one, held in near]
     prior = _prior([one.candidate for one, _ in ranked], [one.candidate for one, _ in near])
+    moved = np.array([not isinstance(one.candidate, Came) for one, _ in near])
     wins: dict[str, float] = {}
     spread = []
     groups = [np.flatnonzero(is_b == side) for side in (0, 1)]
@@ -247,6 +255,8 @@ def _resampled(
         found = [_one(gram, products, one, is_b, counts) for one, products in laid]
         gained = np.array([f[0] - one.usual for f, (one, _) in zip(found, laid, strict=True)])
         weights = prior * np.exp((gained - gained.max()) / max(FORM * gained.max(), TINY))
+        if moved[np.argmax(gained)]:  # no new effect where a parameter explains as much
+            weights = weights * moved
         for (one, _), weight in zip(laid, weights / weights.sum(), strict=True):
             wins[one.family] = wins.get(one.family, 0.0) + float(weight)
         spread.append(found[0][1])

@@ -34,7 +34,7 @@ def diff(
     effects came or went. A change is stated where the best candidate explains more than in 95 % of
     random choices of runs.
     """
-    from estimation.changes.compare import compare
+    from rig.diagnosis.compared import compared
     from rig.diagnosis.subject import subject
     from rig.output.console import progress
     from rig.output.table import to_rich
@@ -47,13 +47,7 @@ def diff(
         say_left_out(path, campaign)
     with progress() as bar:
         task = bar.add_task("changes", total=1)
-        found: Difference = compare(
-            list(first.campaign.evidence),
-            list(second.campaign.evidence),
-            first.models,
-            [] if third is None else list(third.evidence),
-            seed,
-        )
+        found: Difference = compared(first.campaign, second.campaign, first.models, third, seed)
         bar.advance(task)
     screen = results(json_)
     for line in lines(found):

@@ -112,3 +112,15 @@ def test_other_conditions_are_remarked_on_and_too_few_runs_refused():
     assert "not recorded under the same conditions" in found.notes[0]
     with pytest.raises(ChangesError, match="3 runs"):
         compare(record(1)[:3], record(2), [axis()])
+
+
+def test_a_change_that_distorts_a_common_fit_does_not_hide_its_equation():
+    def runs(scale: int, first: int, **changed: float) -> list[Recording]:
+        seeds = range(first, first + 4)
+        found = [record(seed, scale, friction=0.4, **changed)[0] for seed in seeds]
+        return [replace(run, name=f"{k}") for k, run in enumerate(found)]
+
+    # slow runs with little damping, fast ones with much: of both together friction is negative
+    found = compare(runs(0, 1, damping=3.0), runs(5, 11, damping=12.0), [axis()])
+    assert not any("not judged" in note for note in found.notes)
+    assert found.changes[0].name == "friction.viscous damping of motor"

@@ -1,1 +1,0 @@
-"""How often `rig diff` names a planted change, and what changed on measured machines."""
