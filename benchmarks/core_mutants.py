@@ -231,7 +231,7 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "of one line of `firmware/core`, drawn by a fixed seed. Unit tests and random sequences",
         "see every mutant, every small input those that passed both, the contract tests the rest.",
         "",
-        f"{len(tried)} mutants, {len(tried) - len(lived)} noticed"
+        f"{len(tried)} mutants tried so far, {len(tried) - len(lived)} noticed"
         f" ({(len(tried) - len(lived)) / total:.0%}); {len(results) - len(tried)} did not compile.",
         f"Of those not noticed, {unfinished} have not yet been held against every test.",
         "",
