@@ -80,7 +80,8 @@ def judge(truth: Truth, report: Report) -> Judgement:
 def judge_next(truth: Truth, report: Report) -> Judgement:
     """Judge an answer about a confounded case after the runs that should settle it."""
     best = _best(truth, report)
-    return Judgement(best == OUTCOMES[0], note=best)
+    single = all(f["verdict"] == "identified" for f in report["findings"])
+    return Judgement(best == OUTCOMES[0] and single, note=best)
 
 
 def outcome(truth: Truth, report: Report) -> str:

@@ -17,11 +17,7 @@ from drivers.epos4.power_stage import PowerStage
 from drivers.epos4.protocol import Feedback, Ratings, State
 from drivers.epos4.samples import batch_of, channels_of
 from drivers.epos4.setup import set_up
-from drivers.errors import (
-    DisarmUnconfirmedError,
-    DriverError,
-    MissingExtraError,
-)
+from drivers.errors import DisarmUnconfirmedError, DriverError, MissingExtraError
 from drivers.polling import PollSchedule
 from drivers.transport.can_bus import CanBus
 

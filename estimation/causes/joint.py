@@ -29,9 +29,9 @@ class LeftOut(NamedTuple):
     """The base fitted without the runs of each fold of a family.
 
     Attributes:
-        left: Which runs each fold leaves out, shape (folds, runs), 0 or 1.
+        left: Which runs each fold omits, shape (folds, runs), 0 or 1.
         runs: The runs left out by some fold, shape (n,).
-        fold: The fold that leaves each of them out, shape (n,).
+        fold: The fold that omits each of them, shape (n,).
         inverse: Of the normal matrices, shape (folds, base, base).
         base: Parameters, shape (folds, base).
     """

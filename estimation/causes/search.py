@@ -100,7 +100,7 @@ class Ranking:
         self._known: dict[frozenset[int], list[Scored]] = {}
 
     def next_to(self, causes: Sequence[Scored]) -> list[Scored]:
-        """Return the best of each name: on the grid, refined, bent, and on some of the runs."""
+        """Return the best of each name: on the grid, refined, relaxed, and on some of the runs."""
         key = frozenset(id(c.candidate) for c in causes)
         if key not in self._known:
             self._known[key] = _ranked(self._with(causes), self.pool, self.folds)

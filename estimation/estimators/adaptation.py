@@ -192,7 +192,7 @@ def _interval(
 
 
 def spread_out(source: BankEstimator, runs: Sequence[RunEvidence], count: int) -> list[int]:
-    """Return the runs to adapt with: those that leave the others closest to them.
+    """Return the runs to adapt with: those that are closest to all the others.
 
     One after another, the run is taken after which the mean score of all runs by those taken is
     least. Only the conditions of the samples are used, not the target.

@@ -205,9 +205,7 @@ class Asking:
     def _asked(self) -> str:
         """Return the answer to the question, asked again until it is one of its answers."""
         while True:
-            remarks().print(
-                "Enter when done, b to measure the step before again, q to stop: ", end=""
-            )
+            remarks().print(QUESTION, end="")
             try:
                 answer = input().strip().lower()
             except EOFError:

@@ -92,12 +92,20 @@ def udev(json: JsonFlag = False) -> None:
         typer.echo(udev_rules(), nl=False)
 
 
-def selftest(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+def selftest(
+    config: ConfigOption = None,
+    sim: SimFlag = False,
+    bench: Annotated[
+        bool, typer.Option("--bench", help="Also name the tests that only a person can make.")
+    ] = False,
+    json: JsonFlag = False,
+) -> int:
     """Run the acceptance test of a bench: devices, rates, zeros, limits, watchdog, stop.
 
     Nothing moves. Exit code 1 when a check fails.
     """
     from rig.configuration.check import refuse_problems
+    from rig.doctor.bench import bench_tests
     from rig.doctor.selftest import selftest as checks
 
     settings = chosen_rig(config, sim)
@@ -110,6 +118,10 @@ def selftest(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag =
         screen.print(f"{word}  {check.name}: {check.detail}", markup=False)
     failed = [check.name for check in done if not check.passed]
     screen.print(f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}.")
+    by_hand = bench_tests() if bench else []
+    for number, test in enumerate(by_hand, 1):
+        screen.print(f"by hand {number}  {test.name}: {test.do}", markup=False)
+        screen.print(f"    must show: {test.shows}", markup=False)
     if json:
-        emit_json({"passed": not failed, "checks": done})
+        emit_json({"passed": not failed, "checks": done, "by_hand": by_hand})
     return 1 if failed else 0

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.shipped import complete_effect
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
@@ -13,7 +14,11 @@ if TYPE_CHECKING:
 
 def effects(
     name: Annotated[
-        str | None, typer.Argument(help="Effect, such as ripple.motor, or a family's beginning.")
+        str | None,
+        typer.Argument(
+            help="Effect, such as ripple.motor, or a family's beginning.",
+            autocompletion=complete_effect,
+        ),
     ] = None,
     json: JsonFlag = False,
 ) -> None:

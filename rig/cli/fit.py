@@ -183,11 +183,14 @@ def fit(
             bar.update(task, description=declared.name)
             fitted = _dated(fit_model(declared, campaign, seed=seed))
             bar.advance(task)
-            done.append((fitted, held_out_error(declared, campaign, folds=folds, seed=seed)))
+            several = len(campaign.evidence) > 1
+            error = held_out_error(declared, campaign, folds=folds, seed=seed) if several else None
+            done.append((fitted, error))
             bar.advance(task)
     for fitted, error in done:
         screen.print(to_rich(parameter_table(fitted)))
-        screen.print(held_out_sentence(fitted, error))
+        one = "One run: there is no error on runs that it was not fitted on."
+        screen.print(held_out_sentence(fitted, error) if error else one)
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
         screen.print(f"Model: {out}", markup=False)
@@ -224,7 +227,7 @@ def _dated(model: "Model") -> "Model":
     return replace(model, evidence=replace(model.evidence, made_at=now))
 
 
-def _told(model: "Model", error: "HeldOutError", out: Path | None) -> dict[str, Any]:
+def _told(model: "Model", error: "HeldOutError | None", out: Path | None) -> dict[str, Any]:
     """Return the JSON result of a fit."""
     parameters = [
         {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}

@@ -133,7 +133,8 @@ def data_text(table: Path, plant: Plant) -> str:
         UsageError: No such file.
         DataError: The table cannot be read.
     """
-    from rig.importers.table.mapping import Data, Mapping
+    from rig.importers.table.data import Data
+    from rig.importers.table.mapping import Mapping
     from rig.importers.table.open import files_at, read_raw
 
     mapping = Mapping(Data())

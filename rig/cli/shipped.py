@@ -81,6 +81,13 @@ def complete_machine(incomplete: str) -> list[str]:
     return _matching(machine_names(), incomplete)
 
 
+def complete_effect(incomplete: str) -> list[str]:
+    """Complete an effect by its name."""
+    from estimation.effects import catalogue
+
+    return [name for name in catalogue() if name.startswith(incomplete)]
+
+
 def complete_model(incomplete: str) -> list[str]:
     """Complete a declared model: a shipped name or a file."""
     return _matching(model_names(), incomplete)

@@ -59,7 +59,7 @@ def _beside(path: Path) -> Path:
 
 
 def _about(path: Path) -> dict[str, Any]:
-    """Return what is stated of each run, by its name."""
+    """Return the statements of each run, by its name."""
     from pyarrow import parquet
 
     if path.suffix == ".csv":

@@ -30,7 +30,11 @@ def plain_line(
             parts.append(words.error_rms(reading))
     parts += [words.rate(snapshot), words.lost(snapshot.lost, snapshot.samples)]
     parts += [f"{device.name} {device.state}" for device in snapshot.devices]
-    parts += [f"{limit.name} {words.limit_words(limit)}" for limit in snapshot.limits]
+    parts += [
+        f"{limit.name} {words.limit_words(limit)}"
+        for limit in snapshot.limits
+        if words.limit_style(words.limit_share(limit)) != "good"
+    ]
     parts += [f"flagged: {words.flagged(snapshot.flagged)}"] if snapshot.flagged else []
     return " | ".join(parts)
 

@@ -14,6 +14,7 @@ import pytest
 from rig.errors import UsageError
 from rig.live import foxglove as served
 from rig.live.block import DeviceStatus, SampleBlock
+from rig.log.reader import read_log
 
 pytestmark = pytest.mark.integration
 
@@ -134,3 +135,15 @@ def test_the_layout_shows_channels_that_are_sent():
     paths = [p["value"] for panel in layout["configById"].values() for p in panel.get("paths", [])]
     assert "/rig/sample.distal_torque_n_m_estimate" in paths
     assert all(value.startswith(f"{served.SAMPLE}.") for value in paths)
+
+
+def test_the_layouts_channels_are_those_of_a_recorded_log():
+    """A recording opens in the same layout; only estimates are missing from it."""
+    example = next((Path(__file__).parents[2] / "logs" / "example").glob("*.mcap"))
+    recorded = set(read_log(example).topics[served.SAMPLE].columns)
+    text = Path(served.__file__).with_name("foxglove.layout.json").read_text()
+    panels = json.loads(text)["configById"].values()
+    shown = {p["value"].rpartition(".")[2] for panel in panels for p in panel.get("paths", [])}
+    of_reference = {"distal_torque_n_m", "proximal_torque_n_m", "motor_current_a"} & shown
+    assert of_reference
+    assert of_reference <= recorded

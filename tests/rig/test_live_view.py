@@ -155,8 +155,16 @@ def test_before_the_first_sample_the_display_says_so():
 def test_plain_line_holds_the_same_facts():
     line = plain_line(snapshot_of(stream()), 0.012)
     assert "\n" not in line
-    for wanted in ("123.4 mN m", "10.28 N at 12 mm", "1000 Hz", "lost 0", "teensy armed", "52 %"):
+    for wanted in (
+        "123.4 mN m",
+        "10.28 N at 12 mm",
+        "1000 Hz",
+        "lost 0",
+        "teensy armed",
+        "97 % near",
+    ):
         assert wanted in line
+    assert "52 %" not in line  # a limit is named from 80 % of it on
 
 
 def test_other_quantities_take_one_line_each():

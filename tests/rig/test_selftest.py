@@ -15,6 +15,7 @@ from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
 from rig.configuration.check import refuse_problems
 from rig.configuration.config import Config, load_config
+from rig.doctor.bench import bench_tests, page
 from rig.doctor.selftest import selftest
 from tests.rig.simulated import Wrapped, simulated, transport
 
@@ -78,3 +79,12 @@ def test_selftest_speaks_to_machines(capsys: pytest.CaptureFixture[str]) -> None
     told = json.loads(capsys.readouterr().out)
     assert told["passed"]
     assert {"name", "passed", "detail"} == set(told["checks"][0])
+
+
+def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(capsys) -> None:
+    assert main(["selftest", "--sim", "--bench", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    tests = bench_tests()
+    assert [test["name"] for test in said["by_hand"]] == [test.name for test in tests]
+    assert all(test.why and test.do and test.shows for test in tests)
+    assert Path("docs/bench.md").read_text() == page()

@@ -122,6 +122,11 @@ def test_the_diagnosis_names_the_bearing_and_nothing_else():
     assert 0.2 < term.values["share"].value < 0.9
 
 
+def test_the_diagnosis_answers_where_its_causes_hide_one_another():
+    axes = axes_of(PROTOTYPES["third"], "yaw", zhao.LOOKED_AT, 0.1)
+    assert all(family for family, _ in lacking("yaw", axes, zhao.LOOKED_AT).findings)
+
+
 def test_the_angle_makes_up_for_the_lag_of_the_filter_and_adds_nothing_at_rest():
     low = LowPass(cutoff_hz=25.0, order=2)
     time_s = np.arange(0, 4, 1 / RATE_HZ)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.errors import DataError, MissingExtraError
 from rig.importers.matlab import read_variables
-from rig.importers.table.mapping import Layout
+from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, Values
 
 

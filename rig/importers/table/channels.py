@@ -10,9 +10,10 @@ from estimation.channels import UnknownUnitError, unit_of
 from estimation.recording import FloatArray
 from rig.errors import DataError
 from rig.importers.matlab import carries_unit
+from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
-from rig.importers.table.mapping import DATE, TIME, Mapping, Source
+from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Raw, Values
 from rig.importers.table.units import conversion
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.errors import DataError
-from rig.importers.table.mapping import Layout
+from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, numbers_or_text, to_number
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}

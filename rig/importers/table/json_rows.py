@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import DataError
-from rig.importers.table.mapping import Layout
+from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, Values, numbers_or_text
 
 

@@ -1,18 +1,4 @@
-"""`[data]` of a machine's file: which column of a table becomes which channel, and what runs are.
-
-    [data]
-    files = "*.csv"
-    [data.columns]
-    time_s = "t:ms"
-    motor_angle_rad = "encoder:rev/4096"
-    motor_current_a = { column = "adc", unit = "A", gain = 0.00488, zero = 512 }
-    [data.conditions]
-    load_mass_kg = "load:g"
-    [data.runs]
-    gap_s = 0.5
-
-Every other table of that file is of the machine itself and is not read here.
-"""
+"""Reading a mapping from a machine's file and the command line, with the place of each entry."""
 
 import tomllib
 from collections.abc import Mapping as Names
@@ -20,169 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import ValidationError
 
 from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
 from rig.configuration.validation import explain, line_of
 from rig.errors import UsageError
+from rig.importers.table.data import DATE, TIME, Data, Invalid, Runs, Section, Source
 from rig.importers.table.formula import FormulaError, names_in
-from rig.importers.table.units import NotAUnitError, conversion, read_unit
-
-TIME = "time_s"
-DATE = "iso8601"
-"""Unit of a time column that holds dates."""
+from rig.importers.table.units import NotAUnitError, conversion
 
 EXAMPLES = Path(str(files("rig"))) / "machines" / "examples"
 """Folder of the shipped machine files; `--machine` takes their names."""
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
 
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def _short(value: Any) -> Any:
-    """Return `COLUMN:UNIT` as a table; what follows the last colon counts if it is a unit."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return {"column": str(value)}
-    if not isinstance(value, str):
-        return value
-    name, colon, unit = value.rpartition(":")
-    if colon and (unit == DATE or _is_unit(unit)):
-        return {"column": name, "unit": unit}
-    return {"column": value}
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        read_unit(text)
-    except NotAUnitError:
-        return False
-    return True
-
-
-class Source(_Section):
-    """Where a channel or a condition comes from: SI value = unit * gain * (raw - zero).
-
-    Attributes:
-        column: Name of a column, of a single value of the file, of a group of `file_name`, or of a
-            column of the side file; columns without a head are numbered from 1.
-        unit: Unit of the values; the SI unit of the channel's name if none.
-        gain: Number, or the name of a single value of the file.
-        zero: Raw value that means nought.
-        wraps_at: Raw range of a counter or angle that starts again at its end, or None.
-        sign_bit: Raw value of a bit that is set where the reading is negative, or None: the
-            registers of many servos hold sign and magnitude.
-        value: Of a condition: the value itself, in place of a column.
-    """
-
-    column: Annotated[str, BeforeValidator(lambda v: str(v) if type(v) is int else v)] = ""
-    unit: str = ""
-    gain: FiniteFloat | str = 1.0
-    zero: FiniteFloat = 0.0
-    wraps_at: Positive | None = None
-    sign_bit: Positive | None = None
-    value: FiniteFloat | str | None = None
-
-
-Short = Annotated[Source, BeforeValidator(_short)]
-
-
-class Invalid(_Section):
-    """Samples that do not count.
-
-    Attributes:
-        when: Formula that is true for them.
-        reason: Why.
-        missing: Whether nothing was read: a filter then bridges them, instead of smearing values
-            that are none over their neighbours.
-    """
-
-    when: str
-    reason: str
-    missing: bool = False
-
-
-class Runs(_Section):
-    """Where one run ends and the next one begins; every stated rule applies.
-
-    Attributes:
-        gap_s: A pause of more than this in the time column, s.
-        resets: Whether time that goes back begins a run.
-        changes: Columns a new value of which begins a run.
-        falls: Column that begins a run where it falls.
-        mark: Column that begins a run where it turns from 0 to something else.
-        at_s: Times since the start of the file, s.
-        lap_s: Length of a lap, s.
-        start_s: What is before this time since the start of the file is left out, s.
-        tail_s: What is within this time of the end of the file is left out, s.
-        least_s: Shorter parts are left out, s; half a lap if laps are cut.
-    """
-
-    gap_s: Positive | None = None
-    resets: bool = False
-    changes: tuple[str, ...] = ()
-    falls: str = ""
-    mark: str = ""
-    at_s: tuple[FiniteFloat, ...] = ()
-    lap_s: Positive | None = None
-    start_s: FiniteFloat = 0.0
-    tail_s: Annotated[FiniteFloat, Field(ge=0)] = 0.0
-    least_s: Annotated[FiniteFloat, Field(ge=0)] | None = None
-
-
-class Layout(_Section):
-    """How a file is laid out, as far as it is stated.
-
-    Attributes:
-        files: Pattern of the files of a folder, such as `*.csv`.
-        header: Whether the first line of a text table names the columns; None follows it.
-        separator: Of a text table; found in the first line if none.
-        decimal: Decimal sign of a text table.
-        comment: What a line to be skipped begins with.
-        skip_lines: Lines before the head.
-        rows: Key of a JSON object that holds the samples.
-    """
-
-    files: str = ""
-    header: bool | None = None
-    separator: Annotated[str, Field(max_length=1)] = ""
-    decimal: Literal[".", ","] = "."
-    comment: str = ""
-    skip_lines: Annotated[int, Field(ge=0)] = 0
-    rows: str = ""
-
-
-class Data(Layout):
-    """The table `[data]`.
-
-    Attributes:
-        sample_rate_hz: Rate of the samples where no column holds their time.
-        even_rate_hz: Rate of an even clock onto which the samples are interpolated, or None.
-        file_name: Regular expression of a file's name; each named group is a single value.
-        side_file: CSV next to the data with a column `file` and one for each single value.
-        columns: Channel to its source.
-        conditions: Condition to its source.
-        formulas: Channel or condition to a formula of others, in SI units.
-        invalid: Samples that do not count.
-        runs: Where runs begin.
-    """
-
-    sample_rate_hz: Positive | None = None
-    even_rate_hz: Positive | None = None
-    file_name: str = ""
-    side_file: str = ""
-    columns: dict[str, Short] = Field(default_factory=dict)
-    conditions: dict[str, Short] = Field(default_factory=dict)
-    formulas: dict[str, str] = Field(default_factory=dict)
-    invalid: tuple[Invalid, ...] = ()
-    runs: Runs = Field(default_factory=Runs)
-
-
-class _Whole(_Section):
+class _Whole(Section):
     data: Data
 
 

@@ -11,9 +11,9 @@ from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
 from rig.importers.table.arrays import read_mat, read_npz, read_parquet
 from rig.importers.table.channels import to_samples
+from rig.importers.table.data import Layout
 from rig.importers.table.delimited import read_delimited
 from rig.importers.table.json_rows import read_json
-from rig.importers.table.mapping import Layout
 from rig.importers.table.mapping import Mapping as ColumnMapping
 from rig.importers.table.raw import Raw, Remark, to_number
 from rig.importers.table.raw import checked as with_samples

@@ -56,7 +56,7 @@ def _usual(study: IntervalStudy) -> dict[tuple[str, str], float]:
 
 
 def tables(study: IntervalStudy) -> list[TextTable]:
-    """Return what was measured."""
+    """Return the table of levels left out and that of other instruments."""
     usual = _usual(study)
     columns = ["instrument", "estimate", "left out", "runs", "RMSE", "covered", "median run"]
     columns += ["worst run", "worst fit", "half width", "of that on unseen runs", "none stated"]
@@ -65,8 +65,8 @@ def tables(study: IntervalStudy) -> list[TextTable]:
         for row in study.levels
     ]
     note = (
-        "Closing samples; each run counts alike. A fit leaves out one fold of runs, or one level."
-        " Worst fit: the smallest mean share of what one fit left out. At rest and on opening no"
+        "Closing samples; each run counts alike. One fold of runs, or one level, is left out of a"
+        " fit. Worst fit: the smallest mean share of what one fit left out. At rest and on opening no"
         " width is stated."
     )
     moved = [[*_cells(row), f"{row.rmse_ratio:.2f}", _none(row)] for row in study.adapted]

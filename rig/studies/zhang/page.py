@@ -217,7 +217,9 @@ def _table_1_ours(study: ZhangStudy) -> TextTable:
 def _effects(study: ZhangStudy) -> TextTable:
     rows = [[name, str(count), SIMULATED.get(name, "no")] for name, count in study.effects.items()]
     note = "By the forward search of `rig study pique`, confirmed in the other direction."
-    return TextTable("Effects found", ["effect", "arms", "in the simulation"], rows, note)
+    return TextTable(
+        "Effects found", ["effect", "arms", "in the simulation's own form"], rows, note
+    )
 
 
 def _table_2(study: ZhangStudy) -> TextTable:

@@ -1,5 +1,6 @@
 """Runs of several rigs are not opened as one, and what is left out is named with its reason."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -123,3 +124,11 @@ def test_an_exported_campaign_is_read_back(tmp_path, capsys, ending):
     assert "2 runs. Channels: motor_current_a" in said
     assert "a  1.999 s, 1000 Hz  load_command_a = 0.2" in said
     assert "flagged samples: 1" in said
+
+
+def test_one_run_is_fitted_without_an_error_on_others(tmp_path, capsys):
+    write_recording(tmp_path / "a.mcap", run("a"))
+    assert main(["fit", str(tmp_path), "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["held_out"] is None
+    assert "One run: there is no error on runs" in said.err
