@@ -471,6 +471,7 @@ def test_a_servo_s_run_is_its_drive_and_what_does_not_count_is_flagged(tmp_path:
             "position": -3.14 if k == 20 else 0.1,
             "goal_position": 0.4,
             "input_volts": 12.0,
+            "torque": 12.74,  # the sign bit, 10.24, and 2.5
             "temp": 30.0,
             "torque_enable": k >= 10,
         }
@@ -481,7 +482,7 @@ def test_a_servo_s_run_is_its_drive_and_what_does_not_count_is_flagged(tmp_path:
     other = {**head, "mass": 0.5, "entries": entries}
     (tmp_path / "other.json").write_text(json.dumps(other))
     (run,) = handed_over(tmp_path, "sts3215")
-    assert run["drive_ratio"][run.valid] == pytest.approx(np.full(run.valid.sum(), 0.4))
+    assert run["drive_ratio"][run.valid] == pytest.approx(np.full(run.valid.sum(), 0.25))
     assert run["motor_temperature_k"][0] == pytest.approx(303.15)
     assert not run.valid[:10].any()
     assert run.valid[11:20].all()

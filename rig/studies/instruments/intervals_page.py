@@ -66,8 +66,8 @@ def tables(study: IntervalStudy) -> list[TextTable]:
     ]
     note = (
         "Closing samples; each run counts alike. One fold of runs, or one level, is left out of a"
-        " fit. Worst fit: the smallest mean share of what one fit left out. At rest and on opening no"
-        " width is stated."
+        " fit. Worst fit: the smallest mean share of what one fit left out. At rest and on opening"
+        " no width is stated."
     )
     moved = [[*_cells(row), f"{row.rmse_ratio:.2f}", _none(row)] for row in study.adapted]
     more = [*columns[:2], "adapted with", *columns[3:10], "error over median", "none stated"]
