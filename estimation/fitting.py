@@ -287,6 +287,7 @@ def _descended(
     each descent moves by at most one step of the grid; it restarts from its end while that improves
     the result, since a valley of two shapes is curved.
     """
+    point = [min(max(x, low), high) for x, (low, high) in zip(point, bounds, strict=True)]
     left = error(point)
     for _ in range(most):
         near = [

@@ -17,6 +17,10 @@ from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
 
+SKEW_S = 5e-4
+MOST_SKEW = 2.0
+"""Usual delay of a reading against the others, half a sample at 1 kHz, and the most, over it."""
+
 QUIET = 0.002
 """Noise of a channel over its range below which no column follows it."""
 
@@ -114,6 +118,36 @@ def candidates(joint: Joint) -> list[Group]:
         )
         for group in pool
     ]
+
+
+def skews(joint: Joint) -> list[Claim]:
+    """Return the readings that are late or early by a little, each as a short delay.
+
+    No two boards share a clock, and a reading has an age. A delay as short as that is part of the
+    base, no finding; a longer one is.
+    """
+    late = [
+        Claim(replace(source, shape=(SKEW_S,)))
+        for place in places_of(joint.layout)
+        for source in itertools.islice(
+            (s for s in sources_at(joint.layout, place) if s.effect.id == "sensor.delay"), 1
+        )
+    ]
+    found = [one for group in groups_of(joint, late) for one in group.candidates]
+    delays = with_skews(joint, found).left_out([[]]).base[0][joint.size :]
+    return [
+        Claim(one.cause)
+        for one, delay in zip(found, delays, strict=True)
+        if abs(delay / one.size[0]) < MOST_SKEW
+    ]
+
+
+def with_skews(joint: Joint, late: Sequence[Claim]) -> Joint:
+    """Return a regression with short delays of readings in its base."""
+    for group in groups_of(joint, late):
+        for one in group.candidates:
+            joint = joint.with_cause(one.laid, 1.0 / one.size**2)
+    return joint
 
 
 def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimation.causes.candidates import Candidate, Claim, laid_out
+from estimation.causes.candidates import Candidate, Claim, laid_out, with_skews
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
 from estimation.causes.numbers import Numbers
@@ -22,11 +22,14 @@ class HeldOut:
         layout: All runs.
         sealed: Which runs train and which test.
         numbers: What decides.
+        late: Short delays of readings that are part of the base.
     """
 
-    def __init__(self, layout: Layout, sealed: Sealed, numbers: Numbers) -> None:
+    def __init__(
+        self, layout: Layout, sealed: Sealed, numbers: Numbers, late: Sequence[Claim] = ()
+    ) -> None:
         self.layout, self.numbers = layout, numbers
-        self.joint = Joint(layout, numbers)
+        self.joint = with_skews(Joint(layout, numbers), late)
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
 
     def acts_in(self, candidate: Candidate) -> Mapping[str, bool | None]:

@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.causes.blocks import block_of, evaluate
-from estimation.causes.candidates import Candidate, Claim, Group, candidates, groups_of
+from estimation.causes.candidates import (
+    Candidate,
+    Claim,
+    Group,
+    candidates,
+    groups_of,
+    skews,
+    with_skews,
+)
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
@@ -55,12 +63,14 @@ class Found:
         conditional: For each cause, every candidate in its place given the others, best first.
         joint: The regression of the training runs without causes.
         clean_score: The best score when nothing was claimed.
+        late: Short delays of readings that are part of the base.
     """
 
     causes: Sequence[Scored]
     conditional: Sequence[Sequence[Scored]]
     joint: Joint
     clean_score: float
+    late: Sequence[Claim] = ()
 
 
 def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
@@ -70,11 +80,13 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
         train: The declared equations on the training runs, instruments added.
         numbers: What decides.
     """
-    joint = Joint(train, numbers)
+    plain = Joint(train, numbers)
+    late = skews(plain)
+    joint = with_skews(plain, late)
     ranking = Ranking(joint, candidates(joint), folds_of(train))
     first = ranking.next_to([])
     if not first or first[0].score < 0.0:
-        return Found([], [], joint, first[0].score if first else 0.0)
+        return Found([], [], joint, first[0].score if first else 0.0, late)
     chains = [_chain(ranking, start) for start in _starts(first)]
     causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
     conditional = []
@@ -83,7 +95,7 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
         ranked = ranking.next_to([c for c in causes if c is not cause]) or [cause]
         conditional.append(ranked)
         causes[k] = ranked[0]
-    return Found(causes, conditional, joint, first[0].score)
+    return Found(causes, conditional, joint, first[0].score, late)
 
 
 class Ranking:

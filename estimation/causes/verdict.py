@@ -150,7 +150,7 @@ def answer(
         found = search(layout.select(sealed.discover), numbers)
     on_stage("opening the held-out test runs")
     refits = Refits(layout, timed, sealed, numbers)
-    kept, findings, notes = _judged(found, HeldOut(layout, sealed, numbers), refits)
+    kept, findings, notes = _judged(found, HeldOut(layout, sealed, numbers, found.late), refits)
     written = refits.models()
     findings = [
         replace(f, parameters=_parameters(k, f.balance, written))
