@@ -2,9 +2,11 @@
 
 A right jaw turns the other way: every measured and commanded column but the load's command has the
 opposite sign. Two sources state the side. The names do: the folder (`..._L_...`, `..._R_...`) and
-the header ("left spindle", "right spindle"). The signs do as well: the load motor pulls the jaw
-open, so torque at the jaw keeps one sign for the whole run, negative as logged on a left jaw. On
-the public runs of left jaws its mean is 2.8 to 21 times its standard deviation.
+the header ("left spindle", "right spindle"). The signs do as well: at a positive command the load
+motor pulls the jaw open, so torque at the jaw keeps one sign for the whole run, negative as logged
+on a left jaw. On the public runs of left jaws its mean is 2.8 to 21 times its standard deviation.
+A negative command shows no side: some right jaws were logged with one, and on a left jaw it pushes
+the jaw shut.
 
 Signs that contradict the names are refused, since a wrong side exchanges opening and closing. The
 header's sentence is left over from earlier sessions in some folders, and then it names the left
@@ -107,9 +109,9 @@ def _decide(path: Path, in_folder: str | None, in_header: str | None, shown: str
 
 def _shown(columns: FloatArray) -> str | None:
     """Return the side that torque at the jaw shows, or None where no load makes it plain."""
-    distal = columns[raw.DISTAL, ::THINNING]
+    distal, load = columns[raw.DISTAL, ::THINNING], float(columns[raw.LOAD].mean())
     mean = float(distal.mean())
-    if not columns[raw.LOAD].any() or abs(mean) <= float(distal.std()):
+    if load <= 0.0 or abs(mean) <= float(distal.std()):
         return None
     return LEFT if mean < 0 else RIGHT
 

@@ -74,6 +74,15 @@ def test_a_stated_side_that_the_signs_contradict_is_refused(load, folder, spindl
         load(folder, spindle, mirrored=is_mirrored)
 
 
+def test_a_load_that_pushes_a_left_jaw_shut_is_no_right_jaw(load):
+    def pushed(rows):
+        rows[:, 5] *= -1
+
+    shut = load(load_a=-0.3, edit=pushed)
+    assert shut.instrument.side == "left"
+    assert np.median(shut["distal_torque_n_m"]) == -np.median(load()["distal_torque_n_m"])
+
+
 def test_without_a_stated_side_the_signs_decide(load):
     right = load("bench", header=["%taken by a test"], mirrored=True)
     assert right.instrument.side == "right"
