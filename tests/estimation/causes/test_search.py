@@ -60,7 +60,7 @@ def test_a_run_with_too_few_samples_is_left_out_with_a_note() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_counts_of_a_coarse_encoder_are_no_cause(seed: int) -> None:
-    count_rad = 0.02
+    count_rad = 0.01
     coarse = [
         run.with_columns(motor_angle_rad=np.round(run["motor_angle_rad"] / count_rad) * count_rad)
         for run in recordings(seed=seed)
