@@ -152,7 +152,7 @@ def _hunt(firmware: Path, settings: Path) -> bool | None:
     return None if program is None else not all(_passes(program, settings, *w) for w in _HUNTS)
 
 
-def _unit(firmware: Path, settings: Path) -> bool:
+def _unit(firmware: Path, settings: Path) -> bool | None:
     own = ("-O0", "-include", "unit.hpp", "-DRIG_MAIN_APART", "main.o")
     program = _built(firmware, "tests/core_test.cpp", *own)
     return None if program is None else not _passes(program)

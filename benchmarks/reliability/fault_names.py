@@ -69,6 +69,7 @@ SAID = {
         Fault.DELAY: _UNANSWERED | {"late"},
         Fault.STALL: _UNANSWERED | {"late"},
     },
+    "ft300": _UNNUMBERED_STREAM,
     "moteus": {
         Fault.DROP: _ASKED_AGAIN | _DAMAGED,
         Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,

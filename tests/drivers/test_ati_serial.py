@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers import modbus
 from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
@@ -30,7 +31,7 @@ def test_messages_are_the_published_bytes(message: bytes, published: str) -> Non
 
 @given(data=st.binary(min_size=1, max_size=40), bit=st.integers(0, 7), place=st.integers(0, 60))
 def test_one_changed_bit_is_refused(data: bytes, bit: int, place: int) -> None:
-    message = bytearray(protocol.encode(protocol.READ, data))
+    message = bytearray(protocol.encode(modbus.READ, data))
     message[place % len(message)] ^= 1 << bit
     with pytest.raises(FrameError):
         protocol.decode(bytes(message))
@@ -115,7 +116,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     fake = AtiSerialFake()
     fake.receive(protocol.write_registers(0, (1, 2)))
     function, reason = protocol.decode(fake.transmit())
-    assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")
+    assert (function, reason) == (modbus.WRITE | protocol.FAILED, b"\x02")
 
 
 def test_what_may_differ_can_be_told_otherwise() -> None:
@@ -178,12 +179,12 @@ def test_the_server_keeps_silent_where_a_slave_does_and_refuses_what_it_must() -
     damaged = bytearray(protocol.read_registers(0, 1))
     damaged[-1] ^= 1
     body = bytes([protocol.SLAVE + 1]) + protocol.read_registers(0, 1)[1:-2]
-    elsewhere = body + protocol.crc16(body).to_bytes(2, "little")
+    elsewhere = body + modbus.crc16(body).to_bytes(2, "little")
     for message in (bytes(damaged), elsewhere, protocol.JAM, b""):
         fake.receive(message)
         assert fake.transmit() == b""
     fake.receive(protocol.read_registers(0x0FFF, 2))
-    assert protocol.decode(fake.transmit()) == (protocol.READ | protocol.FAILED, b"\x02")
+    assert protocol.decode(fake.transmit()) == (modbus.READ | protocol.FAILED, b"\x02")
     fake.receive(protocol.encode(protocol.STORAGE, protocol.UNLOCK))
     fake.receive(protocol.write_registers(3, (7, 8)))
     fake.receive(protocol.encode(protocol.STORAGE, protocol.LOCK))
@@ -191,4 +192,4 @@ def test_the_server_keeps_silent_where_a_slave_does_and_refuses_what_it_must() -
     fake.transmit()
     assert fake.server.registers(2, 4) == (0, 7, 8, 0)
     fake.receive(protocol.read_registers(3, 2))
-    assert protocol.decode(fake.transmit()) == (protocol.READ, bytes.fromhex("04 0007 0008"))
+    assert protocol.decode(fake.transmit()) == (modbus.READ, bytes.fromhex("04 0007 0008"))
