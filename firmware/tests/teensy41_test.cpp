@@ -158,6 +158,24 @@ TEST_CASE("a torque converter at its ends is a saturated field") {
     CHECK(teensy.sample().distal == INT16_MIN);
 }
 
+TEST_CASE_TEMPLATE("cells whose converter is not there are missing", Cells, rig::wiring::AdsPins, rig::wiring::HxPins) {
+    Cells cells;
+    board.levels.clear();
+    cells.begin();
+    const rig::Torques torques = cells.sample();
+    CHECK(torques.proximal == rig::kMissing);
+    CHECK(torques.distal == rig::kMissing);
+}
+
+TEST_CASE("each HX711 is read at pins of its own") {
+    rig::wiring::HxPins cells;
+    cells.begin();
+    board.levels[12] = LOW;  // the proximal cell's: a conversion is ready, and all its bits are 0
+    const rig::Torques torques = cells.sample();
+    CHECK(torques.proximal == 0);
+    CHECK(torques.distal == rig::kMissing);
+}
+
 TEST_CASE("no command goes beyond the limit of the current controller") {
     const rig::EsconWiring& wiring = rig::wiring::kDrive;
     for (double current : {-1e9, -2.0, 0.0, 2.0, 1e9, std::nan("")}) {

@@ -20,7 +20,7 @@ def test_the_request_for_the_stream_is_the_published_one() -> None:
 
 
 def test_a_message_of_another_projects_tests_is_read() -> None:
-    """From `ft_sensor_test` of `robotiq_driver_noros`, a driver written independently of this one."""
+    """From `ft_sensor_test` of `robotiq_driver_noros`, an independent driver."""
     message = bytes.fromhex("20 4E 7B 00 38 FE 15 03 0C 00 DE FF 38 00 E4 5D")
     rows = np.frombuffer(message, np.uint8)[np.newaxis]
     assert protocol.message_checks(rows).all()
