@@ -58,12 +58,6 @@ def test_no_sequence_of_faults_breaks_a_rule_that_is_not_known(
     assert found.farthest_rad > 2.5
 
 
-def test_two_halves_of_a_search_are_the_whole(sanitized: Path, settings: Path) -> None:
-    whole = run(sanitized, settings, "commands", 0, 40)
-    halves = [run(sanitized, settings, "commands", first, 20) for first in (0, 20)]
-    assert joined(*halves) == whole
-
-
 BROKEN = {
     "the watchdog": (
         "board.hpp",
