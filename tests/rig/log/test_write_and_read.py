@@ -14,7 +14,7 @@ from rig.log.reader import DamagedLogError, read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.scan import NotALogError
 from rig.log.schema import Field, Stream
-from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE
+from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import FLUSH_AFTER_S, MAX_LOSS_S, LogExistsError, LogWriteError, LogWriter
 
 STREAM = Stream(
@@ -112,12 +112,6 @@ def test_only_the_wanted_topics_are_read(log):
     assert read_log(log, ()).topics == {}
     with pytest.raises(UsageError, match="no topic /rig/nothing"):
         read_log(log, ["/rig/nothing"])
-
-
-def test_a_stream_without_messages_is_there_and_empty(tmp_path):
-    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
-        writer.write("/t", rows(0), times(0))
-    assert len(read_log(tmp_path / "a.mcap").topics["/t"]) == 0
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
@@ -251,14 +245,6 @@ def test_a_value_that_is_not_finite_needs_a_flag(tmp_path, value):
     np.testing.assert_array_equal(read_log(path).topics["/t"].rows["x_a"], np.full(3, value))
 
 
-def test_a_stream_without_flags_takes_finite_values_only(tmp_path):
-    stream = Stream("/u", "p/msg/P", (Field("x", "float64"),))
-    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [stream]) as writer:
-        with pytest.raises(UnflaggedSampleError):
-            writer.write("/u", {"x": np.array([1.0, np.nan])}, times(2))
-        assert writer.received == {"/u": 0}
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -285,24 +271,6 @@ def test_metadata_that_is_not_finite_is_refused_before_a_file_is_made(tmp_path):
     with pytest.raises(DataError, match="conditions"):
         LogWriter(tmp_path / "a.mcap", RunInfo("a", conditions={"load_a": np.nan}), [STREAM])
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_large_block_is_cut_into_chunks_and_read_back(tmp_path):
-    count = 60_000
-    block = rows(count) | {"x_a": np.random.default_rng(0).normal(size=count)}
-    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM]) as writer:
-        writer.write("/t", block, times(count))
-    np.testing.assert_array_equal(
-        read_log(tmp_path / "a.mcap").topics["/t"].rows["x_a"], block["x_a"]
-    )
-
-
-def test_the_end_of_a_run_that_cannot_be_written_leaves_the_writer_open(tmp_path):
-    with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [COUNTS_STREAM]) as writer:
-        with pytest.raises(DataError, match="drift"):
-            writer.close(RunEnd(drift={"proximal_torque_n_m": np.nan}))
-        writer.close(RunEnd(drift_verdict="not judged"))
-    assert read_log(tmp_path / "a.mcap").end.drift_verdict == "not judged"
 
 
 @pytest.mark.parametrize("data", [b"", b"a", b"not a log at all" * 50, bytes(5000)])
