@@ -68,6 +68,10 @@ def test_a_script_that_is_not_followed_fails() -> None:
         pass
 
 
+def test_the_counts_of_a_unit_are_the_bytes_of_the_manual() -> None:
+    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
+
+
 def test_old_firmware_is_not_asked_for_units() -> None:
     node = AtiCanFake(firmware=(3, 6, 0), load=lambda _: np.array([100, 0, 0, 0, 0, 0]))
     device = AtiCan(SimulatedCanBus([node]))
