@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.ati_can import protocol
-from drivers.ati_can.driver import AtiCan
+from drivers.ati_can.driver import AtiCan, open_ati_can
 from drivers.ati_can.fake import MATRIX, AtiCanFake
 from drivers.ati_can.wrench import moved_wrench
 from drivers.device import SampleFlag
-from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
 from tests.drivers.scripted_can import Exchange, ScriptedCanBus
@@ -66,10 +66,6 @@ def test_a_script_that_is_not_followed_fails() -> None:
         unread.send(frame(0x205))
     with pytest.raises(AssertionError, match="never sent"), ScriptedCanBus(set_up()):
         pass
-
-
-def test_the_counts_of_a_unit_are_the_bytes_of_the_manual() -> None:
-    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
 
 
 def test_old_firmware_is_not_asked_for_units() -> None:
@@ -263,3 +259,18 @@ def test_any_bytes_are_decoded_or_refused(one: bytes, two: bytes, three: bytes) 
     ):
         with contextlib.suppress(FrameError):  # nothing else may be raised
             decode()
+
+
+def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
+    """Source: ATI 9610-05-1030, commands 7 and 8."""
+    first, *others = set_up()
+    assert first == (frame(0x20F), [frame(0x20F, "03080011")])
+    with ScriptedCanBus([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
+        assert AtiCan(bus).identify().firmware == "3.7.0"
+    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
+
+
+def test_options_that_are_no_sensors() -> None:
+    for options in ({"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}):
+        with pytest.raises(LinkError, match="not"):
+            open_ati_can("can:virtual:options", **options)  # type: ignore[arg-type]
