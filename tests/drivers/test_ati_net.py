@@ -185,18 +185,6 @@ def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
     assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
 
 
-def test_a_request_that_is_lost_is_sent_again() -> None:
-    fake = RdtFake()
-    device = device_of(fake)
-    device.identify()
-    fake.deaf = 2  # stop and start
-    device.start()
-    batches = [device.read(0.1) for _ in range(20)]
-    assert sum(map(len, batches)) > 500
-    assert device.counters["retries"] == 1
-    assert batches[-1].lost == 0
-
-
 def test_a_device_that_is_gone_is_said_at_every_reading_until_it_is_back() -> None:
     fake = RdtFake()
     device = device_of(fake)

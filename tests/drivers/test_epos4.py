@@ -25,8 +25,6 @@ from drivers.errors import (
     ProtocolMismatchError,
 )
 from drivers.transport.can_bus import CanFrame
-from drivers.transport.faulty import Fault, Faults
-from drivers.transport.faulty_can import FaultyCanBus
 from drivers.transport.simulated_can import SimulatedCanBus
 
 RATINGS = Ratings(12.46e-3, 17.8e-3, 0.7, 1.4)
@@ -313,22 +311,6 @@ def test_a_host_that_only_waits_beats_all_the_same() -> None:
     device.close()
 
 
-def test_a_silent_drive_is_said_at_every_reading() -> None:
-    trouble = Faults()
-    device = Epos4(FaultyCanBus(SimulatedCanBus([Epos4Fake()]), trouble))
-    device.start()
-    trouble.inject(Fault.STALL, duration_s=2.0)
-    errors = 0
-    for _ in range(60):
-        try:
-            device.read(0.1)
-        except LinkTimeoutError as error:
-            errors += "fallen silent" in str(error)
-    assert errors > 10
-    assert device.counters["stalls"] == 1
-    device.close()
-
-
 def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
     device, bus = armed(Epos4Fake())
     bus.lose = lambda frame: frame.can_id == 0x601
@@ -385,15 +367,6 @@ def test_an_absent_object_is_refused_with_its_code() -> None:
     assert CanFrame(0x581, bytes.fromhex("8072600000000206")) in answers
     with pytest.raises(DriverError, match=r"epos4\.eds"):
         link.read(0x6072)
-
-
-def test_a_lost_answer_is_asked_for_again() -> None:
-    trouble = Faults()
-    device = Epos4(FaultyCanBus(SimulatedCanBus([Epos4Fake()]), trouble))
-    trouble.inject(Fault.DROP, 2)
-    assert device.identify().serial == "00c0ffee"
-    assert device.counters["retries"] >= 1
-    device.close()
 
 
 @pytest.mark.parametrize("options", [{"node_id": 0}, {"node_id": 127}, {"rate_hz": 0.0}])
