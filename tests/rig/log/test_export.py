@@ -69,11 +69,6 @@ def test_flags_and_missing_values_are_exported(tmp_path, kind):
     np.testing.assert_array_equal(columns["flags"], [0, 4, 0])
 
 
-def test_one_topic_goes_to_the_named_file(log, tmp_path):
-    target = tmp_path / "counts.csv"
-    assert export_log(log, ExportFormat.CSV, target, COUNTS) == [target]
-
-
 def test_all_topics_go_to_a_folder(log, tmp_path):
     written = export_log(log, ExportFormat.NPZ, tmp_path / "new" / "folder")
     assert {item.parent for item in written} == {tmp_path / "new" / "folder"}
