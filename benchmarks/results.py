@@ -190,7 +190,7 @@ def main() -> int:
     asked = [name for name in parser.parse_args().remake.split(",") if name]
     unknown = set(asked) - {page.name for page in PAGES} - {"old"}
     if unknown:
-        parser.error(f"there is no page {', '.join(sorted(unknown))}")
+        parser.error(f"unknown page {', '.join(sorted(unknown))}")
     since = {page: page.commits_since() for page in PAGES}
     if not asked:
         sys.stdout.write(f"{'page':20}{'made':12}{'commit':17}{'commits since':>15}{'min':>5}\n")
