@@ -33,7 +33,7 @@ class Part:
     Attributes:
         term: The term, or None.
         acts: Names of the runs in which the term acts; in all when None.
-        unwritten: The columns where there is no term.
+        unwritten: The columns if the term is None.
         precision: Prior precision of an amplitude of these, in units of the inverse squared column.
     """
 
