@@ -88,13 +88,8 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     if not first or first[0].score < 0.0:
         return Found([], [], joint, first[0].score if first else 0.0, late)
     chains = [_chain(ranking, start) for start in _starts(first)]
-    causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
-    conditional = []
-    for k, cause in enumerate(causes):
-        # next to the others every candidate may be dropped: the cause then stands as it was found
-        ranked = ranking.next_to([c for c in causes if c is not cause]) or [cause]
-        conditional.append(ranked)
-        causes[k] = ranked[0]
+    causes = max(chains, key=lambda chain: sum(c.score for c in chain))
+    causes, conditional = _settled(ranking, causes)
     return Found(causes, conditional, joint, first[0].score, late)
 
 
@@ -145,6 +140,25 @@ def _chain(ranking: Ranking, start: Scored) -> list[Scored]:
     return causes
 
 
+def _settled(
+    ranking: Ranking, causes: Sequence[Scored]
+) -> tuple[list[Scored], list[Sequence[Scored]]]:
+    """Return causes, each the best next to the others, and what competes in the place of each.
+
+    A cause that is not worth its price next to the others goes, the least first.
+    """
+    settled, conditional = list(causes), list[Sequence[Scored]]()
+    for k, cause in enumerate(causes):
+        # next to the others every candidate may be dropped: the cause then stands as it was found
+        ranked = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
+        conditional.append(ranked)
+        settled[k] = ranked[0]
+    least = min(settled, key=lambda c: c.score)
+    if least.score < 0.0 and len(settled) > 1:
+        return _settled(ranking, [c for c in settled if c is not least])
+    return settled, conditional
+
+
 def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
     """Return the probability of each candidate by its score alone, shape (n,)."""
     scores = np.array([s.score for s in ranked])
@@ -153,13 +167,15 @@ def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
 
 
 def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
-    """Return the probability of each candidate, shape (n,).
+    """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
 
-    Only what is better than no cause at all competes with the best.
+    Only what is better than no cause at all, whose score is zero, competes with the best.
     """
     scores = np.array([s.score for s in ranked])
-    kept = np.where((scores > 0.0) | (scores == scores.max()), shares_of(ranked, numbers), 0.0)
-    return np.asarray(kept / kept.sum())
+    kept = (scores > 0.0) | (scores == scores.max())
+    top = max(0.0, float(scores.max()))
+    weights = np.where(kept, np.exp(numbers.sharpness * (scores - top)), 0.0)
+    return np.asarray(weights / (weights.sum() + np.exp(-numbers.sharpness * top)))
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
@@ -205,14 +221,14 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
     of the runs by all choices of them.
     """
-    choices = float(np.log(candidate.choices))
+    choices, rare = float(np.log(candidate.choices)), float(candidate.is_function)
     if candidate.acts is not None:
+        rare += 1.0
         count, acting = len(candidate.acts), sum(candidate.acts)
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
         )
-    more = numbers.function_cost if candidate.is_function else 0.0
-    return numbers.cause_cost + more + numbers.choice_price * choices
+    return numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices
 
 
 def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
