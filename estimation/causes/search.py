@@ -42,6 +42,7 @@ class Scored:
     Attributes:
         candidate: The candidate.
         score: Mean of the families of folds, less the price of what was chosen.
+        gain: The same with the price left in.
         by_family: Score of each family of folds.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
         by_run: Products of its columns with the base's residual and with themselves, of each run.
@@ -49,6 +50,7 @@ class Scored:
 
     candidate: Candidate
     score: float
+    gain: float
     by_family: FloatArray
     amplitudes: FloatArray
     by_run: tuple[FloatArray, FloatArray]
@@ -169,12 +171,13 @@ def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
 def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
     """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
 
-    Only what is better than no cause at all, whose score is zero, competes with the best.
+    No cause at all has the score zero. What explains nothing has no share: of each weight that of
+    the same candidate without its gain is taken off.
     """
-    scores = np.array([s.score for s in ranked])
-    kept = (scores > 0.0) | (scores == scores.max())
+    scores, gains = np.array([(s.score, s.gain) for s in ranked]).T
     top = max(0.0, float(scores.max()))
-    weights = np.where(kept, np.exp(numbers.sharpness * (scores - top)), 0.0)
+    explains = -np.expm1(-numbers.sharpness * np.maximum(gains, 0.0))
+    weights = np.exp(numbers.sharpness * (scores - top)) * explains
     return np.asarray(weights / (weights.sum() + np.exp(-numbers.sharpness * top)))
 
 
@@ -200,9 +203,10 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             amplitudes = outcome.amplitudes[k]
             if outcome.replaces[k] or _sign_is_wrong(candidate, amplitudes):
                 continue
-            score = float(scores[k]) - _price(candidate, joint.numbers)
+            gain = float(scores[k])
+            score = gain - _price(candidate, joint.numbers)
             by_run = outcome.cross[:, k], outcome.own[:, k]
-            out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
+            out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
     return out
 
 
