@@ -225,9 +225,10 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
     of the runs by all choices of them.
     """
-    choices, rare = float(np.log(candidate.choices)), float(candidate.is_function)
+    choices, cause = float(np.log(candidate.choices)), candidate.cause
+    changes = isinstance(cause, Function) and "time" in cause.variables
+    rare = candidate.is_function + (changes or candidate.acts is not None)
     if candidate.acts is not None:
-        rare += 1.0
         count, acting = len(candidate.acts), sum(candidate.acts)
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
@@ -286,8 +287,8 @@ def _neighbours(candidate: Candidate) -> list[Claim]:
 def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     """Return named effects that act in some of the runs, as promising as there are.
 
-    Every effect is tried on cuts of two orders of the runs: of recording, and of the error that it
-    removes in each of them.
+    Every effect is tried on cuts of two orders of the runs: of recording, and of its size in each
+    of them.
     """
     count = len(joint.runs)
     if count < 6:
@@ -300,8 +301,8 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     for group in named.values():
         cross, own = (np.stack([s.by_run[i] for s in group]) for i in (0, 1))
         order = np.broadcast_to(np.arange(count), (len(group), count))
-        gains = np.argsort(_removed(cross, own), axis=1)[:, ::-1]
-        for runs in (order, order[:, ::-1], gains, gains[:, ::-1]):
+        sizes = np.argsort(_sizes(cross, own), axis=1)
+        for runs in (order, order[:, ::-1], sizes, sizes[:, ::-1]):
             every = np.arange(len(group))[:, None]
             sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own)]
             for one, chosen, removed in zip(group, runs, _removed(*sums), strict=True):
@@ -322,9 +323,24 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     return tried
 
 
+def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the size of candidates in each run, of that in all runs, shape (candidates, runs).
+
+    A run that shows little of a candidate is taken to have the size that all runs have.
+    """
+    everywhere = _solved(cross.sum(axis=1), own.sum(axis=1))[:, None]
+    shown = np.einsum("crj,crjk,crk->cr", everywhere, own, everywhere)
+    apart = (everywhere * cross).sum(axis=-1) - shown
+    return np.asarray(apart / (shown + 0.1 * shown.mean(axis=1, keepdims=True) + 1e-300))
+
+
 def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
     """Return the error that amplitudes remove, from products (..., k) and (..., k, k)."""
+    return np.asarray((cross * _solved(cross, own)).sum(axis=-1))
+
+
+def _solved(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return amplitudes from products (..., k) and (..., k, k)."""
     size = np.einsum("...kk->...", own)[..., None, None]
     steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[-1])
-    solved = np.linalg.solve(steady, cross[..., None])[..., 0]
-    return np.asarray((cross * solved).sum(axis=-1))
+    return np.asarray(np.linalg.solve(steady, cross[..., None])[..., 0])
