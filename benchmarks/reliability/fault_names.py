@@ -80,7 +80,6 @@ SAID = {
     "qia128": _UNNUMBERED_STREAM,
     "teensy": _NUMBERED_STREAM,
     "teensy-master": _NUMBERED_STREAM,
-    "teensy-can": _NUMBERED_STREAM | {Fault.DELAY: _DAMAGED_AND_MISSING | {"duplicates"}},
     "usb520": {
         **_UNNUMBERED_STREAM,
         Fault.DROP: _DAMAGED | _SILENT,

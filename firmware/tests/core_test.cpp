@@ -8,7 +8,6 @@
 #include <limits>
 #include <vector>
 
-#include "../core/can_segments.hpp"
 #include "../core/profile_grasper.hpp"
 #include "../proofs/world.hpp"
 #include "guards_test.hpp"
@@ -62,24 +61,6 @@ TEST_CASE("a missing reading trips before anything is computed from it") {
     const rig::Crossing crossing = reference.check(inputs);
     CHECK(crossing.code == rig::kSensorMissing);
     CHECK(crossing.channel == 1);
-}
-
-TEST_CASE("frames survive being cut into CAN pieces") {
-    const Bytes wire = proofs::wire_of(Bytes(42, 7));
-    rig::CanSplitter splitter;
-    rig::CanJoiner joiner;
-    Bytes joined;
-    int pieces = 0;
-    for (std::uint8_t byte : wire) {
-        splitter.take(byte, [&](const std::uint8_t* data, std::size_t size) {
-            ++pieces;
-            joiner.take(data, size, [&](const std::uint8_t* bytes, std::size_t count) {
-                joined.insert(joined.end(), bytes, bytes + count);
-            });
-        });
-    }
-    CHECK(pieces == 7);
-    CHECK(joined == wire);
 }
 
 TEST_CASE_TEMPLATE("any bytes do no harm", Profile, rig::ReferenceProfile, rig::GrasperProfile) {
