@@ -51,6 +51,12 @@ RULES = (
     ("false", "true"),
     ("0", "1"),
 )
+EQUIVALENT = {
+    "std::uint32_t sequence_ = 0;": "a board sends samples from a start on, which sets it to 0",
+    "return {{0, 0, 0, 0, kFullScaleE4}": "of a board's own gains only the largest command is read",
+    "std::int64_t far_ticks_ = 0;": "a first target beyond the window is refused, so the first tick sets it to 0",
+}
+"""Beginnings of lines whose change no input can show, and why."""
 _STATEMENT = re.compile(r"\s+[\w.\[\]>()*-]+(\s*[-+*|&]?=\s|\(|\+\+|--).*;(\s*//.*)?")
 _NO_CODE = re.compile(r"\s*(//|#|\"|static_assert|using|template|constexpr char|namespace|\}|$)")
 
@@ -240,9 +246,12 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     killed = {name: [test for test, hit in found.items() if hit] for name, found in tried.items()}
     count = Counter(test for tests in killed.values() for test in tests)
     alone = Counter(tests[0] for tests in killed.values() if len(tests) == 1)
-    lived = [name for name, tests in killed.items() if not tests]
+    unseen = [name for name, tests in killed.items() if not tests]
+    alike = {n: why for n in unseen for line, why in EQUIVALENT.items() if f": {line}" in n}
+    lived = [name for name in unseen if name not in alike]
     unfinished = sum(len(tried[name]) < len(TESTS) for name in lived)
     total = max(1, len(tried))
+    noticed = sum(bool(tests) for tests in killed.values())
     asked = Counter(test for found in tried.values() for test in found)
     lines = [
         "# Mutants of the core",
@@ -251,8 +260,8 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "of one line of `firmware/core`, drawn by a fixed seed. Unit tests and random sequences",
         "see every mutant, every small input those that passed both, the contract tests the rest.",
         "",
-        f"{len(tried)} mutants tried so far, {len(tried) - len(lived)} noticed"
-        f" ({(len(tried) - len(lived)) / total:.0%}); {len(results) - len(tried)} did not compile.",
+        f"{len(tried)} mutants tried so far, {noticed} noticed ({noticed / total:.0%}),"
+        f" {len(tried) - noticed - len(lived)} equivalent; {len(results) - len(tried)} did not compile.",
         f"Of those not noticed, {unfinished} have not yet been held against every test.",
         "",
         "| tests | mutants seen | noticed | share of those seen | noticed by nothing before |",
@@ -271,6 +280,7 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     lines += [
         f"- `{name}`{'' if len(tried[name]) == len(TESTS) else ' *'}" for name in sorted(lived)
     ] or ["- none"]
+    lines += ["", "Equivalent:", "", *(f"- `{name}`: {why}." for name, why in alike.items())]
     now = Provenance.now(SEED)
     lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, seed {SEED}."]
     return "\n".join(lines) + "\n"

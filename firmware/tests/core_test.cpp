@@ -233,7 +233,27 @@ TEST_CASE("a motor's heat outlives its session, and a hot motor is not armed unt
     desk.inputs.current = 0;
     desk.run(40);
     desk.arm();
-    CHECK(desk.result() == rig::kOk);
+    REQUIRE(desk.result() == rig::kOk);
+    desk.inputs.current = 200;
+    desk.setpoints(std::vector<std::int32_t>(100));
+    desk.run(40);
+    desk.ping();
+    desk.run(40);  // a cold motor would have 100 ms
+    CHECK(desk.board.trip() == rig::kOverheated);
+}
+
+TEST_CASE("a command number is new up to half the range ahead, and an old one never is") {
+    rig::Session session;
+    session.begin(1, 100);
+    for (unsigned ahead : {1U, 2U, 0x7FFFU}) CHECK(session.is_new(static_cast<std::uint16_t>(100 + ahead)));
+    for (unsigned ahead : {0U, 0x8000U, 0xFFFFU}) CHECK_FALSE(session.is_new(static_cast<std::uint16_t>(100 + ahead)));
+}
+
+TEST_CASE("a controller that begins at a motor far from 0 does not take that for a speed") {
+    rig::Controller controller;
+    controller.reset({0, 0, 1, 1, 10000});
+    CHECK(controller.tick(0, 0, 500) == 0);
+    CHECK(controller.tick(0, 0, 507) == 7);
 }
 
 TEST_CASE("a late tick is judged by its time: travel at the same speed is no jump, and more is") {

@@ -65,6 +65,13 @@ inline const Guard kGuards[] = {
          l.max_twist = 8;
      },
      [](Inputs& i, int, int b) { i.spindle = 2, i.motor = b; }},
+    {rig::kEncodersDisagree, 0, 2,
+     [](Limits& l) {
+         l.motor_per_turn = -40;
+         l.spindle_per_turn = 10;
+         l.max_twist = 8;
+     },
+     [](Inputs& i, int since, int b) { i.motor = since % 2 ? 4 + b : -4; }},
     {rig::kEncodersDisagree, 2, 1,
      [](Limits& l) {
          l.jaw_per_turn = 20;
