@@ -54,7 +54,7 @@ RULES = (
 EQUIVALENT = {
     "std::uint32_t sequence_ = 0;": "a board sends samples from a start on, which sets it to 0",
     "return {{0, 0, 0, 0, kFullScaleE4}": "of a board's own gains only the largest command is read",
-    "std::int64_t far_ticks_ = 0;": "a first target beyond the window is refused, so the first tick sets it to 0",
+    "std::int64_t far_ticks_ = 0;": "the first target is within the window, so the first tick sets it to 0",
 }
 """Beginnings of lines whose change no input can show, and why."""
 _STATEMENT = re.compile(r"\s+[\w.\[\]>()*-]+(\s*[-+*|&]?=\s|\(|\+\+|--).*;(\s*//.*)?")
@@ -261,7 +261,7 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "see every mutant, every small input those that passed both, the contract tests the rest.",
         "",
         f"{len(tried)} mutants tried so far, {noticed} noticed ({noticed / total:.0%}),"
-        f" {len(tried) - noticed - len(lived)} equivalent; {len(results) - len(tried)} did not compile.",
+        f" {len(alike)} equivalent; {len(results) - len(tried)} did not compile.",
         f"Of those not noticed, {unfinished} have not yet been held against every test.",
         "",
         "| tests | mutants seen | noticed | share of those seen | noticed by nothing before |",
