@@ -15,9 +15,6 @@ from estimation.causes.joint import Joint, Next, Part
 from estimation.causes.laid import Laid
 from estimation.recording import FloatArray
 
-MOST_CHANGE = 2.0
-"""Factor by which the largest linear term of an equation may change next to a cause."""
-
 
 @dataclass(frozen=True)
 class Block:
@@ -45,9 +42,7 @@ class Outcome:
     Attributes:
         errors: For each family of folds, part to squared error, shape (runs, causes).
         amplitudes: On all runs, shape (causes, k).
-        replaces: Whether a cause stands in for the largest linear term of an equation: a reading of
-            the target through another sensor explains any equation, with no use for the declared
-            terms, but a cause comes in addition to them. Shape (causes,).
+        changes: Equation to the factor by which its largest linear term changes, shape (causes,).
         cross: Products of the columns with the base's residual within runs, weighted, shape
             (runs, causes, k).
         own: Products of the columns with themselves, shape (runs, causes, k, k).
@@ -55,7 +50,7 @@ class Outcome:
 
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
-    replaces: NDArray[np.bool_]
+    changes: Mapping[str, FloatArray]
     cross: FloatArray
     own: FloatArray
 
@@ -138,17 +133,11 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     entered = {name for name, _ in block.base}
     changes = {
         name: declared[:, at] / (joint.declared[at] or 1.0)
-        for name, at in joint.largest_linear().items()
+        for name, (at, _) in joint.largest_linear.items()
         if name in entered
     }
-    kept = [(change > 1.0 / MOST_CHANGE) & (change < MOST_CHANGE) for change in changes.values()]
-    replaces = ~np.logical_and.reduce(kept) if kept else np.zeros(len(base), dtype=np.bool_)
-    for found in errors:
-        for name, change in changes.items():
-            # in the unit of the equation's largest reading, whose noise the residual may be
-            found[name, "within"] *= np.maximum(1.0, 1.0 / np.maximum(change, 1e-3) ** 2)
     residual = right - np.einsum("rcik,i->rck", cross, usual)
-    return Outcome(errors, amplitudes, replaces, residual, own)
+    return Outcome(errors, amplitudes, changes, residual, own)
 
 
 def _squared(

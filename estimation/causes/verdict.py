@@ -194,7 +194,8 @@ def _judged(
     confirmed, notes = _confirmed(found, held_out, numbers)
     for one in confirmed:
         cause = one.scored.candidate.cause
-        acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], one.scored.candidate)
+        earlier = [k.scored.candidate for k in kept]
+        acts_in, settled = held_out.acts_in(earlier, one.scored.candidate)
         if settled:
             notes.append(
                 f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
@@ -233,9 +234,7 @@ def _judged(
     return kept, findings, notes
 
 
-def _confirmed(
-    found: Found, held_out: HeldOut, numbers: Numbers
-) -> tuple[list[Kept], list[str]]:
+def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:
     """Return the causes with evidence on the test runs next to the others, and notes on the rest.
 
     The one with the least evidence goes first: two effects may need one another.
@@ -246,7 +245,9 @@ def _confirmed(
         left.append(Kept(likely[0].best, likely, ranked))
     while left:
         evidence = [
-            held_out.evidence([o.scored.candidate for o in left if o is not one], one.scored.candidate)
+            held_out.evidence(
+                [o.scored.candidate for o in left if o is not one], one.scored.candidate
+            )
             for one in left
         ]
         if min(evidence) >= numbers.kept_evidence:
