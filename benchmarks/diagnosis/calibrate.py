@@ -50,7 +50,7 @@ class Searched:
 
     Attributes:
         name: The case.
-        candidates: Family, score and gain of each candidate in the first place.
+        candidates: Family, score and gain of the best of each in the first place.
         families: True families; none in a clean campaign.
     """
 
@@ -109,9 +109,10 @@ def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searc
         add_instruments(layout, train)
         found = search(layout.select(train))
         ranked = found.conditional[0] if found.conditional else found.first
+        best = {c.candidate.cause.family: c for c in reversed(ranked)}
         families = [family for group in case.truth.families for family in group]
         content = {
-            "candidates": [(c.candidate.cause.family, c.score, c.gain) for c in ranked],
+            "candidates": [(name, c.score, c.gain) for name, c in best.items()],
             "families": families,
         }
         write_text_atomic(path, json.dumps(content))

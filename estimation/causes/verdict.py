@@ -171,17 +171,13 @@ def answer(
 
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
-    """Return the posterior over families of one slot, the likeliest first."""
-    shares: dict[str, float] = {}
+    """Return the posterior over families of one slot, each by its best candidate, best first."""
     best: dict[str, Scored] = {}
-    for scored, weight in zip(ranked, posterior(ranked, numbers), strict=True):
-        family = scored.candidate.cause.family
-        shares[family] = shares.get(family, 0.0) + float(weight)
-        best.setdefault(family, scored)
-    return sorted(
-        (Probability(f, share, best[f]) for f, share in shares.items() if share > 0.0),
-        key=lambda p: -p.share,
-    )
+    for scored in ranked:
+        best.setdefault(scored.candidate.cause.family, scored)
+    shares = posterior(list(best.values()), numbers)
+    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
+    return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 
 def _judged(
