@@ -46,6 +46,7 @@ class Outcome:
         cross: Products of the columns with the base's residual within runs, weighted, shape
             (runs, causes, k).
         own: Products of the columns with themselves, shape (runs, causes, k, k).
+        base: Products of the base's columns with the columns, shape (runs, causes, base, k).
     """
 
     errors: Sequence[Mapping[Part, FloatArray]]
@@ -53,6 +54,7 @@ class Outcome:
     changes: Mapping[str, FloatArray]
     cross: FloatArray
     own: FloatArray
+    base: FloatArray
 
 
 def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
@@ -136,8 +138,16 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
         for name, (at, _) in joint.largest_linear.items()
         if name in entered
     }
-    residual = right - np.einsum("rcik,i->rck", cross, usual)
-    return Outcome(errors, amplitudes, changes, residual, own)
+    # the columns as they were before declared ones were taken off: in some runs these differ
+    gram = np.asarray(sum((weights[p] * joint.gram[p] for p in inside), zero))
+    count = block.taken.shape[1]
+    mixed = block.taken.swapaxes(1, 2) @ cross[:, :, :count]
+    own = own + mixed + mixed.swapaxes(2, 3)
+    own += block.taken.swapaxes(1, 2) @ gram[:, None, :count, :count] @ block.taken
+    right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
+    cross = cross + gram[:, None, :-1, :count] @ block.taken
+    residual = right - (usual @ cross)
+    return Outcome(errors, amplitudes, changes, residual, own, cross)
 
 
 def _squared(

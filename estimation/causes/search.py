@@ -49,7 +49,8 @@ class Scored:
         gain: The same with the price left in.
         by_family: Score of each family of folds.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
-        by_run: Products of its columns with the base's residual and with themselves, of each run.
+        by_run: Products of its columns with the base's residual, with themselves and with the base,
+            of each run.
     """
 
     candidate: Candidate
@@ -57,7 +58,7 @@ class Scored:
     gain: float
     by_family: FloatArray
     amplitudes: FloatArray
-    by_run: tuple[FloatArray, FloatArray]
+    by_run: tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
                 continue
             gain = float(scores[k])
             score = gain - _price(candidate, joint.numbers)
-            by_run = outcome.cross[:, k], outcome.own[:, k]
+            by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
             out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
     return out
 
@@ -329,19 +330,21 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     count = len(joint.runs)
     if count < 6:
         return []
+    inverse = joint.left_out([[]]).inverse[0]
     named: dict[int, list[Scored]] = {}
     for one in everything:
         if not one.candidate.is_function:
             named.setdefault(len(one.amplitudes), []).append(one)
     promise: list[tuple[float, Candidate, tuple[int, ...]]] = []
     for group in named.values():
-        cross, own = (np.stack([s.by_run[i] for s in group]) for i in (0, 1))
+        cross, own, base = (np.stack([s.by_run[i] for s in group]) for i in range(3))
         order = np.broadcast_to(np.arange(count), (len(group), count))
         sizes = np.argsort(_sizes(cross, own), axis=1)
         for runs in (order, order[:, ::-1], sizes, sizes[:, ::-1]):
             every = np.arange(len(group))[:, None]
-            sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own)]
-            for one, chosen, removed in zip(group, runs, _removed(*sums), strict=True):
+            sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own, base)]
+            gains = _removed(inverse, *sums)
+            for one, chosen, removed in zip(group, runs, gains, strict=True):
                 promise += [
                     (float(r), one.candidate, tuple(sorted(chosen[: k + 2].tolist())))
                     for k, r in enumerate(removed)
@@ -370,9 +373,19 @@ def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
     return np.asarray(apart / (shown + 0.1 * shown.mean(axis=1, keepdims=True) + 1e-300))
 
 
-def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the error that amplitudes remove, from products (..., k) and (..., k, k)."""
-    return np.asarray((cross * _solved(cross, own)).sum(axis=-1))
+def _removed(
+    inverse: FloatArray, cross: FloatArray, own: FloatArray, base: FloatArray
+) -> FloatArray:
+    """Return the error that amplitudes remove, fitted together with the base.
+
+    Args:
+        inverse: Of the base's normal matrix, shape (base, base).
+        cross: Products of the columns with the base's residual, shape (..., k).
+        own: With themselves, shape (..., k, k).
+        base: Of the base's columns with them, shape (..., base, k).
+    """
+    beyond = own - base.swapaxes(-1, -2) @ inverse @ base
+    return np.asarray((cross * _solved(cross, beyond)).sum(axis=-1))
 
 
 def _solved(cross: FloatArray, own: FloatArray) -> FloatArray:
