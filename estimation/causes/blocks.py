@@ -134,7 +134,7 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
     entered = {name for name, _ in block.base}
     changes = {
-        name: declared[:, at] / (joint.declared[at] or 1.0)
+        name: declared[:, at] / (joint.whole(usual)[at] or 1.0)
         for name, (at, _) in joint.largest_linear.items()
         if name in entered
     }
