@@ -15,7 +15,7 @@ from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
 from rig.studies.zhang import rest as zhang_rest
-from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, with_instrument
+from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, simulate, with_instrument
 from rig.studies.zhang.psm_grasp import configurations, grasp_and_release
 from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
@@ -49,29 +49,6 @@ def test_shown_torque_is_the_true_one_through_both_couplings(psm):
     np.testing.assert_allclose(leaked[:2], 0, atol=1e-9)
 
 
-def test_paths_keep_to_the_limits_and_a_held_gripper_stays(psm):
-    rng = np.random.default_rng(3)
-    path = random_path(rng, 20.0)
-    limits = np.array([(joint.lower, joint.upper) for joint in psm.table.joints])
-    assert np.all((path >= limits[:, 0]) & (path <= limits[:, 1]))
-    moving = moving_gripper(rng, 20.0, 0.8)
-    assert 0 < moving.min() < 0.1
-    assert moving.max() == pytest.approx(0.8)
-    motion = with_gripper(path, 0.2, 0.8)
-    assert motion.position[0, GRIPPER] == pytest.approx(0.8)
-    assert np.all(motion.position[lead_samples() :, GRIPPER] == 0.2)
-
-
-def test_every_instrument_has_a_nominal_coupling():
-    rng = np.random.default_rng(4)
-    arm = draw_arm(rng)
-    for name in KINDS:
-        psm = with_instrument(rng, arm, name)
-        assert psm.leak.shape == (4, 4)
-        assert 0 < np.abs(psm.leak - np.eye(4)).max() < 0.8
-        assert np.array(psm.table.wrist_coupling).shape == (3, 3)
-
-
 def test_grasps_hold_what_the_paper_holds(psm):
     rng = np.random.default_rng(5)
     force = grasp_and_release(rng).force(psm)
@@ -84,13 +61,6 @@ def test_grasps_hold_what_the_paper_holds(psm):
     assert np.ptp([held[place == k].mean() for k in range(5)]) > 0.05
     wrist = grasp.motion.position[:, WRIST]
     np.testing.assert_allclose(wrist[place == 1, 1], np.radians(60.0))
-
-
-def test_networks_see_the_gripper_from_joint_3_on():
-    for joint in range(7):
-        names = zhang_networks.input_names(joint, gripper=True)
-        assert any(name.startswith("q7") for name in names) == (joint >= 2)
-        assert not any(name[1] == "7" for name in zhang_networks.input_names(joint, gripper=False))
 
 
 def test_states_are_causal(psm):
@@ -168,16 +138,6 @@ def here(one_seed, seeds, workers, start):
 def nothing_left(one_seed, seeds, workers, start):
     assert seeds == []
     return iter(())
-
-
-def test_motion_of_a_run_does_not_trail_a_smooth_path():
-    time = np.arange(200) / RATE_HZ
-    rise = np.outer(0.3 * time**4 - time**2, np.ones(GRIPPER + 1))
-    run = PsmRun(rise, np.zeros_like(rise), np.zeros_like(rise))
-    motion = zhang_physics.motion_of_run(run)
-    known = slice(zhang_physics.WINDOW, None)
-    np.testing.assert_allclose(motion.velocity[known, 0], (1.2 * time**3 - 2 * time)[known])
-    np.testing.assert_allclose(motion.acceleration[known, 0], (3.6 * time**2 - 2)[known])
 
 
 @torch_only
