@@ -1,6 +1,7 @@
 """Pages of HTML: well formed, without references to anything outside, and quiet in a browser."""
 
 import re
+import subprocess
 from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
