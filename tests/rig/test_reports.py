@@ -23,7 +23,7 @@ from rig.reports.first_look import first_look
 from rig.studies.oneill.page import page
 from rig.studies.oneill.study import Source, run_study
 from tests.estimation.synthetic import campaign
-from tests.rig.browser import Opened, chromium
+from tests.rig.browser import chromium
 
 pytestmark = pytest.mark.integration
 
@@ -113,11 +113,14 @@ def test_the_screening_page_describes_the_residual_and_no_more(pages):
 @NAMES
 def test_a_browser_opens_a_page_without_an_error(pages, name, tmp_path):
     path = write_report(tmp_path / f"{name}.html", pages[name])
+    messages: list[str] = []
     with chromium() as browser:
-        opened = Opened(browser, path)
-        assert opened.messages == []
-        assert opened.page.locator("svg").count() == 3
-        opened.close()
+        opened = browser.new_page()
+        opened.on("console", lambda m: messages.append(m.text))
+        opened.on("pageerror", lambda e: messages.append(str(e)))
+        opened.goto(path.as_uri())
+        assert messages == []
+        assert opened.locator("svg").count() == 3
 
 
 def test_figures_do_not_share_ids_and_thin_long_lines():
