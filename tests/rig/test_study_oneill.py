@@ -103,16 +103,6 @@ def test_the_reference_part_is_picked_and_said(tmp_path, monkeypatch):
     assert "do not apply" in other.notes[0]
 
 
-def test_an_archive_of_several_parts_is_narrowed(tmp_path, monkeypatch):
-    names = ["Tool_4_Maryland_L_4/00", "Tool_4_Maryland_L_4/01", "Tool_5_Maryland_L_2/00"]
-    monkeypatch.setattr(study, "open_campaign", lambda path: named(names))
-    archive = tmp_path / "everything.tar.xz"
-    archive.touch()
-    source = open_reference(archive)
-    assert source.campaign.names == tuple(names[:2])
-    assert "2 of 3 runs" in source.notes[0]
-
-
 def command_line() -> typer.Typer:
     app = typer.Typer()
     app.add_typer(study_app)

@@ -17,7 +17,6 @@ from rig.studies.oneill import networks as study
 from rig.studies.oneill import networks_page as shown
 from rig.studies.oneill import study as linear
 from rig.studies.oneill.closing_table import CAUSAL, closing_table, held_out_masks
-from rig.studies.oneill.data import network_tables
 from rig.studies.oneill.networks import CHANNELS, NetworkStudy, jobs, run_networks
 from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
 from rig.studies.oneill.study import Source
@@ -82,13 +81,6 @@ def test_every_row_of_the_papers_tables_has_a_job():
     }
     assert set(PAPER) <= planned
     assert len(PAPER) == 4 + 9 + 9 + 10 + 10
-
-
-def test_data_of_experiment_3_is_missed_out_loud(tmp_path):
-    tables, notes = network_tables(with_jaw(), {"00": "flagged"}, tmp_path)
-    assert list(tables) == ["neutral"]
-    assert len(tables["neutral"].conditions["frequency_hz"]) == 8
-    assert [n for n in notes if "experiment 3, pitch" in n]
 
 
 @pytest.fixture(scope="module")

@@ -15,14 +15,13 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
 from rig.arm.hidden import FAMILIES
-from rig.arm.simulated import GRIP_N_M, contact_motion, passed_on, pin
+from rig.arm.simulated import contact_motion
 from rig.studies.pique.wrench import (
     BODY,
     HAND,
     OURS,
     SERIES,
     THESIS,
-    TWISTED,
     in_tip_frame,
     one_arm,
 )
@@ -53,19 +52,6 @@ def test_the_command_reports_every_family(tmp_path, monkeypatch):
     assert all(f"| {family} |" in out.read_text() for family in FAMILIES)
     assert f"Table {BODY}" in out.read_text()
     assert "| thesis | 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in out.read_text()
-
-
-def test_a_pin_passes_on_forces_and_no_more_torsion_than_the_grip_holds():
-    rng = np.random.default_rng(3)
-    motion = contact_motion(rng, 20.0)
-    wrench = pin(rng, motion, *TWISTED)
-    assert np.abs(wrench[:, :3]).max(axis=0) == pytest.approx(TWISTED[0], rel=0.3)
-    felt = passed_on(motion, wrench)
-    assert np.array_equal(felt[:, :3], wrench[:, :3])
-    torsion = np.abs(in_tip_frame(felt, motion.position)[:, 5])
-    assert torsion.max() == pytest.approx(GRIP_N_M, rel=1e-6)
-    gentle = pin(rng, motion, TWISTED[0], 0.9 * GRIP_N_M)
-    assert np.allclose(passed_on(motion, gentle), gentle)
 
 
 def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():

@@ -35,17 +35,6 @@ def test_without_friction_the_papers_equations_give_the_force():
     assert played["force_n"][at].mean() == pytest.approx(1.5, abs=0.01)
 
 
-def test_a_held_grasp_lets_go_of_friction_and_not_of_force():
-    axis = PROTOTYPES["third"].axes["pitch"][0]
-    played = play_axis(axis, hold(axis, 1.5, 10.0), 0)
-    current, force = (
-        [values[round(t * RATE_HZ) :][:400].mean() for t in (1.1, 10.5)]
-        for values in (played["motor_current_a"], played["force_n"])
-    )
-    assert current[1] < 0.85 * current[0]
-    assert force[1] == pytest.approx(force[0], rel=0.03)
-
-
 def test_a_drawn_friction_is_repeated_by_its_seed_and_moves_the_current():
     axis = PROTOTYPES["third"].axes["pitch"][0]
     own = play_axis(axis, hold(axis, 1.5, 1.0), 0)["motor_current_a"]
