@@ -274,3 +274,16 @@ def test_a_zero_that_moves_within_a_run_is_an_alarm(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "ALARM: zero of motor_current_a" in said
     assert "good: zero of distal_torque_n_m" in said
+
+
+def test_before_it_starts_a_session_states_what_it_needs_and_what_moves(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    shared = ["--operator", "Ada", "--yes", "--store", "store"]
+    assert main(["calibrate", "torque", "--masses-g", "50,100,150", *shared, "-o", "a"]) == 0
+    said = capsys.readouterr().err
+    first = said.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
+    assert first < said.index("The rig does not move by itself.") < said.index("1/7")
+    assert main(["calibrate", "current", *shared, "-o", "b"]) == 0
+    assert "The rig moves by itself: the spindle turns between" in capsys.readouterr().err

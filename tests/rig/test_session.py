@@ -8,14 +8,16 @@ import pytest
 
 from drivers.teensy.driver import SampleBatch
 from drivers.teensy.protocol import (
+    STATUS_ARMED,
     STATUS_LIMIT_TRIPPED,
+    STATUS_QUEUE_DRY,
     STATUS_SATURATED,
 )
 from drivers.transport.simulated import SimulatedTransport
 from estimation.recording import Flag
 from rig.bench.session import LoggerStalledError, Session
 from rig.errors import ExitCode, SafetyTripError, exit_code_of
-from rig.machines.reading import reading_of
+from rig.machines.reading import reading_of, with_setpoints
 from tests.rig.simulated import Wrapped, is_armed, simulated, transport
 
 pytestmark = pytest.mark.integration
@@ -170,3 +172,18 @@ def test_what_the_board_complains_of_becomes_a_flag():
     batch = SampleBatch(counts, np.arange(len(counts)) * 1000, 0)
     reading = reading_of(batch, config.calibration_set(), {}, 0)
     assert reading.flags[:5].tolist() == [Flag.SATURATED] * 3 + [Flag.SUSPECT, 0]
+
+
+def test_setpoints_are_numbered_past_samples_lost_between_two_readings():
+    config = simulated()
+    with Session(config, transport(config)) as session:
+        counts = next(session.rest(0.1)).counts[:6]
+    counts["status"] = [0, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_QUEUE_DRY]
+    counts["sequence"] = [10, 11, 12, 15, 16, 17]
+    batch = SampleBatch(counts, np.arange(6) * 1000, 0)
+    reading = reading_of(batch, config.calibration_set(), {}, 0)
+    first = with_setpoints(reading, 0, 100, None)
+    assert first.setpoint.tolist() == [-1, 0, 1, 4, 5, -1]
+    assert first.flags.tolist() == [0, 0, 0, 0, 0, Flag.STALE]
+    later = with_setpoints(reading, 6, 100, before=7)
+    assert later.setpoint.tolist() == [-1, 6, 7, 10, 11, -1]

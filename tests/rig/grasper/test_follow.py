@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy_master.fake import REACH, open_fake
 from drivers.transport.faulty import Faults
@@ -159,3 +160,9 @@ def test_what_cannot_be_followed_is_refused(config, url, said, library, tmp_path
     chosen = bench if config == "bench" else load_config(Path(config))
     with pytest.raises(UsageError, match=said):
         following.follow_master(chosen, url, 1.0, 0.2, tmp_path)
+
+
+def test_a_silent_master_is_reported(potentiometers):
+    potentiometers.stop()
+    with pytest.raises(LinkTimeoutError, match="sent nothing"):
+        next(setpoints(potentiometers, CHIEF, HERE, 1.0))
