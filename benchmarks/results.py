@@ -163,7 +163,7 @@ PAGES = (
         "rig study pique --data {data}/psm --also one19 --out docs/results/pique.md"
         " --figures docs/figures",
         f"rig/studies/pique {_ARM}",
-        10,
+        1,
     ),
     Page("reliability", "python -m benchmarks.reliability", "drivers firmware rig/recording", 90),
     Page(
