@@ -6,7 +6,7 @@ column, and the model's own offset becomes the mean over the runs.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -66,6 +66,8 @@ class _Problem:
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
+    kept: dict[tuple[int, int], tuple[list[float], FloatArray]] = field(default_factory=dict)
+    """Each run's and term's last shape and columns: a search moves one term's shape at a time."""
 
     @property
     def shape_parameters(self) -> list[Parameter]:
@@ -76,9 +78,12 @@ class _Problem:
         """Return all signed columns of a run, shape (n, columns)."""
         blocks = []
         rest = list(shape)
-        for term in self.model.terms:
+        for place, term in enumerate(self.model.terms):
             own, rest = rest[: len(term.effect.shape)], rest[len(term.effect.shape) :]
-            blocks.append(run.columns(term, own))
+            last = self.kept.get((id(run), place))
+            if last is None or last[0] != own:
+                last = self.kept[id(run), place] = own, run.columns(term, own)
+            blocks.append(last[1])
         return np.column_stack(blocks) * self.signs
 
     def gram(self, run: FitRun, shape: Sequence[float]) -> FloatArray:

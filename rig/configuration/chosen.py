@@ -66,7 +66,7 @@ def choose_config(config: Path | None, sim: bool) -> Path:
         return SIMULATED
     chosen = config or default_config()
     if chosen is None:
-        raise UsageError("No rig is configured.", "There is no default.", ONE_OF)
+        raise UsageError("No rig is configured.", "None is taken by default.", ONE_OF)
     return chosen
 
 
