@@ -101,7 +101,7 @@ def drawn(count: int) -> list[Mutant]:
     order = random.Random(SEED)
     files = []
     for file in sorted((FIRMWARE / "core").glob("*.hpp")):
-        if file.name in ("contract.hpp", "can_segments.hpp", "profile_grasper.hpp"):
+        if file.name in ("contract.hpp", "profile_grasper.hpp"):
             continue  # generated; not of this board
         found = list(mutants_of(file))
         order.shuffle(found)
@@ -112,32 +112,32 @@ def drawn(count: int) -> list[Mutant]:
 
 
 def killers_of(
-    mutant: Mutant, settings: Path, known: dict[str, bool], tests: list[str]
+    mutant: Mutant, folder: Path, known: dict[str, bool], tests: list[str]
 ) -> dict[str, bool] | None:
     """Return which tests notice a mutant, None where it does not compile.
 
     Args:
         mutant: The change.
-        settings: Gains and limits for the programs.
+        folder: Where a copy of the firmware and the settings of the programs are.
         known: What is known of it.
         tests: Which tests to make, of `TESTS`.
     """
     known = dict(known)
-    with tempfile.TemporaryDirectory() as name:
-        firmware = Path(name) / "firmware"
-        for part in ("core", "boards", "host", "proofs", "tests"):
-            shutil.copytree(FIRMWARE / part, firmware / part)
-        source = firmware / "core" / mutant.file
-        lines = source.read_text().splitlines()
-        lines[mutant.line - 1] = mutant.after
-        source.write_text("\n".join(lines) + "\n")
+    source = folder / "core" / mutant.file
+    sound = source.read_text()
+    lines = sound.splitlines()
+    lines[mutant.line - 1] = mutant.after
+    source.write_text("\n".join(lines) + "\n")
+    try:
         for test in lacking(known, tests):
             if test in LATER and any(known.values()):
                 break
-            notices = TESTS[test](firmware, settings)
+            notices = TESTS[test](folder, folder / "settings.bin")
             if notices is None:
                 return None
             known[test] = notices
+    finally:
+        source.write_text(sound)
     return known
 
 
@@ -148,13 +148,14 @@ def lacking(known: dict[str, bool], tests: list[str]) -> list[str]:
 
 
 def _hunt(firmware: Path, settings: Path) -> bool | None:
-    program = _built(firmware, "proofs/hunt.cpp", "-O0")
+    program = _built(firmware, "proofs/hunt.cpp", "-O0", "-include", "own.hpp")
     return None if program is None else not all(_passes(program, settings, *w) for w in _HUNTS)
 
 
-def _unit(firmware: Path, settings: Path) -> bool:
-    program = _built(firmware, "tests/core_test.cpp", *_UNIT)
-    return program is None or not _passes(program)
+def _unit(firmware: Path, settings: Path) -> bool | None:
+    own = ("-O0", "-include", "unit.hpp", "-DRIG_MAIN_APART", "main.o")
+    program = _built(firmware, "tests/core_test.cpp", *own)
+    return None if program is None else not _passes(program)
 
 
 def _small(firmware: Path, settings: Path) -> bool:
@@ -163,15 +164,34 @@ def _small(firmware: Path, settings: Path) -> bool:
 
 
 _HUNTS = (("commands", "0", "400", "1"), ("faults", "100", "40", "1"))
-_UNIT = ("-O0", "-Itests/arduino", "-DARDUINO_TEENSY41")
+_HEADERS = {
+    "own.hpp": ("algorithm", "array", "cmath", "cstring", "deque", "fstream", "vector"),
+    "unit.hpp": ("doctest/doctest.h", "array", "cmath", "cstring", "fstream", "vector"),
+}
 
 
 def _built(firmware: Path, source: str, *flags: str) -> Path | None:
     program = firmware / "program"
     program.unlink(missing_ok=True)
-    words = ["g++", "-std=c++17", "-w", "-ffp-contract=off", *flags, "-o", str(program), source]
-    done = subprocess.run(words, cwd=firmware, capture_output=True, check=False)  # noqa: S603
-    return program if done.returncode == 0 else None
+    done = _compiled(firmware, source, *flags, "-o", str(program))
+    return program if done == 0 else None
+
+
+def _compiled(folder: Path, *words: str) -> int:
+    command = ["g++", "-std=c++17", "-w", "-ffp-contract=off", *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode  # noqa: S603
+
+
+def prepare(folder: Path) -> None:
+    """Compile what every mutant shares: the headers of others, and the unit tests' main program."""
+    for file, names in _HEADERS.items():
+        (folder / file).write_text("".join(f"#include <{name}>\n" for name in names))
+    (folder / "main.cpp").write_text(
+        "#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN\n#include <doctest/doctest.h>\n"
+    )
+    parts = [("-x", "c++-header", file) for file in _HEADERS] + [("-c", "main.cpp")]
+    if any(_compiled(folder, "-O0", *words) for words in parts):
+        raise RuntimeError("g++ and doctest (apt-get install doctest-dev) are needed")
 
 
 def _passes(program: Path, *words: object) -> bool:
@@ -204,8 +224,8 @@ def _contract(firmware: Path, settings: Path) -> bool:
 
 
 TESTS: dict[str, Callable[[Path, Path], bool | None]] = {
-    "hunt": _hunt,
     "unit": _unit,
+    "hunt": _hunt,
     "small": _small,
     "contract": _contract,
 }
@@ -271,14 +291,17 @@ def main() -> int:
     state = json.loads(STATE.read_text()) if STATE.is_file() else {}
     results = state.get("results", {}) if state.get("core") == core else {}
     STATE.parent.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        settings = Path(folder) / "settings.bin"
-        write_settings(settings)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "firmware"
+        for part in ("core", "boards", "host", "proofs", "tests"):
+            shutil.copytree(FIRMWARE / part, folder / part)
+        write_settings(folder / "settings.bin")
+        prepare(folder)
         for mutant in mutants:
             known = results.get(mutant.name, {})
             if known is None or not lacking(known, options.tests):
                 continue
-            results[mutant.name] = killers_of(mutant, settings, known, options.tests)
+            results[mutant.name] = killers_of(mutant, folder, known, options.tests)
             write_text_atomic(STATE, json.dumps({"core": core, "results": results}) + "\n")
             found = results[mutant.name]
             said = "does not compile" if found is None else ", ".join(k for k in found if found[k])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.counters import DeviceCounters
+from drivers.transport.transport import Transport
 
 Check = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 """Returns for each row of candidates, shape (m, size), whether its checksum is right."""
@@ -69,6 +70,23 @@ class SlidingFrames:
         frames = np.concatenate(found) if found else np.empty((0, self._size), np.uint8)
         self._counters.frames += len(frames)
         return frames
+
+    def read(self, transport: Transport, timeout_s: float, early: bytes = b"") -> NDArray[np.uint8]:
+        """Read until a frame is confirmed or nothing comes; return the frames, shape (n, size).
+
+        Args:
+            transport: Where the bytes come from.
+            timeout_s: Longest wait for the first.
+            early: Bytes that came before.
+        """
+        give_up_s = transport.now_s + timeout_s
+        while True:
+            wait_s = 0.0 if early else max(0.0, give_up_s - transport.now_s)
+            data = early + transport.read(wait_s)
+            early = b""
+            frames = self.feed(data)
+            if len(frames) or not data or transport.now_s >= give_up_s:
+                return frames
 
     def _search(self, good: NDArray[np.bool_], first: int) -> tuple[int, bool]:
         """Return where `agree` frames in a row hold, or where to go on searching."""

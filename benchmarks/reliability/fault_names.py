@@ -69,6 +69,7 @@ SAID = {
         Fault.DELAY: _UNANSWERED | {"late"},
         Fault.STALL: _UNANSWERED | {"late"},
     },
+    "ft300": _UNNUMBERED_STREAM,
     "moteus": {
         Fault.DROP: _ASKED_AGAIN | _DAMAGED,
         Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
@@ -79,7 +80,6 @@ SAID = {
     "qia128": _UNNUMBERED_STREAM,
     "teensy": _NUMBERED_STREAM,
     "teensy-master": _NUMBERED_STREAM,
-    "teensy-can": _NUMBERED_STREAM | {Fault.DELAY: _DAMAGED_AND_MISSING | {"duplicates"}},
     "usb520": {
         **_UNNUMBERED_STREAM,
         Fault.DROP: _DAMAGED | _SILENT,

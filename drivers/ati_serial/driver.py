@@ -11,16 +11,13 @@ from drivers.ati_net.protocol import AXES, N_M_PER_UNIT, N_PER_UNIT
 from drivers.ati_serial import protocol
 from drivers.counters import Arrivals, DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
-from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.errors import DriverError
+from drivers.modbus import QUIET_S, ModbusLine
 from drivers.registry import BaudOption, Driver, RateOption
 from drivers.sliding import SlidingFrames
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
-TRIES = 3
-REPLY_TIMEOUT_S = 0.2
-QUIET_S = 0.05
-"""A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
 GAUGE_LIMIT = 32767
 
@@ -76,6 +73,14 @@ class AtiSerial:
         self._matrix = np.zeros((6, 6))
         self._counters = DeviceCounters()
         self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._line = ModbusLine(
+            transport,
+            protocol.SLAVE,
+            self._counters,
+            title="digital F/T",
+            jam=protocol.JAM,
+            check="Check its supply, the line, 1.25 Mbit/s and even parity.",
+        )
         self._frames = SlidingFrames(
             protocol.FRAME_SIZE, protocol.frame_checks, self._counters, agree=5
         )
@@ -108,10 +113,10 @@ class AtiSerial:
             LinkTimeoutError: Nobody answers.
             DriverError: The calibration is empty, or in unknown units.
         """
-        self._quieten()
+        self._line.quieten()
         first = protocol.FIRST_CALIBRATION + (self._number - 1) * protocol.CALIBRATION_STEP
         registers = b"".join(
-            self._read_registers(first + offset, count) for offset, count in protocol.PIECES
+            self._line.read(first + offset, count) for offset, count in protocol.PIECES
         )
         told = protocol.decode_calibration(registers)
         found = replace(
@@ -147,14 +152,17 @@ class AtiSerial:
         if self._calibration is None:
             self.identify()
         assert self._calibration is not None  # noqa: S101
-        self._quieten()
+        self._line.quieten()
         active = self._calibration.gains + self._calibration.offsets
         self._set_lock(protocol.UNLOCK)
-        self._ask(protocol.write_registers(protocol.ACTIVE_GAINS, active))
+        self._line.write(protocol.ACTIVE_GAINS, active)
         self._set_lock(protocol.LOCK)
         self._frames.restart()
         self._errors_at_start = self._counters.crc_errors
-        self._early = self._start_stream()
+        self._early = self._line.begin_stream(
+            protocol.encode(protocol.STREAM, protocol.START_STREAM),
+            (protocol.STREAM, protocol.SUCCESS),
+        )
         self._arrivals.restart(self._transport.now_s)
 
     def read(self, timeout_s: float) -> Batch:
@@ -165,14 +173,8 @@ class AtiSerial:
         """
         if self._calibration is None:
             raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
-        give_up_s = self._transport.now_s + timeout_s
-        while True:
-            early, self._early = self._early, b""
-            wait_s = 0.0 if early else max(0.0, give_up_s - self._transport.now_s)
-            data = early + self._transport.read(wait_s)
-            frames = self._frames.feed(data)
-            if len(frames) or not data or self._transport.now_s >= give_up_s:
-                break
+        frames = self._frames.read(self._transport, timeout_s, self._early)
+        self._early = b""
         gauges, bad = protocol.decode_frames(frames)
         self._counters.device_errors += int(np.count_nonzero(bad))
         now_s = self._transport.now_s
@@ -189,16 +191,16 @@ class AtiSerial:
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
         if self._assumed.lock_answers:
-            answer = self._ask(message)
+            answer = self._line.ask(message)
             if answer != protocol.SUCCESS:
-                raise self._refused(protocol.STORAGE, answer)
+                raise self._line.refused(protocol.STORAGE, answer)
             return
         self._transport.write(message)
         self._transport.read(QUIET_S)  # an answer all the same is let go
 
     def status(self) -> int:
         """Return the status register; only while it does not stream."""
-        return int.from_bytes(self._read_registers(protocol.STATUS, 1), "big")
+        return int.from_bytes(self._line.read(protocol.STATUS, 1), "big")
 
     def stop(self) -> None:
         """End the stream."""
@@ -210,87 +212,6 @@ class AtiSerial:
             return
         self._closed = True
         stop_and_let_go(self.stop, self._transport.close)
-
-    def _quieten(self) -> None:
-        """End the stream and wait until nothing more comes."""
-        self.stop()
-        give_up_s = self._transport.now_s + 1.0
-        while self._transport.read(QUIET_S):
-            if self._transport.now_s > give_up_s:
-                raise LinkTimeoutError(
-                    f"The sensor at {self._transport.url} does not end its stream.",
-                    "It was jammed and went on for 1 s.",
-                    "Check the adapter's sending side, or switch the sensor off and on.",
-                )
-
-    def _read_registers(self, first: int, count: int) -> bytes:
-        data = self._ask(protocol.read_registers(first, count))
-        if len(data) != 2 * count + 1 or data[0] != 2 * count:
-            raise FrameError(f"{count} registers were asked for, {len(data) - 1} bytes came.")
-        return data[1:]
-
-    def _start_stream(self) -> bytes:
-        """Let the stream begin; return the bytes of it that came with the answer.
-
-        Raises:
-            LinkTimeoutError: Nobody answers.
-            DriverError: The sensor refuses.
-        """
-        request = protocol.encode(protocol.STREAM, protocol.START_STREAM)
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
-                self._quieten()  # it may stream although its answer did not come through
-            self._transport.write(request)
-            give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
-            came = b""
-            while len(came) < len(request) and self._transport.now_s < give_up_s:
-                came += self._transport.read(give_up_s - self._transport.now_s)
-            answer, rest = came[: len(request)], came[len(request) :]
-            try:
-                function, data = protocol.decode(answer)
-            except FrameError:
-                self._counters.discarded_bytes += len(came)
-                continue
-            if (function, data) != (protocol.STREAM, protocol.SUCCESS):
-                raise self._refused(protocol.STREAM, data)
-            return rest
-        raise self._no_answer()
-
-    def _ask(self, request: bytes) -> bytes:
-        """Return the data of the answer to a request."""
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
-            self._transport.write(request)
-            give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
-            came = b""
-            while self._transport.now_s < give_up_s:
-                came += self._transport.read(give_up_s - self._transport.now_s)
-                try:
-                    function, data = protocol.decode(came)
-                except FrameError:
-                    continue  # more may be on its way
-                if function == request[1]:
-                    return data
-                raise self._refused(request[1], data)
-            self._counters.discarded_bytes += len(came)
-        raise self._no_answer()
-
-    def _refused(self, function: int, answer: bytes) -> DriverError:
-        return DriverError(
-            f"The sensor at {self._transport.url} refused function {function:#04x}.",
-            f"Its answer is {answer.hex() or 'empty'}.",
-            "Switch the sensor off and on, then start again.",
-        )
-
-    def _no_answer(self) -> LinkTimeoutError:
-        self._counters.timeouts += 1
-        return LinkTimeoutError(
-            f"No digital F/T answers at {self._transport.url}.",
-            f"It was asked {TRIES} times.",
-            "Check its supply, the line, 1.25 Mbit/s and even parity.",
-        )
 
 
 def _flags(gauges: NDArray[np.int64], bad: NDArray[np.bool_]) -> NDArray[np.uint8]:

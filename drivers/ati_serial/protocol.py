@@ -1,19 +1,21 @@
 """The digital F/T's bytes: Modbus RTU with two functions of its own, and frames of 13 bytes.
 
 Source: the RS-485 handle of the public ROS driver `ati_force_torque` and ATI manual 9620-05-Digital
-FT; Modbus application protocol 1.1b3 and serial line guide 1.02 for functions 3 and 16 and the CRC.
+FT; functions 3 and 16 and the CRC are `drivers.modbus`.
 """
 
 import struct
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import modbus
 from drivers.errors import FrameError
 
 SLAVE = 0x0A
-READ, WRITE, STREAM, STORAGE = 0x03, 0x10, 0x46, 0x6A
+STREAM, STORAGE = 0x46, 0x6A
 START_STREAM = b"\x55"
 UNLOCK, LOCK = b"\xaa", b"\x18"
 SUCCESS = b"\x01"
@@ -59,44 +61,10 @@ class Calibration:
     offsets: tuple[int, ...]
 
 
-def crc16(data: bytes) -> int:
-    """Return the Modbus CRC-16: polynomial 0xA001 reflected, start 0xFFFF."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
-    return crc
-
-
-def encode(function: int, data: bytes) -> bytes:
-    """Return a request or an answer."""
-    body = bytes([SLAVE, function]) + data
-    return body + crc16(body).to_bytes(2, "little")
-
-
-def decode(message: bytes) -> tuple[int, bytes]:
-    """Return function and data of a request or an answer.
-
-    Raises:
-        FrameError: Too short, of another slave, or the CRC does not fit.
-    """
-    if len(message) < 4 or message[0] != SLAVE:
-        raise FrameError(f"{message[:8].hex(' ')} is not a message of a digital F/T.")
-    if crc16(message[:-2]) != int.from_bytes(message[-2:], "little"):
-        raise FrameError("The CRC of a Modbus message does not fit.", "Bytes changed on the line.")
-    return message[1], message[2:-2]
-
-
-def read_registers(first: int, count: int) -> bytes:
-    """Return the request for `count` registers."""
-    return encode(READ, struct.pack(">HH", first, count))
-
-
-def write_registers(first: int, values: tuple[int, ...]) -> bytes:
-    """Return the request that writes registers."""
-    count = len(values)
-    return encode(WRITE, struct.pack(f">HHB{count}H", first, count, 2 * count, *values))
+encode = partial(modbus.encode, SLAVE)
+decode = partial(modbus.decode, SLAVE)
+read_registers = partial(modbus.read_registers, SLAVE)
+write_registers = partial(modbus.write_registers, SLAVE)
 
 
 def decode_calibration(registers: bytes) -> Calibration:

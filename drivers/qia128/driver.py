@@ -109,13 +109,7 @@ class Qia128:
         """Return the readings that have come, stamped with the time of this read."""
         if self._points is None:
             self.identify()
-        give_up_s = self._transport.now_s + timeout_s
-        raw = np.empty(0, np.int64)
-        while not raw.size:
-            data = self._transport.read(max(0.0, give_up_s - self._transport.now_s))
-            raw = protocol.readings(self._frames.feed(data))
-            if not data or self._transport.now_s >= give_up_s:
-                break
+        raw = protocol.readings(self._frames.read(self._transport, timeout_s))
         now_s = self._transport.now_s
         flags = np.zeros(raw.size, np.uint8)
         flags[(raw == 0) | (raw == protocol.TOP)] = np.uint8(SampleFlag.SATURATED)

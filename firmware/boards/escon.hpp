@@ -18,6 +18,12 @@ struct EsconLine {
     double input(double current_a) const { return x1 + (current_a - y1) * (x2 - x1) / (y2 - y1); }
 };
 
+// The read-back of an INA240 (Texas Instruments, SBOS662C) in place of the module's own: gain 20, 50, 100 or 200.
+constexpr EsconLine ina240(double shunt_ohm, double gain, double reference_v, double adc_full_v) {
+    const double v_per_a = shunt_ohm * gain;
+    return {0.0, -reference_v / v_per_a, adc_full_v, (adc_full_v - reference_v) / v_per_a};
+}
+
 struct EsconWiring {
     EsconLine set_value;  // of the size of a current; its sign is a line of its own
     double set_full;  // V of the DAC's full scale; 1 for a duty
@@ -26,6 +32,8 @@ struct EsconWiring {
     double limit_a;
     int output_bits = 12;
     int adc_bits = 12;
+    double lowest_v = 0.0;  // what gives the read-back measures between these; an INA240 to 0.2 V below its supply
+    double highest_v = 1e9;
 
     // Never beyond the limit, whatever was commanded.
     std::int32_t code(double current_a) const {
@@ -35,15 +43,14 @@ struct EsconWiring {
         return static_cast<std::int32_t>(std::floor(set_value.input(asked) / set_full * top + 0.5));
     }
 
-    // Actual current in counts of 1 mA, as the logger's frames carry it. A converter at its end has not measured:
-    // that is the end of the field, which the guards find.
+    // Actual current in counts of 1 mA, as the logger's frames carry it. A converter or an amplifier at its end has
+    // not measured: that is the end of the field, which the guards find.
     std::int32_t milliampere(std::int32_t reading) const {
         const std::int32_t last = (1 << adc_bits) - 1;
-        if (reading <= 0) return INT16_MIN;
-        if (reading >= last) return INT16_MAX;
-        const double top = static_cast<double>(last);
-        return static_cast<std::int32_t>(
-            std::floor(1000 * read_back.current(reading * adc_full_v / top) + 0.5));
+        const double volt = reading * adc_full_v / static_cast<double>(last);
+        if (reading <= 0 || volt < lowest_v) return INT16_MIN;
+        if (reading >= last || volt > highest_v) return INT16_MAX;
+        return static_cast<std::int32_t>(std::floor(1000 * read_back.current(volt) + 0.5));
     }
 };
 

@@ -2,7 +2,6 @@
 // the device, ticked from outside in virtual time. One thread per board.
 #include "../boards/escon.hpp"
 #include "../core/board.hpp"
-#include "../core/can_segments.hpp"
 #include "../core/profile_grasper.hpp"
 #include "../core/profile_reference.hpp"
 
@@ -181,36 +180,6 @@ void rig_board_receive(void* board, const std::uint8_t* data, std::size_t size) 
 void rig_board_tick(void* board, std::uint32_t tick_us, const std::int32_t* inputs,
                     std::int32_t* outputs) {
     board_of(board)->tick(tick_us, inputs, outputs);
-}
-
-// Cuts the frames in `wire` into CAN frames: a length byte and 8 bytes each; returns how many.
-std::size_t rig_can_split(const std::uint8_t* wire, std::size_t size, std::uint8_t* out,
-                          std::size_t room) {
-    rig::CanSplitter splitter;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < size; ++i) {
-        splitter.take(wire[i], [&](const std::uint8_t* data, std::size_t length) {
-            if (9 * (count + 1) > room) return;
-            out[9 * count] = static_cast<std::uint8_t>(length);
-            for (std::size_t k = 0; k < length; ++k) out[9 * count + 1 + k] = data[k];
-            ++count;
-        });
-    }
-    return count;
-}
-
-// Puts such CAN frames together; returns the bytes of the serial line written to `out`.
-std::size_t rig_can_join(const std::uint8_t* frames, std::size_t count, std::uint8_t* out,
-                         std::size_t room) {
-    rig::CanJoiner joiner;
-    std::size_t used = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        joiner.take(frames + 9 * i + 1, frames[9 * i],
-                    [&](const std::uint8_t* data, std::size_t length) {
-                        for (std::size_t k = 0; k < length && used < room; ++k) out[used++] = data[k];
-                    });
-    }
-    return used;
 }
 
 std::int32_t rig_escon_code(double current_a) { return kEscon.code(current_a); }

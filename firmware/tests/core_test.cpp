@@ -1,32 +1,18 @@
-// The core and the Teensy's layer on a host, under the sanitizers. The core's guards and
-// sessions are tried by tests/drivers/test_guards.py and test_sessions.py; here is what no library shows.
+// The core on a host, under the sanitizers. Its guards and sessions are tried through the library by
+// tests/drivers/test_guards.py and test_sessions.py too.
+#ifndef RIG_MAIN_APART
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#endif
 #include <doctest/doctest.h>
 
 #include <limits>
 #include <vector>
 
-#include "../boards/teensy/main.cpp"
-#include "../core/can_segments.hpp"
 #include "../core/profile_grasper.hpp"
+#include "../proofs/world.hpp"
+#include "guards_test.hpp"
 
-namespace {
-
-using Bytes = std::vector<std::uint8_t>;
-
-Bytes frame_of(const Bytes& payload) {
-    Bytes body = payload;
-    const std::uint16_t crc = rig::crc16(payload.data(), payload.size());
-    body.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-    body.push_back(static_cast<std::uint8_t>(crc >> 8));
-    Bytes wire(rig::kMaxWire + 1);
-    std::size_t length = rig::cobs_encode(body.data(), body.size(), wire.data());
-    wire[length++] = 0;
-    wire.resize(length);
-    return wire;
-}
-
-}  // namespace
+using proofs::Bytes;
 
 TEST_CASE("published check values") {
     const std::uint8_t digits[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
@@ -77,24 +63,6 @@ TEST_CASE("a missing reading trips before anything is computed from it") {
     CHECK(crossing.channel == 1);
 }
 
-TEST_CASE("frames survive being cut into CAN pieces") {
-    const Bytes wire = frame_of(Bytes(42, 7));
-    rig::CanSplitter splitter;
-    rig::CanJoiner joiner;
-    Bytes joined;
-    int pieces = 0;
-    for (std::uint8_t byte : wire) {
-        splitter.take(byte, [&](const std::uint8_t* data, std::size_t size) {
-            ++pieces;
-            joiner.take(data, size, [&](const std::uint8_t* bytes, std::size_t count) {
-                joined.insert(joined.end(), bytes, bytes + count);
-            });
-        });
-    }
-    CHECK(pieces == 7);
-    CHECK(joined == wire);
-}
-
 TEST_CASE_TEMPLATE("any bytes do no harm", Profile, rig::ReferenceProfile, rig::GrasperProfile) {
     rig::Board<Profile, 4096> any("T");
     std::uint32_t random = 1;
@@ -106,164 +74,183 @@ TEST_CASE_TEMPLATE("any bytes do no harm", Profile, rig::ReferenceProfile, rig::
     }
 }
 
-TEST_CASE("a Teensy starts with both motors off and 0 A asked for") {
-    setup();
-    CHECK(board.levels[rig::wiring::kDriveEnablePin] == LOW);
-    CHECK(board.levels[rig::wiring::kLoadEnablePin] == LOW);
-    CHECK(board.duties[rig::wiring::kDriveSetPin] == 410);
-    REQUIRE((timer.function != nullptr));
-    timer.function();
-    CHECK(board.duties[rig::wiring::kDriveSetPin] == 410);
-}
 
-TEST_CASE("a Teensy answers a hello, with interrupts off only while it touches the board") {
-    setup();
-    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 1, 0})) Serial.in.push_back(byte);
-    loop();
-    loop();
-    CHECK(board.locked == 0);
-    CHECK(Serial.out.size() > rig::kSerialSize);
-    Serial.out.clear();
-    Serial.room = 5;  // a host that does not read
-    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 2, 0})) Serial.in.push_back(byte);
-    loop();
-    CHECK(Serial.out.size() == 5);
-    Serial.room = 512;
-    loop();
-    CHECK(Serial.out.size() > rig::kSerialSize);
-}
+namespace {
 
-TEST_CASE("only a tick that ended, behind a main loop that turned, feeds the chip's watchdog") {
-    setup();
-    CHECK(WDOG3_TOVAL.value <= 20 * 33);
-    CHECK((WDOG3_CS & (WDOG_CS_EN | WDOG_CS_UPDATE)) == WDOG_CS_EN);
-    timer.function();  // may find that the loop turned in another test
-    const int begun = WDOG3_CNT.writes;
-    timer.function();
-    CHECK(WDOG3_CNT.writes == begun);  // the main loop has not turned
-    loop();
-    timer.function();
-    const int meal = WDOG3_CNT.writes - begun;
-    CHECK(meal > 0);
-    const int level = board.levels[rig::wiring::kAlivePin];
-    timer.function();  // it hangs now
-    timer.function();
-    CHECK(WDOG3_CNT.writes == begun + meal);
-    CHECK(board.levels[rig::wiring::kAlivePin] == level);
-    loop();
-    loop();  // the tick hangs now
-    CHECK(WDOG3_CNT.writes == begun + meal);
-    timer.function();
-    CHECK(WDOG3_CNT.writes == begun + 2 * meal);
-    CHECK(board.levels[rig::wiring::kAlivePin] != level);
-}
-
-TEST_CASE("a Teensy whose timer does not start leaves its motors off and its watchdog hungry") {
-    board.levels[rig::wiring::kDriveEnablePin] = HIGH;
-    timer.works = false;
-    setup();
-    timer.works = true;
-    CHECK(board.levels[rig::wiring::kDriveEnablePin] == LOW);
-    const int begun = WDOG3_CNT.writes;
-    for (int turns = 0; turns < 100; ++turns) loop();
-    CHECK(WDOG3_CNT.writes == begun);
-}
-
-TEST_CASE("a USB line that was gone for a moment is written to again") {
-    setup();
-    Serial.out.clear();
-    Serial.detached = true;
-    for (std::uint8_t byte : frame_of({rig::kVersion, rig::kHello, 1, 0})) Serial.in.push_back(byte);
-    for (int turns = 0; turns < 10; ++turns) loop();
-    CHECK(Serial.out.empty());
-    Serial.detached = false;
-    for (int turns = 0; turns < 10; ++turns) loop();
-    CHECK(Serial.out.size() > rig::kSerialSize);
-}
-
-TEST_CASE("an enabled controller that is not ready reports no current") {
-    rig::ReferenceHardware teensy;
-    teensy.begin();
-    board.analog[rig::wiring::kDriveCurrentPin] = 2048;
-    board.levels[rig::wiring::kDriveReadyPin] = HIGH;  // a broken wire, or no power
-    board.levels[rig::wiring::kLoadReadyPin] = LOW;
-    CHECK(teensy.sample().current != rig::kMissing);
-    rig::ReferenceProfile::Outputs outputs;
-    outputs.in_force = true;
-    for (std::uint32_t tick = 0; tick < rig::wiring::kReadyAfterTicks; ++tick) teensy.drive(outputs);
-    CHECK(board.levels[rig::wiring::kDriveEnablePin] == HIGH);
-    CHECK(teensy.sample().current == rig::kMissing);
-    board.levels[rig::wiring::kDriveReadyPin] = LOW;
-    CHECK(teensy.sample().current != rig::kMissing);
-    board.levels[rig::wiring::kLoadReadyPin] = HIGH;
-    CHECK(teensy.sample().current == rig::kMissing);
-}
-
-TEST_CASE("a current is asked for by its size, and its sign by a line of its own") {
-    rig::ReferenceHardware teensy;
-    teensy.begin();
-    rig::ReferenceProfile::Outputs outputs;
-    outputs.in_force = true;
-    outputs.command_e4 = -5000;
-    outputs.load_ma = 500;
-    teensy.drive(outputs);
-    CHECK(board.duties[rig::wiring::kDriveSetPin] == rig::wiring::kDrive.code(1.0));
-    CHECK(board.duties[rig::wiring::kDriveSetPin] > board.duties[rig::wiring::kLoadSetPin]);
-    CHECK(board.levels[rig::wiring::kDriveDirectionPin] == LOW);
-    CHECK(board.levels[rig::wiring::kLoadDirectionPin] == HIGH);
-    CHECK(rig::wiring::kDrive.set_value.input(0.0) == doctest::Approx(0.1));  // and less is not more current
-}
-
-TEST_CASE("an emergency stop is pressed while its contact, or its wire, is open") {
-    rig::ReferenceHardware teensy;
-    teensy.begin();
-    board.levels.erase(rig::wiring::kStopPin);  // open: the pull-up's level
-    CHECK(teensy.stopped());
-    board.levels[rig::wiring::kStopPin] = LOW;
-    CHECK_FALSE(teensy.stopped());
-}
-
-TEST_CASE("a current converter at its ends is a saturated field") {
-    CHECK(rig::wiring::kDrive.milliampere(0) == INT16_MIN);
-    CHECK(rig::wiring::kDrive.milliampere(4095) == INT16_MAX);
-}
-
-TEST_CASE("two boards with the same image have serial numbers of their own") {
-    CHECK(std::strncmp(rig::TeensyLink::serial("NAME"), "NAME-0000444C", 24) == 0);
-}
-
-TEST_CASE("the settings that a board is built with are valid, and a host may ask for no more") {
-    rig::ReferenceProfile::Settings own = rig::wiring::own_limits();
-    own.limits.choice.watchdog_us = 50000;
-    CHECK(own.valid());
-    rig::ReferenceProfile::Settings asked = own;
-    CHECK(asked.within(rig::wiring::own_limits()));
-    ++asked.limits.max_current;
-    CHECK_FALSE(asked.within(rig::wiring::own_limits()));
-}
-
-TEST_CASE("each encoder of a Teensy 4.1 has inputs of the crossbar for itself") {
-    rig::ReferenceHardware teensy;
-    teensy.begin();
-    CHECK(teensy.sample().motor == 1000);
-    CHECK(teensy.sample().spindle == 2000);
-    CHECK(teensy.sample().jaw == 3000);
-}
-
-TEST_CASE("a torque converter at its ends is a saturated field") {
-    rig::ReferenceHardware teensy;
-    teensy.begin();
-    board.analog[rig::wiring::kProximalPin] = 4095;
-    board.analog[rig::wiring::kDistalPin] = 0;
-    CHECK(teensy.sample().proximal == INT16_MAX);
-    CHECK(teensy.sample().distal == INT16_MIN);
-}
-
-TEST_CASE("no command goes beyond the limit of the current controller") {
-    const rig::EsconWiring& wiring = rig::wiring::kDrive;
-    for (double current : {-1e9, -2.0, 0.0, 2.0, 1e9, std::nan("")}) {
-        CHECK(wiring.code(current) >= 409);
-        CHECK(wiring.code(current) <= 3686);
+// A reference board, what it sent, and its ticks; everything within every limit but those a test sets.
+class Desk {
+  public:
+    explicit Desk(const rig::ReferenceFields& limits) {
+        board.booted(1, true);
+        settings_.resize(rig::ReferenceProfile::kArmSize);
+        const auto number = [&](std::size_t at, std::uint64_t value, int size) {
+            for (int k = 0; k < size; ++k) settings_[at + k] = static_cast<std::uint8_t>(value >> 8 * k);
+        };
+        const double full = 10000;
+        std::uint64_t bits;
+        std::memcpy(&bits, &full, sizeof bits);
+        number(4 * 8, bits, 8);
+        std::size_t at = 5 * 8;
+        rig::ReferenceFields::each(limits, limits, [&](std::int32_t limit, std::int32_t, rig::Sense) {
+            number(at, static_cast<std::uint32_t>(limit), 4);
+            at += 4;
+        });
+        send(rig::kHello, {});
+        send(rig::kStart, {});
     }
-    CHECK(wiring.code(std::nan("")) == wiring.code(0.0));
+
+    rig::Board<rig::ReferenceProfile, 4096> board{"DESK"};
+    rig::ReferenceProfile::Inputs inputs;
+    Bytes answer;  // the newest
+    Bytes sample;  // the newest
+    int samples = 0;
+
+    void send(rig::Kind kind, const Bytes& body) {
+        Bytes payload = {rig::kVersion, static_cast<std::uint8_t>(kind), ++number_, 0};
+        payload.insert(payload.end(), body.begin(), body.end());
+        const Bytes wire = proofs::wire_of(payload);
+        board.receive<rig::NoLock>(wire.data(), wire.size());
+        take();
+        if (kind == rig::kHello) session_ = Bytes(answer.end() - 4, answer.end());
+    }
+    rig::Result result() const { return static_cast<rig::Result>(answer[5]); }
+    void arm() {
+        send(rig::kHello, {});
+        Bytes body = session_;
+        body.insert(body.end(), settings_.begin(), settings_.end());
+        send(rig::kArm, body);
+    }
+    // A block of setpoints: targets, no load.
+    void setpoints(const std::vector<std::int32_t>& targets) {
+        Bytes body = session_;
+        for (std::int32_t target : targets) {
+            proofs::put(body, static_cast<std::uint32_t>(target), 4);
+            proofs::put(body, 0, 2);
+        }
+        send(rig::kSetpoints, body);
+    }
+    void ping() {
+        Bytes body = session_;
+        proofs::put(body, 0, 8);
+        send(rig::kPing, body);
+    }
+    void run(int ticks) {
+        for (int k = 0; k < ticks; ++k) {
+            now_us_ += 1000;
+            inputs.current ^= 1;  // none of the sensors stays
+            board.tick(now_us_, inputs);
+            take();
+        }
+    }
+
+  private:
+    void take() {
+        std::uint8_t bytes[4096];
+        std::size_t count;
+        while ((count = board.transmit(bytes, sizeof bytes)) > 0) {
+            for (std::size_t k = 0; k < count; ++k) {
+                if (!frames_.take(bytes[k])) continue;
+                const Bytes payload(frames_.payload(), frames_.payload() + frames_.size());
+                const bool is_sample = payload[1] == rig::kSample;
+                samples += is_sample;
+                (is_sample ? sample : answer) = payload;
+            }
+        }
+    }
+
+    rig::FrameReceiver frames_;
+    Bytes settings_, session_;
+    std::uint32_t now_us_ = 0;
+    std::uint8_t number_ = 0;
+};
+
+rig::ReferenceFields widest() {
+    rig::ReferenceFields limits = rig::widest<rig::ReferenceFields>();
+    limits.choice.watchdog_us = 50000;
+    limits.choice.hold_command_e4 = 0;
+    return limits;
+}
+
+std::uint32_t word(const Bytes& frame, std::size_t at) { return rig::Reader(frame.data() + at).u32(); }
+
+}  // namespace
+
+TEST_CASE("a queue that ran dry trips after its time, pings or not, and its report names when") {
+    rig::ReferenceFields limits = widest();
+    limits.choice.dry_ticks = 10;
+    Desk desk(limits);
+    desk.arm();
+    REQUIRE(desk.result() == rig::kOk);
+    desk.run(20);  // nothing was queued yet: that is not dry
+    CHECK(desk.board.in_force());
+    desk.setpoints({0, 0, 0});
+    desk.run(3 + 10);
+    desk.ping();
+    CHECK(desk.board.in_force());
+    desk.run(1);
+    CHECK_FALSE(desk.board.in_force());
+    CHECK(desk.board.trip() == rig::kQueueRanDry);
+    desk.run(7);
+    desk.send(rig::kTrip, {});
+    CHECK(desk.answer[1] == rig::kTripReport);
+    CHECK(desk.answer[4] == rig::kQueueRanDry);
+    CHECK(word(desk.answer, 14) == 34000);
+    desk.send(rig::kClear, {rig::kQueueRanDry});
+    CHECK(desk.result() == rig::kOk);
+    desk.send(rig::kTrip, {});
+    CHECK(desk.answer[4] == rig::kNoTrip);
+    CHECK(word(desk.answer, 14) == 0);
+}
+
+TEST_CASE("samples are numbered from each start on, and a stopped board sends none") {
+    Desk desk(widest());
+    for (int round = 0; round < 2; ++round) {
+        desk.run(5);
+        CHECK(word(desk.sample, 4) == 4);
+        desk.send(rig::kStop, {});
+        desk.samples = 0;
+        desk.run(3);
+        CHECK(desk.samples == 0);
+        desk.send(rig::kStart, {});
+    }
+}
+
+TEST_CASE("a motor's heat outlives its session, and a hot motor is not armed until it has cooled") {
+    rig::ReferenceFields limits = widest();
+    limits.motor.continuous_current = 100;
+    limits.motor.i2t = 3000;
+    Desk desk(limits);
+    desk.arm();
+    desk.inputs.current = 200;
+    desk.setpoints(std::vector<std::int32_t>(100));
+    desk.run(30);
+    desk.ping();
+    desk.run(30);  // 30000 counts^2 for 60 ms is more than half of what is allowed
+    REQUIRE(desk.board.in_force());
+    desk.send(rig::kDisarm, {});
+    desk.arm();
+    CHECK(desk.result() == rig::kTooHot);
+    desk.inputs.current = 0;
+    desk.run(40);
+    desk.arm();
+    CHECK(desk.result() == rig::kOk);
+}
+
+TEST_CASE("a late tick is judged by its time: travel at the same speed is no jump, and more is") {
+    for (int step : {10, 11}) {
+        rig::ReferenceFields limits = widest();
+        limits.loop.max_motor_jump = limits.max_spindle_jump = limits.max_jaw_jump = 10;
+        limits.motor.max_motor_step = 10;
+        for (int channel = 0; channel < 3; ++channel) {
+            rig::ReferenceProfile profile;
+            rig::ReferenceProfile::Settings settings = rig::ReferenceProfile::Settings::widest();
+            settings.limits = limits;
+            profile.begin(settings);
+            rig::ReferenceProfile::Inputs inputs;
+            CHECK(profile.check(inputs).code == rig::kNoTrip);
+            rig::ReferenceProfile::encoder(inputs, static_cast<std::size_t>(channel)) = 5 * step;
+            profile.late(inputs, 5);
+            CHECK((profile.check(inputs).code == rig::kNoTrip) == (step == 10));
+        }
+    }
 }

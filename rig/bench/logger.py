@@ -58,10 +58,6 @@ def open_logger(
             config.safety.watchdog_s,
             step_s,
         )
-    if config.logger.driver == "teensy-can":
-        from drivers.teensy.can_device import open_can_transport
-
-        return open_can_transport(config.logger.url, **config.logger.options)
     return open_transport(config.logger.url)
 
 

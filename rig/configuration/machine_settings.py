@@ -81,7 +81,7 @@ class ReferenceDrift(DriftSection):
     motor_current_a: Current | None = None
 
 
-REFERENCE = MachineSettings(ReferenceLimits, ReferenceDrift, ("teensy", "teensy-can", "epos4"))
+REFERENCE = MachineSettings(ReferenceLimits, ReferenceDrift, ("teensy", "epos4"))
 
 
 class SensorLimits(LimitsSection):

@@ -44,8 +44,8 @@ class LoggerSection(Section):
     """The board or drive that moves and samples the rig, and its URL.
 
     Attributes:
-        driver: `teensy` for the 1 kHz logger board, `teensy-can` for it on CAN, `epos4` for a drive
-            on CANopen whose position loop runs in this computer; with the profiles `drive` and
+        driver: `teensy` for the 1 kHz logger board, `epos4` for a drive on CANopen whose
+            position loop runs in this computer; with the profiles `drive` and
             `sensor` any driver, such as `dynamixel`.
         url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
             `can:...`.

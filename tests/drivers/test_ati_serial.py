@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers import modbus
 from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
@@ -33,7 +34,7 @@ def test_messages_are_the_published_bytes(message: bytes, published: str) -> Non
 
 @given(data=st.binary(min_size=1, max_size=40), bit=st.integers(0, 7), place=st.integers(0, 60))
 def test_one_changed_bit_is_refused(data: bytes, bit: int, place: int) -> None:
-    message = bytearray(protocol.encode(protocol.READ, data))
+    message = bytearray(protocol.encode(modbus.READ, data))
     message[place % len(message)] ^= 1 << bit
     with pytest.raises(FrameError):
         protocol.decode(bytes(message))
@@ -146,7 +147,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     fake = AtiSerialFake()
     fake.receive(protocol.write_registers(0, (1, 2)))
     function, reason = protocol.decode(fake.transmit())
-    assert (function, reason) == (protocol.WRITE | protocol.FAILED, b"\x02")
+    assert (function, reason) == (modbus.WRITE | protocol.FAILED, b"\x02")
 
 
 def test_what_may_differ_can_be_told_otherwise() -> None:

@@ -31,7 +31,7 @@ from rig.logic.link import LogicLink
 
 pytestmark = pytest.mark.integration
 
-COUNTED = {"teensy": "spindle_count", "teensy-can": "spindle_count", "teensy-master": "yaw_count"}
+COUNTED = {"teensy": "spindle_count", "teensy-master": "yaw_count"}
 """Drivers whose channels need a calibration, and one of these channels."""
 DRIVES = {"dynamixel": (DynamixelFake, Dynamixel), "moteus": (MoteusFake, Moteus)}
 

@@ -54,6 +54,7 @@ class ReferenceHardware : public TeensyLink {
         analogReadResolution(wiring::kAdcBits);
         analogReadAveraging(4);
         encoders_.begin();
+        torques_.begin();
         Serial.begin(115200);  // the rate has no effect on USB
     }
 
@@ -67,8 +68,9 @@ class ReferenceHardware : public TeensyLink {
         counts.motor = encoders_.motor();
         counts.spindle = encoders_.spindle();
         counts.jaw = encoders_.jaw();
-        counts.proximal = torque(wiring::kProximalPin);
-        counts.distal = torque(wiring::kDistalPin);
+        const Torques torques = torques_.sample();
+        counts.proximal = torques.proximal;
+        counts.distal = torques.distal;
         counts.current = ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
                                        : kMissing;
         counts.fsr = analogRead(wiring::kFsrPin);
@@ -88,12 +90,6 @@ class ReferenceHardware : public TeensyLink {
     }
 
   private:
-    static std::int32_t torque(int pin) {
-        // spread over the 16 bits of a sample, so that the ends of the converter are those of the field
-        const std::int32_t reading = analogRead(pin) - wiring::kTorqueZero;
-        return reading >= wiring::kTorqueZero - 1 ? INT16_MAX : reading * 16;
-    }
-
     // Either controller that is not ready after it was enabled makes the current missing. A broken wire or a
     // controller without power leaves the line high, which is not ready.
     bool ready() const {
@@ -102,6 +98,7 @@ class ReferenceHardware : public TeensyLink {
     }
 
     Counters encoders_;
+    wiring::TorquePins torques_;
     ChipWatch watch_;
     std::uint32_t enabled_ticks_ = 0;
 };

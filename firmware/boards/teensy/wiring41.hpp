@@ -4,6 +4,7 @@
 
 #include "../escon.hpp"
 #include "own_reference.hpp"
+#include "torque_cells.hpp"
 #include "crossbar41.hpp"
 
 namespace rig::wiring {
@@ -23,6 +24,12 @@ constexpr int kProximalPin = 14, kDistalPin = 15, kFsrPin = 16;  // A0, A1, A2
 constexpr int kDriveCurrentPin = 17;                             // A3
 constexpr int kAdcBits = 12;
 constexpr int kTorqueZero = 2048;  // counts of a cell's amplifier at mid-scale
+// Or write AdsPins or HxPins in the last line: an ADS1256 with the proximal cell at inputs 0-1 and the distal one at 2-3,
+// or two HX711 (drivers/ads1256, drivers/hx711).
+using AdsPins = AdsCells<ConverterPins<10, 12, 11, 6>>;  // SCLK, DOUT, DIN, DRDY; CS to ground
+using HxPins = HxCells<ConverterPins<10, 12>, ConverterPins<5, 4>>;  // PD_SCK and DOUT of each
+using AnalogPins = AnalogCells<kProximalPin, kDistalPin, kTorqueZero>;
+using TorquePins = AnalogPins;
 
 // This board has no DAC: set values are PWM, the size of the current as 10 to 90 % duty, 0 A at 10 % and below:
 // a broken wire or a board without power asks for nothing. The sign is the direction line's.

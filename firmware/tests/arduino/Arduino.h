@@ -26,6 +26,8 @@ inline void analogWriteFrequency(int, float) {}
 inline void analogWriteResolution(int) {}
 inline void analogReadResolution(int) {}
 inline void analogReadAveraging(int) {}
+inline void digitalWriteFast(int pin, int level) { digitalWrite(pin, level); }
+inline void delayNanoseconds(std::uint32_t) {}
 inline int digitalReadFast(int pin) { return digitalRead(pin); }
 inline int digitalPinToInterrupt(int pin) { return pin; }
 inline void attachInterrupt(int pin, void (*called)(), int) { board.edges[pin] = called; }

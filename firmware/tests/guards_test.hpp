@@ -1,0 +1,124 @@
+// Every guard of the reference profile at its limit: a reading at the limit never trips, one count beyond it
+// trips, and exactly so many ticks after it began as the limits say.
+#pragma once
+
+#include <doctest/doctest.h>
+
+#include "../core/profile_reference.hpp"
+
+namespace guards {
+
+using Profile = rig::ReferenceProfile;
+using Inputs = Profile::Inputs;
+using Limits = rig::ReferenceFields;
+
+constexpr int kBegins = 30;  // tick at which a fault begins
+
+struct Guard {
+    rig::Trip code;
+    std::uint8_t channel;
+    int lasts;  // ticks of a fault until the trip, the first included
+    void (*limit)(Limits&);
+    // What the fault adds to readings of no size; `beyond` is 0 at the limit, 1 beyond. `since` counts from 0.
+    void (*fault)(Inputs&, int since, int beyond);
+};
+
+inline const Guard kGuards[] = {
+    {rig::kOverCurrent, 5, 1, [](Limits& l) { l.max_current = 100; },
+     [](Inputs& i, int, int b) { i.current = -100 - b; }},
+    {rig::kProximalTorque, 3, 1, [](Limits& l) { l.max_proximal = 100; },
+     [](Inputs& i, int, int b) { i.proximal = 100 + b; }},
+    {rig::kDistalTorque, 4, 1, [](Limits& l) { l.max_distal = 100; },
+     [](Inputs& i, int, int b) { i.distal = -100 - b; }},
+    {rig::kSpindleTravel, 1, 1, [](Limits& l) { l.min_spindle = -9; },
+     [](Inputs& i, int, int b) { i.spindle = -9 - b; }},
+    {rig::kSpindleTravel, 1, 1, [](Limits& l) { l.max_spindle = 9; },
+     [](Inputs& i, int, int b) { i.spindle = 9 + b; }},
+    {rig::kJawTravel, 2, 1, [](Limits& l) { l.min_jaw = -9; },
+     [](Inputs& i, int, int b) { i.jaw = -9 - b; }},
+    {rig::kJawTravel, 2, 1, [](Limits& l) { l.max_jaw = 9; },
+     [](Inputs& i, int, int b) { i.jaw = 9 + b; }},
+    {rig::kOverSpeed, 0, 3, [](Limits& l) { l.motor.max_motor_step = 10; },
+     [](Inputs& i, int since, int b) { i.motor = (10 + b) * (since + 1); }},
+    {rig::kStalled, 0, 20,
+     [](Limits& l) {
+         l.motor.stall_current = 51;
+         l.choice.stall_ticks = 20;
+     },
+     [](Inputs& i, int since, int b) { i.current = since % 2 ? -50 - b : 50 + b; }},
+    {rig::kSensorSaturated, 3, 5, [](Limits& l) { l.choice.saturated_ticks = 5; },
+     [](Inputs& i, int, int b) { i.proximal = INT16_MAX - 1 + b; }},
+    {rig::kSensorSaturated, 4, 5, [](Limits& l) { l.choice.saturated_ticks = 5; },
+     [](Inputs& i, int, int b) { i.distal = INT16_MIN + 1 - b; }},
+    {rig::kSensorStale, 4, 8, [](Limits& l) { l.choice.stale_ticks = 7; },
+     [](Inputs& i, int since, int b) { i.distal = 50 + (b == 0 && since % 7 == 0); }},
+    {rig::kEncoderJump, 0, 1, [](Limits& l) { l.loop.max_motor_jump = 60; },
+     [](Inputs& i, int, int b) { i.motor = 60 + b; }},
+    {rig::kEncoderJump, 1, 1, [](Limits& l) { l.max_spindle_jump = 60; },
+     [](Inputs& i, int, int b) { i.spindle = -60 - b; }},
+    {rig::kEncoderJump, 2, 1, [](Limits& l) { l.max_jaw_jump = 60; },
+     [](Inputs& i, int, int b) { i.jaw = 60 + b; }},
+    {rig::kEncodersDisagree, 0, 1,
+     [](Limits& l) {
+         l.motor_per_turn = -40;
+         l.spindle_per_turn = 10;
+         l.max_twist = 8;
+     },
+     [](Inputs& i, int, int b) { i.spindle = 2, i.motor = b; }},
+    {rig::kEncodersDisagree, 2, 1,
+     [](Limits& l) {
+         l.jaw_per_turn = 20;
+         l.spindle_per_turn = 10;
+         l.stretch_e6 = 500000;
+         l.max_stretch = 10;
+     },
+     [](Inputs& i, int, int b) { i.distal = 60, i.jaw = 40 + b; }},
+    {rig::kFollowingError, 1, 7,
+     [](Limits& l) {
+         l.loop.max_following = 60;
+         l.loop.following_ticks = 7;
+     },
+     [](Inputs& i, int, int b) { i.spindle = 60 + b; }},
+    {rig::kOverheated, 5, 11,
+     [](Limits& l) {
+         l.motor.continuous_current = 10;
+         l.motor.i2t = 3;
+     },
+     [](Inputs& i, int, int b) { i.current = b == 0 ? 10 : 20; }},
+};
+
+inline Inputs quiet(int tick) {
+    Inputs inputs;
+    inputs.proximal = inputs.distal = inputs.current = tick % 2;  // none of them stays
+    return inputs;
+}
+
+// The tick at which a profile with these limits trips over these readings, or 0; and over what.
+inline int trips(const Guard& guard, int beyond, rig::Crossing& crossing) {
+    Profile::Settings settings = Profile::Settings::widest();
+    guard.limit(settings.limits);
+    Profile profile;
+    profile.begin(settings);
+    for (int tick = 1; tick < 200; ++tick) {
+        Inputs inputs = quiet(tick);
+        if (tick >= kBegins) guard.fault(inputs, tick - kBegins, beyond);
+        profile.warm(inputs, 1);
+        crossing = profile.check(inputs);
+        if (crossing.code != rig::kNoTrip) return tick;
+        profile.drive({0, 0}, inputs);
+    }
+    return 0;
+}
+
+TEST_CASE("a guard trips one count beyond its limit, after the time that the limits give, and not before") {
+    for (const Guard& guard : kGuards) {
+        CAPTURE(&guard - kGuards);
+        rig::Crossing crossing;
+        CHECK(trips(guard, 0, crossing) == 0);
+        CHECK(trips(guard, 1, crossing) == kBegins + guard.lasts - 1);
+        CHECK(crossing.code == guard.code);
+        CHECK(crossing.channel == guard.channel);
+    }
+}
+
+}  // namespace guards
