@@ -7,6 +7,7 @@ import select
 import socket
 import struct
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -147,3 +148,14 @@ def test_the_layouts_channels_are_those_of_a_recorded_log():
     of_reference = {"distal_torque_n_m", "proximal_torque_n_m", "motor_current_a"} & shown
     assert of_reference
     assert of_reference <= recorded
+
+
+def test_every_curve_of_the_plotjuggler_layout_is_a_field_of_a_recorded_log():
+    """PlotJuggler calls a field of a ROS 2 message TOPIC/FIELD."""
+    log = read_log(next((Path(__file__).parents[2] / "logs" / "example").glob("*.mcap")))
+    fields = {f"{t}/{f}" for t, topic in log.topics.items() for f in topic.rows.dtype.names}
+    file = Path(served.__file__).with_name("plotjuggler.layout.xml")
+    layout = ElementTree.parse(file)  # noqa: S314  a file of this project
+    curves = [curve.get("name") for curve in layout.iter("curve")]
+    assert curves
+    assert set(curves) <= fields
