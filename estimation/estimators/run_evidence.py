@@ -21,7 +21,7 @@ class RunEvidence:
         normal: The run's share in the normal equations.
         ranges: Lowest and highest value of each judged channel, shape (2, judged).
         places: Conditions of each sample, shape (n, d); see `estimation.bank.beyond`.
-        conditions: What was held constant in the run; the interval looks beyond their levels.
+        conditions: What was held constant in the run; the interval grows beyond their levels.
     """
 
     design: FloatArray

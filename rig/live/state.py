@@ -36,7 +36,7 @@ class Value:
 
     Attributes:
         number: The value, or None.
-        missing: Why there is no value; empty when there is one.
+        missing: Why the value is missing; empty when it is not.
     """
 
     number: float | None

@@ -1,4 +1,4 @@
-"""A look at a table before it is imported: ranges, rates, and what looks wrong.
+"""A preview of a table before it is imported: ranges, rates, and what may be wrong.
 
 Each remark is a question to the person who knows the machine; nothing is corrected here.
 """
@@ -55,7 +55,7 @@ class ChannelView:
         least: Least value.
         greatest: Greatest value.
         mean: Mean.
-        wrong: What looks wrong with it, in words.
+        wrong: What may be wrong with it, in words.
     """
 
     name: str
@@ -68,7 +68,7 @@ class ChannelView:
 
 @dataclass(frozen=True)
 class RunView:
-    """One run: its length, rate, conditions, flagged samples, and what looks wrong with its clock.
+    """One run: its length, rate, conditions, flagged samples, and what may be wrong with its clock.
 
     `rate_hz` is None for a run of one sample.
     """
@@ -90,7 +90,7 @@ class Preview:
         runs: Every run.
         channels: Every channel.
         first: Channel and time to the values of the first samples.
-        wrong: What looks wrong with channels together, in words.
+        wrong: What may be wrong with channels together, in words.
         remarks: What was assumed, left out or filled in, in words.
     """
 
@@ -102,7 +102,7 @@ class Preview:
 
     @property
     def questions(self) -> list[str]:
-        """Everything that looks wrong, in words, each with the channel or run it is about."""
+        """Everything that may be wrong, in words, each with the channel or run it is about."""
         found = [f"{c.name}: {text}" for c in self.channels for text in c.wrong]
         found += [f"{r.name}: {text}" for r in self.runs for text in r.wrong]
         return [*found, *self.wrong]
