@@ -5,6 +5,7 @@ import json
 import socket
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from tornado.websocket import websocket_connect
 from rig.errors import UsageError
 from rig.live import foxglove as served
 from rig.live.block import DeviceStatus, SampleBlock
+from rig.log.reader import read_log
 
 pytestmark = pytest.mark.integration
 
@@ -91,3 +93,14 @@ def test_the_layout_shows_channels_that_are_sent():
     paths = [p["value"] for panel in layout["configById"].values() for p in panel.get("paths", [])]
     assert "/rig/sample.distal_torque_n_m_estimate" in paths
     assert all(value.startswith(f"{served.SAMPLE}.") for value in paths)
+
+
+def test_every_curve_of_the_plotjuggler_layout_is_a_field_of_a_recorded_log():
+    """PlotJuggler calls a field of a ROS 2 message TOPIC/FIELD."""
+    log = read_log(next((Path(__file__).parents[2] / "logs" / "example").glob("*.mcap")))
+    fields = {f"{t}/{f}" for t, topic in log.topics.items() for f in topic.rows.dtype.names}
+    file = Path(served.__file__).with_name("plotjuggler.layout.xml")
+    layout = ElementTree.parse(file)  # noqa: S314  a file of this project
+    curves = [curve.get("name") for curve in layout.iter("curve")]
+    assert curves
+    assert set(curves) <= fields
