@@ -33,17 +33,11 @@ TWICE = 2.5
 
 @dataclass(frozen=True)
 class Cost:
-    """One timing.
+    """One timing."""
 
-    Attributes:
-        samples: Samples of all runs.
-        candidates: Effects at points of their grids.
-        seconds: Processor time, the shortest of several.
-    """
-
-    samples: int
-    candidates: int
-    seconds: float
+    samples: int  # Samples of all runs
+    candidates: int  # Effects at points of their grids
+    seconds: float  # Processor time, the shortest of several
 
 
 def costs_over_samples() -> list[Cost]:

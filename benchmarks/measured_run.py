@@ -27,17 +27,11 @@ SETTLED = slice(1000, None)
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """What one channel does in a run.
+    """What one channel does in a run."""
 
-    Attributes:
-        low: 5th percentile.
-        middle: Median.
-        high: 95th percentile.
-    """
-
-    low: float
-    middle: float
-    high: float
+    low: float  # 5th percentile
+    middle: float  # Median
+    high: float  # 95th percentile
 
     @property
     def span(self) -> float:

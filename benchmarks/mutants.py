@@ -46,17 +46,11 @@ UNOBSERVABLE = {
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One change of one file.
+    """One change of one file."""
 
-    Attributes:
-        driver: Folder of the driver.
-        what: The change, in a few words.
-        source: The whole changed file.
-    """
-
-    driver: str
-    what: str
-    source: str
+    driver: str  # Folder of the driver
+    what: str  # The change, in a few words
+    source: str  # The whole changed file
 
 
 def mutants_of(driver: str, text: str) -> Iterator[Mutant]:

@@ -35,17 +35,11 @@ UNIT_BY_SUFFIX: dict[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One column of a recording.
+    """One column of a recording."""
 
-    Attributes:
-        name: Column name, ends in the unit's suffix.
-        unit: SI unit symbol.
-        description: Quantity and place of the measurement.
-    """
-
-    name: str
-    unit: str
-    description: str
+    name: str  # Column name, ends in the unit's suffix
+    unit: str  # SI unit symbol
+    description: str  # Quantity and place of the measurement
 
 
 class UnknownUnitError(EstimationError):

@@ -29,14 +29,10 @@ UPDATES = 5000
 
 @dataclass(frozen=True, eq=False)
 class Tracker:
-    """The filter's constant gain.
+    """The filter's constant gain."""
 
-    Attributes:
-        period_s: Sample period.
-        gain: Correction of angle, speed and acceleration for an innovation of 1 rad, shape (3,).
-    """
-
-    period_s: float
+    period_s: float  # Sample period
+    # Correction of angle, speed and acceleration for an innovation of 1 rad, shape (3,)
     gain: FloatArray
 
     @property

@@ -29,17 +29,11 @@ MOST_LATE = 6
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCurrentSession:
-    """Calibrate the current of an unloaded drive.
+    """Calibrate the current of an unloaded drive."""
 
-    Attributes:
-        speeds_rad_s: Speeds of the shaft; at least two.
-        repeats: Number of moves of each.
-        motor_constant_n_m_a: Torque at the shaft an ampere, by the data sheet.
-    """
-
-    speeds_rad_s: tuple[float, ...]
-    repeats: int = 1
-    motor_constant_n_m_a: float | None = None
+    speeds_rad_s: tuple[float, ...]  # Speeds of the shaft; at least two
+    repeats: int = 1  # Number of moves of each
+    motor_constant_n_m_a: float | None = None  # Torque at the shaft an ampere, by the data sheet
 
     kind = "current"
     devices = ("logger",)

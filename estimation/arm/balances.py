@@ -39,27 +39,19 @@ Columns = Callable[[Motion], FloatArray]
 
 @dataclass(frozen=True)
 class ArmBalances:
-    """The torque equations of an arm's joints.
+    """The torque equations of an arm's joints."""
 
-    Attributes:
-        name: The arm.
-        models: Declared model of each joint, without values.
-        joints: Channels of each joint.
-        columns: Motion to the columns of the declared parameters, shape (n, joints, parameters).
-        shared: Of each parameter, whether it is the links' and not a joint's own.
-        sign_width: Speed over which each joint's Coulomb friction changes sign, shape (joints,).
-        motors: Positions of a wrist's joints to those of its motors, or None; see `wrist`.
-        wrist: First joint, from 0, that motors behind a coupling drive.
-    """
-
-    name: str
-    models: tuple[Model, ...]
-    joints: tuple[JointNames, ...]
+    name: str  # The arm
+    models: tuple[Model, ...]  # Declared model of each joint, without values
+    joints: tuple[JointNames, ...]  # Channels of each joint
+    # Motion to the columns of the declared parameters, shape (n, joints, parameters)
     columns: Columns
-    shared: NDArray[np.bool_]
+    shared: NDArray[np.bool_]  # Of each parameter, whether it is the links' and not a joint's own
+    # Speed over which each joint's Coulomb friction changes sign, shape (joints,)
     sign_width: FloatArray
+    # Positions of a wrist's joints to those of its motors, or None; see `wrist`
     motors: FloatArray | None = None
-    wrist: int = 0
+    wrist: int = 0  # First joint, from 0, that motors behind a coupling drive
 
 
 def balances_of(recording: Recording) -> ArmBalances | None:

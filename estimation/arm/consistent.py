@@ -30,16 +30,12 @@ ROOT = float(np.sqrt(2.0))
 
 @dataclass(frozen=True)
 class Consistent:
-    """A physically consistent fit.
+    """A physically consistent fit."""
 
-    Attributes:
-        values: All parameters, in the order of `estimation.arm.regressor.names`; those that are
-            not identifiable from the torques get the smallest consistent values.
-        base: Their base parameters, in the order of `estimation.arm.base.base_of`.
-    """
-
+    # All parameters, in the order of `estimation.arm.regressor.names`; those that are not
+    # identifiable from the torques get the smallest consistent values
     values: FloatArray
-    base: FloatArray
+    base: FloatArray  # Their base parameters, in the order of `estimation.arm.base.base_of`
 
 
 def solver() -> Any:

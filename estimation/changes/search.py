@@ -52,21 +52,13 @@ beyond a parameter that moved."""
 
 @dataclass(frozen=True)
 class Gained:
-    """A candidate that acts in the runs of one campaign.
+    """A candidate that acts in the runs of one campaign."""
 
-    Attributes:
-        candidate: What changed.
-        in_b: Whether it acts in the runs of B; else in those of A.
-        gain: Log of the squared error before over after, above the mean over random choices.
-        usual: That mean.
-        amplitudes: Its amplitudes, SI, shape (k,).
-    """
-
-    candidate: Candidate
-    in_b: bool
-    gain: float
-    usual: float
-    amplitudes: FloatArray
+    candidate: Candidate  # What changed
+    in_b: bool  # Whether it acts in the runs of B; else in those of A
+    gain: float  # Log of the squared error before over after, above the mean over random choices
+    usual: float  # That mean
+    amplitudes: FloatArray  # Its amplitudes, SI, shape (k,)
 
     @property
     def family(self) -> str:
@@ -76,23 +68,16 @@ class Gained:
 
 @dataclass(frozen=True)
 class Step:
-    """One change that was found.
+    """One change that was found."""
 
-    Attributes:
-        best: The change.
-        p: Share of random choices of runs with as large a gain of any candidate.
-        shares: Name to its weight over resampled sets of runs, largest first. A name that explains
-            less than the best by `FORM` of it has 1/e of its weight: forms are not exact. Where a
-            parameter that moved explains most, effects have none.
-        spread: Amplitudes in the resampled sets, shape (replicates, k).
-        alternatives: Name to its best candidate.
-    """
-
-    best: Gained
-    p: float
+    best: Gained  # The change
+    p: float  # Share of random choices of runs with as large a gain of any candidate
+    # Name to its weight over resampled sets of runs, largest first. A name that explains less than
+    # the best by `FORM` of it has 1/e of its weight: forms are not exact. Where a parameter that
+    # moved explains most, effects have none.
     shares: Mapping[str, float]
-    spread: FloatArray
-    alternatives: Mapping[str, Gained]
+    spread: FloatArray  # Amplitudes in the resampled sets, shape (replicates, k)
+    alternatives: Mapping[str, Gained]  # Name to its best candidate
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,13 +13,9 @@ from estimation.stream import Stream
 
 @dataclass(frozen=True)
 class ModelEstimator:
-    """A fitted model as an estimator.
+    """A fitted model as an estimator."""
 
-    Attributes:
-        model: The fitted model.
-    """
-
-    model: Model
+    model: Model  # The fitted model
 
     @property
     def target(self) -> str:
@@ -41,13 +37,9 @@ class ModelEstimator:
 
 @dataclass(frozen=True)
 class ModelRecipe:
-    """Fits a declared model; the paper's straight line is the shipped model `linear`.
+    """Fits a declared model; the paper's straight line is the shipped model `linear`."""
 
-    Attributes:
-        declared: The model without values.
-    """
-
-    declared: Model
+    declared: Model  # The model without values
 
     def fit(self, campaign: Campaign) -> ModelEstimator:
         """Fit on the runs that are not excluded; see `estimation.fitting.fit` for the errors."""

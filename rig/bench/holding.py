@@ -33,15 +33,10 @@ SIMULATED = "sim:"
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How the program that held a rig let go.
+    """How the program that held a rig let go."""
 
-    Attributes:
-        pid: Its process number.
-        was_killed: Whether it did not end when it was asked to.
-    """
-
-    pid: int
-    was_killed: bool
+    pid: int  # Its process number
+    was_killed: bool  # Whether it did not end when it was asked to
 
 
 @contextmanager

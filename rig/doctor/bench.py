@@ -20,19 +20,12 @@ stops. `rig selftest --bench` prints this list after its own checks; keep it wit
 
 @dataclass(frozen=True, slots=True)
 class BenchTest:
-    """One test for a person with a bench.
+    """One test for a person with a bench."""
 
-    Attributes:
-        name: Its name.
-        why: Why nothing else shows it.
-        do: What to do.
-        shows: What it must show.
-    """
-
-    name: str
-    why: str
-    do: str
-    shows: str
+    name: str  # Its name
+    why: str  # Why nothing else shows it
+    do: str  # What to do
+    shows: str  # What it must show
 
 
 def bench_tests() -> list[BenchTest]:

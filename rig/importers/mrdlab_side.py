@@ -41,15 +41,10 @@ DRIVEN = {
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """The side of a log.
+    """The side of a log."""
 
-    Attributes:
-        name: "left" or "right".
-        remarks: How it was found where that is not plain, one sentence each.
-    """
-
-    name: str
-    remarks: tuple[str, ...] = ()
+    name: str  # "left" or "right"
+    remarks: tuple[str, ...] = ()  # How it was found where that is not plain, one sentence each
 
     @property
     def sign(self) -> float:

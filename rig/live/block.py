@@ -18,34 +18,21 @@ class BlockError(DataError):
 
 @dataclass(frozen=True, slots=True)
 class DeviceStatus:
-    """State of one device.
+    """State of one device."""
 
-    Attributes:
-        name: Name of the device.
-        state: One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ...
-        detail: Further information for the user; may be empty.
-    """
-
-    name: str
-    state: str
-    detail: str = ""
+    name: str  # Name of the device
+    state: str  # One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ..
+    detail: str = ""  # Further information for the user; may be empty
 
 
 @dataclass(frozen=True, slots=True)
 class LimitStatus:
-    """One watched quantity and how far it may go.
+    """One watched quantity and how far it may go."""
 
-    Attributes:
-        name: Limited quantity.
-        value: Its value now; the limit holds in both directions.
-        limit: The magnitude that trips the rig, positive.
-        unit: Unit of both.
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
+    name: str  # Limited quantity
+    value: float  # Its value now; the limit holds in both directions
+    limit: float  # The magnitude that trips the rig, positive
+    unit: str  # Unit of both
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +40,19 @@ class SampleBlock:
     """Consecutive samples, usually 50 ms of them.
 
     A block without samples means that nothing arrived during its time.
-
-    Attributes:
-        time_s: Device clock, shape (n,), increasing.
-        columns: Channel name to values, shape (n,) each, SI units, closing positive.
-        flags: `estimation.recording.Flag` bits, shape (n,), uint8.
-        estimates: Channel name to its estimate, shape (n,) each; may be empty.
-        lost: Samples lost since the start.
-        devices: State of each device.
-        limits: Watched limits; may be empty.
-        inside: Channel name to whether its estimate is within the fitted range of its
-            estimator, shape (n,) each; channels of estimators without a range are missing.
     """
 
-    time_s: FloatArray
+    time_s: FloatArray  # Device clock, shape (n,), increasing
+    # Channel name to values, shape (n,) each, SI units, closing positive
     columns: Mapping[str, FloatArray]
-    flags: NDArray[np.uint8]
+    flags: NDArray[np.uint8]  # `estimation.recording.Flag` bits, shape (n,), uint8
+    # Channel name to its estimate, shape (n,) each; may be empty
     estimates: Mapping[str, FloatArray]
-    lost: int
-    devices: tuple[DeviceStatus, ...]
-    limits: tuple[LimitStatus, ...] = ()
+    lost: int  # Samples lost since the start
+    devices: tuple[DeviceStatus, ...]  # State of each device
+    limits: tuple[LimitStatus, ...] = ()  # Watched limits; may be empty
+    # Channel name to whether its estimate is within the fitted range of its estimator, shape (n,)
+    # each; channels of estimators without a range are missing
     inside: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -20,13 +20,9 @@ TICK_S = 1e-3
 
 @dataclass(frozen=True)
 class InCounts:
-    """Limits as the board holds them: in counts of a channel; one the rig has not is not limited.
+    """Limits in counts of a channel, as on the board; a channel the rig lacks is not limited."""
 
-    Attributes:
-        calibrations: Counts to SI.
-    """
-
-    calibrations: CalibrationSet
+    calibrations: CalibrationSet  # Counts to SI
 
     def size(self, channel: str, value: float) -> int:
         """Return a size in counts."""

@@ -19,15 +19,10 @@ from rig.machines.machine import FloatArray, MachinePlan
 
 @dataclass(frozen=True)
 class Observation:
-    """A run in which nothing moves.
+    """A run in which nothing moves."""
 
-    Attributes:
-        last: Samples of the run.
-        first: Index of its first.
-    """
-
-    last: int
-    first: int = 0
+    last: int  # Samples of the run
+    first: int = 0  # Index of its first
 
     @property
     def setpoints(self) -> tuple[FloatArray, ...]:

@@ -12,21 +12,15 @@ import rig
 
 @dataclass(frozen=True)
 class Provenance:
-    """Data needed to reproduce a result.
+    """Data needed to reproduce a result."""
 
-    Attributes:
-        date: Day and time, UTC, ISO 8601 to the minute.
-        commit: Commit of the source tree, with `+changes` when files differ from it; `unknown`
-            outside a git tree.
-        version: Version of rig.
-        seed: Seed of everything random.
-        command: Command line; of a path only the last part, since the others are the machine's own.
-    """
-
-    date: str
+    date: str  # Day and time, UTC, ISO 8601 to the minute
+    # Commit of the source tree, with `+changes` when files differ from it; `unknown` outside a git
+    # tree
     commit: str
-    version: str
-    seed: int
+    version: str  # Version of rig
+    seed: int  # Seed of everything random
+    # Command line; of a path only the last part, since the others are the machine's own
     command: str
 
     @classmethod

@@ -47,23 +47,14 @@ CLIPPED = 0.005
 
 @dataclass(frozen=True)
 class ChannelView:
-    """One channel over all runs.
+    """One channel over all runs."""
 
-    Attributes:
-        name: The channel.
-        unit: Its SI unit.
-        least: Least value.
-        greatest: Greatest value.
-        mean: Mean.
-        wrong: What looks wrong with it, in words.
-    """
-
-    name: str
-    unit: str
-    least: float
-    greatest: float
-    mean: float
-    wrong: tuple[str, ...]
+    name: str  # The channel
+    unit: str  # Its SI unit
+    least: float  # Least value
+    greatest: float  # Greatest value
+    mean: float  # Mean
+    wrong: tuple[str, ...]  # What looks wrong with it, in words
 
 
 @dataclass(frozen=True)
@@ -84,21 +75,13 @@ class RunView:
 
 @dataclass(frozen=True)
 class Preview:
-    """A look at a table.
+    """A look at a table."""
 
-    Attributes:
-        runs: Every run.
-        channels: Every channel.
-        first: Channel and time to the values of the first samples.
-        wrong: What looks wrong with channels together, in words.
-        remarks: What was assumed, left out or filled in, in words.
-    """
-
-    runs: tuple[RunView, ...]
-    channels: tuple[ChannelView, ...]
-    first: dict[str, list[float]]
-    wrong: tuple[str, ...]
-    remarks: tuple[str, ...]
+    runs: tuple[RunView, ...]  # Every run
+    channels: tuple[ChannelView, ...]  # Every channel
+    first: dict[str, list[float]]  # Channel and time to the values of the first samples
+    wrong: tuple[str, ...]  # What looks wrong with channels together, in words
+    remarks: tuple[str, ...]  # What was assumed, left out or filled in, in words
 
     @property
     def questions(self) -> list[str]:

@@ -18,20 +18,13 @@ Random = np.random.Generator
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A function of one variable.
+    """A function of one variable."""
 
-    Attributes:
-        variable: Name from `rig.simulation.varied.hidden.VARIABLES`.
-        low: First point of the grid.
-        high: Last point.
-        values: Shape (`POINTS`,).
-        periodic: Whether it repeats itself beyond the range; its last value is then its first.
-    """
-
-    variable: str
-    low: float
-    high: float
-    values: FloatArray
+    variable: str  # Name from `rig.simulation.varied.hidden.VARIABLES`
+    low: float  # First point of the grid
+    high: float  # Last point
+    values: FloatArray  # Shape (`POINTS`,)
+    # Whether it repeats itself beyond the range; its last value is then its first
     periodic: bool = False
 
     @property

@@ -29,15 +29,10 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Chosen:
-    """A model and what its last effect gained.
+    """A model and what its last effect gained."""
 
-    Attributes:
-        model: The fitted model.
-        gain: Share of the squared error of the model before it, on training runs left out.
-    """
-
-    model: Model
-    gain: float
+    model: Model  # The fitted model
+    gain: float  # Share of the squared error of the model before it, on training runs left out
 
 
 def selected(

@@ -38,19 +38,12 @@ DRAWN = (Bank(LOADS["command"]), "live")
 
 @dataclass(frozen=True)
 class StateStudy:
-    """Results.
+    """Results."""
 
-    Attributes:
-        schema: Name of this layout.
-        rows: The rows.
-        weights: Number of weights of the neutral pose's estimator.
-        notes: Remarks for the reader.
-    """
-
-    schema: str
-    rows: tuple[StateRow, ...]
-    weights: int
-    notes: tuple[str, ...]
+    schema: str  # Name of this layout
+    rows: tuple[StateRow, ...]  # The rows
+    weights: int  # Number of weights of the neutral pose's estimator
+    notes: tuple[str, ...]  # Remarks for the reader
 
 
 @dataclass(frozen=True, eq=False)
