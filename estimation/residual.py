@@ -34,15 +34,9 @@ VARIABLES: dict[str, str] = {
 }
 """Variables of the screening, and the channel of each."""
 
-BINS = 24
-"""Bins of a map; its range is that of the middle 98 % of the samples."""
-
-ORDERS = 12
-"""Highest order of a ripple that is looked for, per turn of the motor."""
-
-REST_RAD_S = 0.02
-"""Spindle speed below which the direction of motion counts as none, rad/s."""
-
+BINS = 24  # Bins of a map; its range is that of the middle 98 % of the samples
+ORDERS = 12  # Highest order of a ripple that is looked for, per turn of the motor
+REST_RAD_S = 0.02  # Spindle speed below which the direction of motion counts as none, rad/s
 SIMPLER_SHARE = 0.9
 """The direction is ranked before the speed when it explains this share of what the speed does."""
 

@@ -46,9 +46,7 @@ class Transport(Protocol):
         ...
 
 
-Opener = Callable[[str], Transport]
-"""Opens the transport a URL names."""
-
+Opener = Callable[[str], Transport]  # Opens the transport a URL names
 _openers: dict[str, Opener] = {}
 
 

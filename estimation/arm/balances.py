@@ -21,9 +21,7 @@ from estimation.effects import effect
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording
 
-ARMS = (PSM,)
-"""Arms that recordings may be of."""
-
+ARMS = (PSM,)  # Arms that recordings may be of
 CORRECTIONS = 3
 """Corrections of the links' parameters that each joint's equation fits with every candidate."""
 

@@ -17,9 +17,7 @@ from rig.simulation.varied.forms import Random, course, falling, grid, rising, s
 from rig.simulation.varied.frictions import bank, power
 from rig.simulation.varied.hidden import BANK
 
-OWN = "the simulation's own"
-"""The written form that a study's paper was matched with."""
-
+OWN = "the simulation's own"  # The written form that a study's paper was matched with
 SIGN_SHARE = 0.02
 """Speed over which a friction changes its sign, as a share of a joint's usual highest."""
 

@@ -20,9 +20,7 @@ from rig.simulation.varied.strength import Fits, amplitude_for, fits_of, shown
 from rig.simulation.varied.truth import HiddenTruth, Truth
 
 TRIED_RUNS = 5
-DRAWS = 2
-"""Draws of an effect's form on one rig before another rig is drawn."""
-
+DRAWS = 2  # Draws of an effect's form on one rig before another rig is drawn
 WORST_TRACKING = 0.4
 """A rig follows when its error is below this share of what it is asked for, both rms."""
 

@@ -13,8 +13,7 @@ from rig.simulation.varied.hidden import Hidden
 from rig.simulation.varied.plant import Plant
 
 TICK_S = 1e-3
-MARGIN = 0.15
-"""How far a table reaches beyond the usual range of its variable, shares of it."""
+MARGIN = 0.15  # How far a table reaches beyond the usual range of its variable, shares of it
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,8 +35,7 @@ from rig.simulation.varied import hidden
     COMMAND,
     LOAD,
 ) = range(8)
-LOGGED = 8
-"""Columns of a tick: the instant's true values, then the commands that act from it on."""
+LOGGED = 8  # Columns of a tick: the instant's true values, then the commands that act from it on
 
 (
     ONE,
