@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.asking import commit
+from benchmarks.rigs import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.equations import lay_out, on_one_clock
@@ -27,7 +28,6 @@ from estimation.causes.search import search
 from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model
-from rig.simulation.varied import CALIBRATE, draw
 
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 GEAR_RATIO = 35.0  # Of all rigs: the derived channels of the reference rig are made for it

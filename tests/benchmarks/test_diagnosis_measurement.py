@@ -24,14 +24,14 @@ from benchmarks.diagnosis.ratio import errors_without
 from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.seeds import next_to_judge
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
+from benchmarks.rigs import DEVELOP, JUDGE, HiddenTruth
+from benchmarks.rigs import Truth as VariedTruth
 from estimation.derived import zero_phase_channels
 from estimation.effects import families
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
 from rig.log.convert import run_info
 from rig.simulation.hidden import NAMES, HiddenEffect
-from rig.simulation.varied import DEVELOP, JUDGE, HiddenTruth
-from rig.simulation.varied import Truth as VariedTruth
 
 pytestmark = pytest.mark.integration
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs import draw
 from estimation.fitting import fit
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
@@ -15,7 +16,6 @@ from rig.log.convert import write_recording
 from rig.machines.recordings import open_recordings
 from rig.machines.shipped import read_machine, shipped
 from rig.simulation.fitted import plant_of
-from rig.simulation.varied import draw
 
 SLIDE = """
 schema = "rig.machine/1"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.recording import FloatArray
-from rig.simulation.varied.forms import Table
+from rig.simulation.forms import BANK, Table
 
 VARIABLES = (
     "one",
@@ -48,7 +48,6 @@ torque against the jaw in front of its sensor, cable wound beyond a round pulley
 
 OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
 MOST = 2  # Most effects at once
-BANK = 40  # Most elements side by side of an operator with memory
 SHAPES = 4
 TABLE_POINTS = 2048
 
