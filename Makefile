@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo demo-real test test-unit test-long lint site bench measure mutants mutants-core soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo demo-real test test-unit test-long lint site bench measure results mutants mutants-core soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -72,6 +72,12 @@ bench: $(VENV)/.developing firmware
 MEASURE ?=
 measure: $(VENV)/.developing
 	$(BIN)/python -m benchmarks.diagnosis measure $(MEASURE)
+
+# the pages of docs/results and how old they are; REMAKE=loop,pique makes them again, REMAKE=old all
+# that are older than their code; RIG_DATA is the folder of the measured data
+REMAKE ?=
+results: $(VENV)/.developing firmware
+	$(BIN)/python -m benchmarks.results $(if $(REMAKE),--remake $(REMAKE))
 
 # an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
 # listening sockets;

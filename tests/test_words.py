@@ -42,9 +42,6 @@ BANNED: dict[str, tuple[str, str]] = {
 """Pattern of a word -> the reason against it, and what to write."""
 
 RIGHT = {
-    "estimation/arm/effects.py": ("bent cable J",),
-    "rig/arm/hidden.py": ("bent drag",),
-    "rig/grasper/hidden.py": ("bent in the load",),
     "estimation/effects/friction_capstan_wrist.py": ("straight and bent",),
     "estimation/effects/ripple_output.py": ("bent shaft",),
     "estimation/effects/sensor_crosstalk.py": ("bent mount",),

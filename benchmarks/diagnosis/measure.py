@@ -52,7 +52,7 @@ def measure(
         cases: The cases, in the order in which they are asked.
         rig: The version to ask.
         folder: Where the answers of this version and generator are kept.
-        ask: Whether to ask where there is no answer yet; else such cases are left out.
+        ask: Whether to ask where an answer is missing; else such cases are left out.
         on_row: Called with each row as it is made.
     """
     folder.mkdir(parents=True, exist_ok=True)

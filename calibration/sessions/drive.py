@@ -5,8 +5,7 @@ While the shaft turns steadily and unloaded
     i = F sgn(v) + b v + c,
 
 F the current that friction takes, below which no grip shows, b that of damping, and c the zero of
-the current's measurement. Without a torque sensor there is no torque constant: that of the data
-sheet makes a torque of it.
+the current's measurement. Without a torque sensor the torque constant is that of the data sheet.
 """
 
 from collections.abc import Sequence

@@ -86,7 +86,7 @@ class Amt21(PolledDevice):
         """Ask for the position.
 
         Raises:
-            LinkTimeoutError: There is no position that the shaft can have.
+            LinkTimeoutError: Every position read is one that the shaft cannot have.
         """
         position = self._plausible()
         if position is None:

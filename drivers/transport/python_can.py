@@ -1,6 +1,6 @@
 """CAN buses by python-can, opened by URL: `can:INTERFACE:CHANNEL[?option=value&...]`.
 
-Frames are read by the caller itself: there is no reader thread that could die unnoticed. What an
+Frames are read by the caller itself: no reader thread could die unnoticed. What an
 interface raises becomes an error of this room, with its own as the cause.
 
 Not known here: whether a bus has a terminator, or another node to acknowledge frames. On a bus

@@ -148,7 +148,7 @@ def _pulls(arm: Arm, k: int, other: int) -> list[ArmEffect]:
             on(lambda q: q),
         ),
         ArmEffect(
-            f"bent cable J{other + 1} on J{k + 1}",
+            f"squared cable pull J{other + 1} on J{k + 1}",
             "elastic torque on one joint by the square of another's position",
             on(lambda q: q**2),
         ),

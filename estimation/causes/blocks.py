@@ -136,13 +136,17 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     )
     declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
     entered = {name for name, _ in block.base}
-    changes = [
-        declared[:, at] / (joint.declared[at] or 1.0)
+    changes = {
+        name: declared[:, at] / (joint.declared[at] or 1.0)
         for name, at in joint.largest_linear().items()
         if name in entered
-    ]
-    kept = [(change > 1.0 / MOST_CHANGE) & (change < MOST_CHANGE) for change in changes]
+    }
+    kept = [(change > 1.0 / MOST_CHANGE) & (change < MOST_CHANGE) for change in changes.values()]
     replaces = ~np.logical_and.reduce(kept) if kept else np.zeros(len(base), dtype=np.bool_)
+    for found in errors:
+        for name, change in changes.items():
+            # in the unit of the equation's largest reading, whose noise the residual may be
+            found[name, "within"] *= np.maximum(1.0, 1.0 / np.maximum(change, 1e-3) ** 2)
     residual = right - np.einsum("rcik,i->rck", cross, usual)
     return Outcome(errors, amplitudes, replaces, residual, own)
 

@@ -17,9 +17,9 @@ from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
 
-SKEW_S = 5e-4
+SKEW_S = 1e-3
 MOST_SKEW = 2.0
-"""Usual delay of a reading against the others, half a sample at 1 kHz, and the most, over it."""
+"""Usual delay of a reading against the others, a sample at 1 kHz, and the most, over it."""
 
 QUIET = 0.002
 """Noise of a channel over its range below which no column follows it."""

@@ -32,12 +32,21 @@ class HeldOut:
         self.joint = with_skews(Joint(layout, numbers), late)
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
 
-    def acts_in(self, candidate: Candidate) -> Mapping[str, bool | None]:
-        """Return whether a cause acts in each run; None where the training runs do not decide.
+    def acts_in(
+        self, before: Sequence[Candidate], cause: Candidate
+    ) -> tuple[Mapping[str, bool], Sequence[str]]:
+        """Return whether a cause acts in each run, and the test runs that themselves decide it.
 
         A test run between a run in which the cause acts and one in which it does not is open: a
-        change at one time of the campaign may be before it or after it.
+        change at one time of the campaign may be before it or after it. The cause acts in it if it
+        lowers the error there, next to the causes before it.
         """
+        known, gains = self._known(cause), self._gains(before, cause)
+        acts = {name: gains[name] > 0.0 if x is None else x for name, x in known.items()}
+        return acts, [name for name, x in known.items() if x is None]
+
+    def _known(self, candidate: Candidate) -> Mapping[str, bool | None]:
+        """Return whether a cause acts in each run; None where the training runs do not decide."""
         order = [run.name for run in self.layout.runs]
         train = [r for k, r in enumerate(order) if k not in self.at]
         since_s = _since(candidate)
@@ -57,24 +66,26 @@ class HeldOut:
         return out
 
     def evidence(self, before: Sequence[Candidate], cause: Candidate) -> float:
-        """Return the e-value of one more cause on the test runs that it decides.
+        """Return the e-value of one more cause on the test runs.
 
-        It is the likelihood ratio of as many independent samples as these runs are worth.
+        It is the product over the runs of the likelihood ratio of as many independent samples as a
+        run is worth; of an open run, the mean of this ratio and that of no cause.
         """
+        known, total = self._known(cause), 0.0
+        for name, gain in self._gains(before, cause).items():
+            ratio = 0.5 * self.numbers.samples_a_run * gain
+            total += ratio if known[name] is not None else np.logaddexp(ratio, 0.0) - math.log(2.0)
+        return math.exp(min(total, 300.0))
+
+    def _gains(self, before: Sequence[Candidate], cause: Candidate) -> Mapping[str, float]:
+        """Return the score of a cause in each test run, as if it acted in those that are open."""
         old, new = self._squared(before), self._squared([*before, cause])
-        state = self.acts_in(cause)
-        open_to = [k for k, at in enumerate(self.at) if state[self.layout.runs[at].name] is None]
-        known = [k for k in range(len(self.at)) if k not in open_to]
-        if not known:
-            return 1.0
-        total = 0.0
+        total = np.zeros(len(self.at))
         for p, samples in self.joint.samples.items():
-            pair = [
-                np.asarray(e[p][known].sum() / samples[self.at][known].sum()) for e in (old, new)
-            ]
-            total += float(self.joint.log_ratio(p, pair[0], pair[1]))
-        worth = 0.5 * self.numbers.samples_a_run * len(known)
-        return math.exp(min(worth * total, 300.0))
+            mean = [e[p] / samples[self.at] for e in (old, new)]
+            total += self.joint.log_ratio(p, mean[0], mean[1])
+        names = [self.layout.runs[k].name for k in self.at]
+        return dict(zip(names, total.tolist(), strict=True))
 
     def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""
@@ -85,10 +96,10 @@ class HeldOut:
         return {p: values[self.at] for p, values in errors.items()}
 
     def _with(self, joint: Joint, candidate: Candidate) -> Joint:
-        """Return a regression with a cause; where it is open whether it acts it does not."""
+        """Return a regression with a cause; where it is open whether it acts it does."""
         acts = None
         if candidate.acts is not None:
-            acts = tuple(on is True for on in self.acts_in(candidate).values())
+            acts = tuple(on is not False for on in self._known(candidate).values())
         laid = laid_out(self.joint, Claim(candidate.cause, acts))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 

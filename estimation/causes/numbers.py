@@ -23,7 +23,7 @@ class Numbers:
         sharpness: Log odds between two causes for one unit of score.
         choice_price: Score that one unit of the logarithm of the number of choices costs.
         cause_cost: Further score that a cause costs.
-        function_cost: Further score that an unknown form costs.
+        rare_cost: Further score that an unknown form costs, and acting in some of the runs only.
         kept_evidence: E-value on the test runs from which a cause is kept.
     """
 
@@ -35,7 +35,7 @@ class Numbers:
     sharpness: float = 12.0
     choice_price: float = 0.02
     cause_cost: float = 0.08
-    function_cost: float = 0.16
+    rare_cost: float = 0.16
     kept_evidence: float = 20.0
 
 

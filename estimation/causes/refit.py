@@ -6,7 +6,7 @@ runs. Shapes stay as they were found. Fits and errors count the samples that the
 standstill friction takes any value.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
+from estimation.causes.laid import TINY
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
 from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
@@ -33,7 +34,7 @@ class Part:
     Attributes:
         term: The term, or None.
         acts: Names of the runs in which the term acts; in all when None.
-        unwritten: The columns where there is no term.
+        unwritten: The columns if the term is None.
         precision: Prior precision of an amplitude of these, in units of the inverse squared column.
     """
 
@@ -147,10 +148,9 @@ class Refit:
             return None
         return known[0].whole[channel][known[1]]
 
-    def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
-        """Return the errors on the test runs, or on some of them."""
-        names = [name for name in self.test_names if name not in without]
-        found = [(name, self.residuals(solved, name)) for name in names]
+    def errors(self, solved: Solved) -> Errors:
+        """Return the errors on the test runs."""
+        found = [(name, self.residuals(solved, name)) for name in self.test_names]
         left = {name: one[1] for name, one in found if one is not None}
         return Errors(
             {name: float(np.sum((e - e.mean()) ** 2)) for name, e in left.items()},
@@ -207,7 +207,11 @@ class Refit:
             samples += len(whole)
         gram = np.sum(grams, axis=0)
         penalty, low, high = self._limits(parts)
-        penalty = penalty * samples / (len(grams) * self.numbers.samples_a_run)
+        independent = len(grams) * self.numbers.samples_a_run
+        # as in the search: no term exceeds half of all signals
+        error = _unexplained(gram, sum(len(t.effect.amplitudes) for t in self._declared))
+        most = 4.0 * np.diag(gram)[:-1] * error / (max(gram[-1, -1], TINY) * independent)
+        penalty = penalty * samples / independent + most
         weights = solve_within(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1], low, high)
         level = 0.0
         if self.model.run_offsets:
@@ -262,6 +266,13 @@ class Refit:
                     ),
                 )
         return held[name]
+
+
+def _unexplained(gram: FloatArray, count: int) -> float:
+    """Return the squared error that the first columns of products leave of the last one."""
+    right = gram[:count, -1]
+    explained = right @ np.linalg.lstsq(gram[:count, :count], right)[0]
+    return max(float(gram[-1, -1] - explained), 0.0)
 
 
 def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:

@@ -28,10 +28,6 @@ class Refits:
         recordings: The runs, with the campaign's time.
         sealed: Which runs train and which test.
         numbers: What decides.
-
-    Attributes:
-        open: Test runs not counted in errors: the training runs do not show whether a cause acts
-            in them.
     """
 
     def __init__(
@@ -43,14 +39,13 @@ class Refits:
             for name, e in layout.equations.items()
         }
         self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
-        self.open: set[str] = set()
 
-    def add(self, candidate: Candidate, acts_in: Mapping[str, bool | None]) -> None:
+    def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> None:
         """Add a cause to every equation it enters.
 
         Args:
             candidate: The cause.
-            acts_in: Run to whether it acts there; None where the training runs do not decide.
+            acts_in: Run to whether it acts there.
         """
         runs = [name for name, acts in acts_in.items() if acts]
         for name in dict.fromkeys(e.equation for e in candidate.cause.place.enters):
@@ -68,7 +63,7 @@ class Refits:
 
     def test_errors(self, name: str) -> Errors:
         """Return an equation's errors on the test runs with the causes so far."""
-        return self.of[name].errors(self.after(name), self.open)
+        return self.of[name].errors(self.after(name))
 
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""
@@ -79,7 +74,7 @@ class Refits:
         out = {}
         for name, refit in self.of.items():
             solved = (self.before(name), self.after(name))
-            old, new = (refit.errors(s, self.open) for s in solved)
+            old, new = (refit.errors(s) for s in solved)
             out[name] = Error(
                 before=old.rmse,
                 after=new.rmse,

@@ -42,6 +42,7 @@ class Scored:
     Attributes:
         candidate: The candidate.
         score: Mean of the families of folds, less the price of what was chosen.
+        gain: The same with the price left in.
         by_family: Score of each family of folds.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
         by_run: Products of its columns with the base's residual and with themselves, of each run.
@@ -49,6 +50,7 @@ class Scored:
 
     candidate: Candidate
     score: float
+    gain: float
     by_family: FloatArray
     amplitudes: FloatArray
     by_run: tuple[FloatArray, FloatArray]
@@ -88,13 +90,8 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     if not first or first[0].score < 0.0:
         return Found([], [], joint, first[0].score if first else 0.0, late)
     chains = [_chain(ranking, start) for start in _starts(first)]
-    causes = list(max(chains, key=lambda chain: sum(c.score for c in chain)))
-    conditional = []
-    for k, cause in enumerate(causes):
-        # next to the others every candidate may be dropped: the cause then stands as it was found
-        ranked = ranking.next_to([c for c in causes if c is not cause]) or [cause]
-        conditional.append(ranked)
-        causes[k] = ranked[0]
+    causes = max(chains, key=lambda chain: sum(c.score for c in chain))
+    causes, conditional = _settled(ranking, causes)
     return Found(causes, conditional, joint, first[0].score, late)
 
 
@@ -145,6 +142,25 @@ def _chain(ranking: Ranking, start: Scored) -> list[Scored]:
     return causes
 
 
+def _settled(
+    ranking: Ranking, causes: Sequence[Scored]
+) -> tuple[list[Scored], list[Sequence[Scored]]]:
+    """Return causes, each the best next to the others, and what competes in the place of each.
+
+    A cause that is not worth its price next to the others goes, the least first.
+    """
+    settled, conditional = list(causes), list[Sequence[Scored]]()
+    for k, cause in enumerate(causes):
+        # next to the others every candidate may be dropped: the cause then stands as it was found
+        ranked = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
+        conditional.append(ranked)
+        settled[k] = ranked[0]
+    least = min(settled, key=lambda c: c.score)
+    if least.score < 0.0 and len(settled) > 1:
+        return _settled(ranking, [c for c in settled if c is not least])
+    return settled, conditional
+
+
 def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
     """Return the probability of each candidate by its score alone, shape (n,)."""
     scores = np.array([s.score for s in ranked])
@@ -153,13 +169,16 @@ def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
 
 
 def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
-    """Return the probability of each candidate, shape (n,).
+    """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
 
-    Only what is better than no cause at all competes with the best.
+    No cause at all has the score zero. What explains nothing has no share: of each weight that of
+    the same candidate without its gain is taken off.
     """
-    scores = np.array([s.score for s in ranked])
-    kept = np.where((scores > 0.0) | (scores == scores.max()), shares_of(ranked, numbers), 0.0)
-    return np.asarray(kept / kept.sum())
+    scores, gains = np.array([(s.score, s.gain) for s in ranked]).T
+    top = max(0.0, float(scores.max()))
+    explains = -np.expm1(-numbers.sharpness * np.maximum(gains, 0.0))
+    weights = np.exp(numbers.sharpness * (scores - top)) * explains
+    return np.asarray(weights / (weights.sum() + np.exp(-numbers.sharpness * top)))
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
@@ -184,9 +203,10 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             amplitudes = outcome.amplitudes[k]
             if outcome.replaces[k] or _sign_is_wrong(candidate, amplitudes):
                 continue
-            score = float(scores[k]) - _price(candidate, joint.numbers)
+            gain = float(scores[k])
+            score = gain - _price(candidate, joint.numbers)
             by_run = outcome.cross[:, k], outcome.own[:, k]
-            out.append(Scored(candidate, score, by_family[:, k], amplitudes, by_run))
+            out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
     return out
 
 
@@ -205,14 +225,15 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
     of the runs by all choices of them.
     """
-    choices = float(np.log(candidate.choices))
+    choices, cause = float(np.log(candidate.choices)), candidate.cause
+    changes = isinstance(cause, Function) and "time" in cause.variables
+    rare = candidate.is_function + (changes or candidate.acts is not None)
     if candidate.acts is not None:
         count, acting = len(candidate.acts), sum(candidate.acts)
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
         )
-    more = numbers.function_cost if candidate.is_function else 0.0
-    return numbers.cause_cost + more + numbers.choice_price * choices
+    return numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices
 
 
 def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
@@ -266,8 +287,8 @@ def _neighbours(candidate: Candidate) -> list[Claim]:
 def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     """Return named effects that act in some of the runs, as promising as there are.
 
-    Every effect is tried on cuts of two orders of the runs: of recording, and of the error that it
-    removes in each of them.
+    Every effect is tried on cuts of two orders of the runs: of recording, and of its size in each
+    of them.
     """
     count = len(joint.runs)
     if count < 6:
@@ -280,8 +301,8 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     for group in named.values():
         cross, own = (np.stack([s.by_run[i] for s in group]) for i in (0, 1))
         order = np.broadcast_to(np.arange(count), (len(group), count))
-        gains = np.argsort(_removed(cross, own), axis=1)[:, ::-1]
-        for runs in (order, order[:, ::-1], gains, gains[:, ::-1]):
+        sizes = np.argsort(_sizes(cross, own), axis=1)
+        for runs in (order, order[:, ::-1], sizes, sizes[:, ::-1]):
             every = np.arange(len(group))[:, None]
             sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own)]
             for one, chosen, removed in zip(group, runs, _removed(*sums), strict=True):
@@ -302,9 +323,24 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     return tried
 
 
+def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the size of candidates in each run, of that in all runs, shape (candidates, runs).
+
+    A run that shows little of a candidate is taken to have the size that all runs have.
+    """
+    everywhere = _solved(cross.sum(axis=1), own.sum(axis=1))[:, None]
+    shown = np.einsum("crj,crjk,crk->cr", everywhere, own, everywhere)
+    apart = (everywhere * cross).sum(axis=-1) - shown
+    return np.asarray(apart / (shown + 0.1 * shown.mean(axis=1, keepdims=True) + 1e-300))
+
+
 def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
     """Return the error that amplitudes remove, from products (..., k) and (..., k, k)."""
+    return np.asarray((cross * _solved(cross, own)).sum(axis=-1))
+
+
+def _solved(cross: FloatArray, own: FloatArray) -> FloatArray:
+    """Return amplitudes from products (..., k) and (..., k, k)."""
     size = np.einsum("...kk->...", own)[..., None, None]
     steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[-1])
-    solved = np.linalg.solve(steady, cross[..., None])[..., 0]
-    return np.asarray((cross * solved).sum(axis=-1))
+    return np.asarray(np.linalg.solve(steady, cross[..., None])[..., 0])

@@ -191,31 +191,22 @@ def _judged(
     numbers, sealed = refits.numbers, refits.sealed
     kept: list[Kept] = []
     findings: list[Finding] = []
-    notes: list[str] = []
-    for ranked in found.conditional:
-        likely = family_probabilities(ranked, numbers)
-        scored = likely[0].best
-        cause = scored.candidate.cause
-        evidence = held_out.evidence([k.scored.candidate for k in kept], scored.candidate)
-        if evidence < numbers.kept_evidence:
+    confirmed, notes = _confirmed(found, held_out, numbers)
+    for one in confirmed:
+        cause = one.scored.candidate.cause
+        acts_in, settled = held_out.acts_in(
+            [k.scored.candidate for k in kept], one.scored.candidate
+        )
+        if settled:
             notes.append(
-                f"{cause.family} ({cause.place.name}) was found in the training runs and not"
-                " confirmed on the test runs."
-            )
-            continue
-        one = Kept(scored, likely, ranked)
-        acts_in = held_out.acts_in(scored.candidate)
-        open_runs = [name for name, acts in acts_in.items() if acts is None]
-        if open_runs:
-            notes.append(
-                f"{', '.join(open_runs)}: the training runs do not show whether {cause.family} acts"
-                " there; not counted in the errors."
+                f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
+                " there; these test runs themselves do."
             )
         home = cause.place.home
         entered = dict.fromkeys(e.equation for e in cause.place.enters)
-        known, refits.open = dict(refits.parts), refits.open | {*open_runs}
+        known = dict(refits.parts)
         before = {name: refits.test_errors(name) for name in entered}
-        refits.add(scored.candidate, acts_in)
+        refits.add(one.scored.candidate, acts_in)
         after = {name: refits.test_errors(name) for name in entered}
         if not any(_is_lower(before[name], after[name], numbers) for name in entered):
             refits.parts = known
@@ -240,8 +231,34 @@ def _judged(
         part = refits.parts[home][-1]
         kept.append(replace(one, part=part))
         if not part.is_written:
-            notes.append(_unwritten(scored.candidate))
+            notes.append(_unwritten(one.scored.candidate))
     return kept, findings, notes
+
+
+def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:
+    """Return the causes with evidence on the test runs next to the others, and notes on the rest.
+
+    The one with the least evidence goes first: two effects may need one another.
+    """
+    left, notes = [], []
+    for ranked in found.conditional:
+        likely = family_probabilities(ranked, numbers)
+        left.append(Kept(likely[0].best, likely, ranked))
+    while left:
+        evidence = [
+            held_out.evidence(
+                [o.scored.candidate for o in left if o is not one], one.scored.candidate
+            )
+            for one in left
+        ]
+        if min(evidence) >= numbers.kept_evidence:
+            break
+        cause = left.pop(evidence.index(min(evidence))).scored.candidate.cause
+        notes.append(
+            f"{cause.family} ({cause.place.name}) was found in the training runs and not"
+            " confirmed on the test runs."
+        )
+    return left, notes
 
 
 def _is_lower(before: Errors, after: Errors, numbers: Numbers) -> bool:
@@ -268,9 +285,10 @@ def _named(one: Kept, may_name: bool) -> Finding:
     cause = one.scored.candidate.cause
     home = cause.place.home
     lead, covered = one.likely[0], one.likely[0].share
+    some = sum(p.share for p in one.likely)
     others: list[str] = []
     for likely in one.likely[1:]:
-        if covered >= (IN_SET if others else SURE):
+        if covered >= (IN_SET if others else SURE) * some:
             break
         covered += likely.share
         others.append(likely.family)

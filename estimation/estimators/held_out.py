@@ -17,7 +17,7 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
         seed: Seed of the folds.
 
     Raises:
-        NetworkError: There is no closing sample to fit.
+        NetworkError: No sample is a closing one.
     """
     found = [recipe.evidence_of(recording) for recording in campaign.evidence]
     runs = [run for run in found if run is not None]

@@ -20,7 +20,7 @@ class RunEvidence:
     normal: Normal  # The run's share in the normal equations
     ranges: FloatArray  # Lowest and highest value of each judged channel, shape (2, judged)
     places: FloatArray  # Conditions of each sample, shape (n, d); see `estimation.bank.beyond`
-    # What was held constant in the run; the interval looks beyond their levels
+    # What was held constant in the run; the interval grows beyond their levels
     conditions: Mapping[str, float | str] = field(default_factory=dict)
 
     @classmethod

@@ -143,7 +143,7 @@ IN_CATALOGUE: Mapping[str, tuple[tuple[str, ...], Drawer]] = {
     "loop after reversals": (LOOPS, _loop),
     "friction that falls with speed": (("friction.stribeck",), _falling),
     "friction along the angle": (("friction.position",), _by_angle),
-    "bent drag": (("friction.drag",), _drag),
+    "curved drag": (("friction.drag",), _drag),
     "friction that changes with time": (("friction.warmup",), _by_time),
 }
 """Family to the catalogue's names of it. The catalogue has the family, not the drawn form."""

@@ -32,7 +32,7 @@ def asked() -> Answers:
     """Ask for a machine on a terminal.
 
     Raises:
-        UsageError: There is no terminal to ask on.
+        UsageError: Standard input is not a terminal.
     """
     if not sys.stdin.isatty():
         raise UsageError(

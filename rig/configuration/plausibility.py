@@ -1,6 +1,6 @@
 """How far the rig's encoders and its measured current may contradict one another before it trips.
 
-The firmware core holds these limits. The board in Python, which is for simulation where there is no
+The firmware core holds these limits. The board in Python, which is for simulation without a
 compiler, does not.
 """
 

@@ -25,8 +25,8 @@ def engine(workers: int = 1, scheduler: str | None = None) -> Iterator[Executor 
             Its workers need the same version of rig.
 
     Raises:
-        UsageError: There is no such number of workers, the extra is not installed, or no scheduler
-            answers.
+        UsageError: The number of workers is impossible, the extra is not installed, or no
+            scheduler answers.
     """
     if workers < 1:
         raise UsageError(f"--workers is {workers}; it is 1 or more.")

@@ -20,7 +20,7 @@ LEAST = 0.2  # Share of the mean that stays where a form is least: no bearing is
 Drawer = Callable[[Random], FloatArray]
 
 IN_CATALOGUE: Mapping[str, tuple[str, Drawer]] = {
-    "bent in the load": ("load", lambda random: power(random, 0.6, 1.7)(grid()) + LEAST),
+    "curved in the load": ("load", lambda random: power(random, 0.6, 1.7)(grid()) + LEAST),
     "falling with speed": (
         "speed", lambda random: falling(random, grid() / random.uniform(0.05, 0.3)) + LEAST),
     "along the angle": ("angle", lambda random: np.exp(0.8 * smooth(random, 0.7))),

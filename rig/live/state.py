@@ -34,7 +34,7 @@ class Value:
     """A number, or the reason why there is none."""
 
     number: float | None  # The value, or None
-    missing: str = ""  # Why there is no value; empty when there is one
+    missing: str = ""  # Why the value is missing; empty when it is not
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The words of the display: numbers with their unit, or why there is no number.
+"""The words of the display: numbers with their unit, or why a number is missing.
 
 SI ends here: torque is shown in mN m and angles in degrees, to people only.
 """
@@ -73,7 +73,7 @@ def main_value(reading: Reading) -> tuple[str, Value]:
 
 
 def tip_force_n(reading: Reading, value: Value, lever_m: float) -> float | None:
-    """Return the force at the jaw tip, N, or None where there is no value or no lever.
+    """Return the force at the jaw tip, N, or None without a value or a lever.
 
     Grip force is jaw torque over the lever arm (O'Neill et al. 2018 measured 12 mm).
     """

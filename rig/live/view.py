@@ -177,7 +177,7 @@ def _device(device: DeviceStatus) -> Text:
 
 
 def _limits(limits: Sequence[LimitStatus], width: int, room: int) -> Iterator[Text]:
-    """Yield the limits, or the nearest of them where there is no room for all."""
+    """Yield the limits, or the nearest of them if the room is too small for all."""
     if len(limits) <= room:
         yield from (_limit(limit, width) for limit in limits)
         return

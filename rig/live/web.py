@@ -103,7 +103,7 @@ def traces(blocks: list[SampleBlock]) -> dict[str, Any]:
 
     Returns:
         `time_s`: two entries a piece; `values`: name of a trace to as many, in its shown unit,
-        None where there is no valid sample; `units`: name of a trace to that unit.
+        None where no sample is valid; `units`: name of a trace to that unit.
     """
     valid = np.concatenate([block.flags for block in blocks]) == 0
     time_s = np.concatenate([block.time_s for block in blocks])

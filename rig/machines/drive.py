@@ -1,6 +1,6 @@
 """One drive that this computer controls: the reference rig's machine at the drive's own rate.
 
-The drive's shaft counts as motor and as spindle. There is no load motor.
+The drive's shaft counts as motor and as spindle. It has no load motor.
 """
 
 import math

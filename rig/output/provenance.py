@@ -15,8 +15,8 @@ class Provenance:
     """Data needed to reproduce a result."""
 
     date: str  # Day and time, UTC, ISO 8601 to the minute
-    # Commit of the source tree, with `+changes` when files differ from it; `unknown` outside a git
-    # tree
+    # Commit of the source tree, with `+changes` when files outside `docs` differ from it; `unknown`
+    # outside a git tree
     commit: str
     version: str  # Version of rig
     seed: int  # Seed of everything random
@@ -27,8 +27,8 @@ class Provenance:
     def now(cls, seed: int) -> "Provenance":
         """Return the provenance of what this process makes now."""
         words = [Path(word).name if "/" in word else word for word in sys.argv]
-        if words and words[0] == "__main__.py":
-            words[0] = f"python -m {Path(sys.argv[0]).parent.name}"
+        if module := getattr(sys.modules["__main__"], "__spec__", None):
+            words[:1] = ["python", "-m", module.name.removesuffix(".__main__")]
         return cls(
             date=datetime.now(UTC).strftime("%Y-%m-%dT%H:%MZ"),
             commit=commit(Path(rig.__file__).parents[1]),
@@ -48,6 +48,8 @@ class Provenance:
 def commit(tree: Path) -> str:
     """Return the short commit of a source tree, or `unknown` when it is not a git tree.
 
+    Changes in `docs` do not count: pages made one after the other are of one commit.
+
     Args:
         tree: Root of the source tree.
     """
@@ -57,7 +59,9 @@ def commit(tree: Path) -> str:
     head = _ask(git, tree, "rev-parse", "--short", "HEAD")
     if head is None:
         return "unknown"
-    changes = _ask(git, tree, "status", "--porcelain", "--untracked-files=no")
+    changes = _ask(
+        git, tree, "status", "--porcelain", "--untracked-files=no", "--", ":/", ":/!docs"
+    )
     return head + ("+changes" if changes else "")
 
 

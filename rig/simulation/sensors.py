@@ -1,7 +1,7 @@
 """From physical quantities to counts, raw signs, and back with the nominal scales.
 
 All channels of a tick are sampled at the same instant, the start of the tick, before the controller
-runs; there is no delay between channels. Angles and the current are the state at that instant. The
+runs; channels have no delay between them. Angles and the current are the state at that instant. The
 two torques are those of the physics step that ends there (0.05 ms long), which puts them 0.025 ms
 earlier. The command logged in a row acts from that row's instant on, so the current answers it in
 the next row.

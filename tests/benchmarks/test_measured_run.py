@@ -2,39 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmarks.measured_run import CHANNELS, compare
-from estimation.recording import Recording
-from rig.errors import DataError
+from benchmarks.measured_run import compare
 from rig.importers.registry import open_campaign
-from rig.protocols import trajectory
-from rig.simulation.bench import SimulatedBench
-from rig.simulation.play import play
 
 pytestmark = pytest.mark.integration
-
-
-def simulated_run() -> Recording:
-    target = trajectory.sine(5.0, -np.pi / 3, np.pi / 6, 0.3)
-    columns = play(SimulatedBench(seed=9), target, np.full(target.size, 0.5))
-    return Recording("sim", np.arange(target.size) * 1e-3, columns)
-
-
-def test_a_simulated_run_compares_equal_to_itself_but_for_noise() -> None:
-    rows = {row.channel: row for row in compare(simulated_run())}
-    assert tuple(rows) == CHANNELS
-    for row in rows.values():
-        assert row.simulated.span == pytest.approx(row.measured.span, rel=0.05)
-    assert rows["spindle_angle_rad"].measured.span > 0.9
-
-
-def test_a_run_without_a_trajectory_is_refused() -> None:
-    run = simulated_run()
-    still = run.with_columns(target_angle_rad=np.zeros(len(run)))
-    with pytest.raises(DataError, match="no trajectory"):
-        compare(still)
 
 
 @pytest.mark.measured

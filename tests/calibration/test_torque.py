@@ -36,12 +36,6 @@ def test_shunts_of_a_350_ohm_bridge(kohm, mv_v):
     assert shunt_ratio(kohm * 1e3) * 1e3 == pytest.approx(mv_v, abs=5.1e-4)
 
 
-def test_a_shunt_is_a_bridge_with_one_arm_in_parallel():
-    bridge, shunt = 350.0, 60_400.0
-    arm = bridge * shunt / (bridge + shunt)
-    assert shunt_ratio(shunt) == pytest.approx(bridge / (bridge + arm) - 0.5)
-
-
 def shunted(seed=0, gain=1.0):
     rng = np.random.default_rng(seed)
     change = gain * shunt_ratio(60_400.0) * 2e6
@@ -94,13 +88,6 @@ def test_the_line_is_recovered_and_its_covariance_is_right():
     measured = np.cov(estimates.T)
     np.testing.assert_allclose(np.diag(stated), np.diag(measured), rtol=0.35)
     assert np.sign(stated[0, 1]) == np.sign(measured[0, 1])
-
-
-def test_a_sensor_that_falls_on_closing_has_a_negative_slope():
-    falling = [replace(step, counts=-step.counts) for step in series()]
-    result = fit_torque(falling)
-    assert result.slope_n_m == pytest.approx(-SLOPE, rel=1e-3)
-    assert result.zero_counts == pytest.approx(-ZERO, abs=1.0)
 
 
 def test_hysteresis_and_drift_are_measured():

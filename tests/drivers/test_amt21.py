@@ -38,12 +38,6 @@ def test_one_changed_bit_is_refused(value: int, bit: int) -> None:
         protocol.decode_reply(word.to_bytes(2, "little"))
 
 
-@pytest.mark.parametrize("reply", [b"", b"\x00", b"\x00\xc0\x00"])
-def test_an_answer_has_two_bytes(reply: bytes) -> None:
-    with pytest.raises(FrameError):
-        protocol.decode_reply(reply)
-
-
 def test_it_asks_at_its_rate_and_reads_the_angle() -> None:
     fake = Amt21Fake(counts_a_tick=100)
     device = Amt21(SimulatedTransport(fake), rate_hz=100.0)

@@ -78,15 +78,6 @@ def test_old_firmware_is_not_asked_for_units() -> None:
     device.close()
 
 
-def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
-    """Source: ATI 9610-05-1030, commands 7 and 8."""
-    first, *others = set_up()
-    assert first == (frame(0x20F), [frame(0x20F, "03080011")])
-    with ScriptedCanBus([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
-        assert AtiCan(bus).identify().firmware == "3.7.0"
-    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
-
-
 def test_replies_are_paired_among_other_frames_and_stragglers() -> None:
     first, second = "0000 0001 0003 0005", "0002 0004 0006"
     answer = [
@@ -153,25 +144,17 @@ def test_the_status_is_said_in_words_and_flags_what_cannot_be_used() -> None:
     device.close()
 
 
-@pytest.mark.parametrize(
-    ("bit", "words"),
-    [
-        (0, "watchdog"),
-        (1, "too high"),
-        (2, "too low"),
-        (3, "analog|ground"),
-        (4, "supply too high"),
-        (5, "supply too low"),
-        (6, "active calibration"),
-        (7, "memory"),
-        (8, "configuration"),
-        (11, "temperature too high"),
-        (12, "temperature too low"),
-        (14, "CAN"),
-    ],
+STATUS_BITS = (
+    "0 watchdog; 1 too high; 2 too low; 3 analog|ground; 4 supply too high; 5 supply too low; "
+    "6 active calibration; 7 memory; 8 configuration; 11 temperature too high; "
+    "12 temperature too low; 14 CAN"
 )
-def test_a_status_bit_is_that_of_the_manual(bit: int, words: str) -> None:
-    """Source: ATI 9610-05-1030, status word; bits 1 to 7, 11 and 12 make a reading unusable."""
+"""Source: ATI 9610-05-1030, status word; bits 1 to 7, 11 and 12 make a reading unusable."""
+
+
+@pytest.mark.parametrize("row", STATUS_BITS.split("; "))
+def test_a_status_bit_is_that_of_the_manual(row: str) -> None:
+    bit, words = int(row.split()[0]), row.split(" ", 1)[1]
     (said,) = protocol.status_words(1 << bit)
     assert re.search(words, said)
     assert bool(protocol.UNUSABLE & 1 << bit) == (bit in {1, 2, 3, 4, 5, 6, 7, 11, 12})
@@ -255,12 +238,6 @@ def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
     assert there.identify().serial == "FT012345"
 
 
-def test_options_that_are_no_sensors() -> None:
-    for options in ({"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}):
-        with pytest.raises(LinkError, match="not"):
-            open_ati_can("can:virtual:options", **options)  # type: ignore[arg-type]
-
-
 def test_the_torque_about_another_point() -> None:
     # 1 N along y at the sensor's origin, seen from 1 m behind it on x, turns about +z
     wrench = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
@@ -269,30 +246,6 @@ def test_the_torque_about_another_point() -> None:
     # a force whose line passes through the point has no torque about it
     pull = np.array([0.0, 0.0, -5.0, 0.0, 0.0, 0.0])
     assert not moved_wrench(pull, np.array([0.0, 0.0, 0.3]))[3:].any()
-
-
-@given(
-    st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6),
-    st.lists(st.floats(-1, 1), min_size=3, max_size=3),
-)
-def test_moving_there_and_back_changes_nothing(wrench: list[float], point: list[float]) -> None:
-    there = moved_wrench(np.array(wrench), np.array(point))
-    back = moved_wrench(there, -np.array(point))
-    assert back == pytest.approx(np.array(wrench), abs=1e-9)
-
-
-@given(st.integers(0, 2**16 - 1), st.lists(counts, min_size=6, max_size=6), st.integers(0, 127))
-def test_a_reading_survives_its_frames(status: int, gauges: list[int], base: int) -> None:
-    first, second = protocol.encode_reading(base, status, gauges)
-    assert (first.can_id, second.can_id) == (base << 4, base << 4 | 1)
-    decoded_status, decoded = protocol.decode_reading(first.data, second.data)
-    assert (decoded_status, decoded.tolist()) == (status, gauges)
-
-
-@given(st.lists(st.floats(width=32, allow_nan=False, allow_infinity=False), min_size=6, max_size=6))
-def test_a_matrix_row_survives_its_frames(row: list[float]) -> None:
-    frames = protocol.encode_matrix_row(0x20, np.array(row))
-    assert protocol.decode_matrix_row([frame.data for frame in frames]).tolist() == row
 
 
 @given(st.binary(max_size=8), st.binary(max_size=8), st.binary(max_size=8))
@@ -306,3 +259,18 @@ def test_any_bytes_are_decoded_or_refused(one: bytes, two: bytes, three: bytes) 
     ):
         with contextlib.suppress(FrameError):  # nothing else may be raised
             decode()
+
+
+def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
+    """Source: ATI 9610-05-1030, commands 7 and 8."""
+    first, *others = set_up()
+    assert first == (frame(0x20F), [frame(0x20F, "03080011")])
+    with ScriptedCanBus([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
+        assert AtiCan(bus).identify().firmware == "3.7.0"
+    assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
+
+
+def test_options_that_are_no_sensors() -> None:
+    for options in ({"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}):
+        with pytest.raises(LinkError, match="not"):
+            open_ati_can("can:virtual:options", **options)  # type: ignore[arg-type]

@@ -1,5 +1,7 @@
 """The digital F/T: messages as published, its calibration put in force, its stream."""
 
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
+from drivers.ati_serial.fake_modbus import ModbusServer
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.transport.faulty import FaultyTransport, once
 from drivers.transport.simulated import SimulatedTransport
@@ -72,6 +75,34 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     assert np.allclose(got, expected)
     device.close()
     assert not fake.server.streaming
+
+
+def test_a_calibration_laid_out_by_hand_is_read_through_another_makers_server() -> None:
+    """Source: the public driver `ati_force_torque`: offsets in registers, high byte first."""
+    matrix = np.arange(36, dtype=np.float32).reshape(6, 6) * 10 - 100
+    block = bytearray(protocol.encode_calibration(example_calibration()))
+    for offset, data in (
+        (0, b"FT12345\0"),
+        (4, b"SI-130-10".ljust(32, b"\0")),
+        (32, struct.pack(">36f", *matrix.ravel())),
+        (104, bytes([2, 3])),
+        (117, struct.pack(">I", 1_000_000)),
+        (119, struct.pack(">I", 500_000)),
+        (121, struct.pack(">6H", 540, 541, 542, 543, 544, 545)),
+        (127, struct.pack(">6H", 34920, 34921, 34922, 34923, 34924, 34925)),
+    ):
+        block[2 * offset : 2 * offset + len(data)] = data
+    fake = AtiSerialFake()
+    fake.server = ModbusServer(0x00E3, bytes(block))
+    device = AtiSerial(SimulatedTransport(fake))
+    identity = device.identify()
+    assert (identity.model, identity.serial) == ("ATI digital F/T SI-130-10", "FT12345")
+    sums = np.abs(matrix).sum(axis=1) * 32768
+    tops = [channel.upper for channel in device.channels]
+    assert tops == pytest.approx([*sums[:3] / 1e6, *sums[3:] / 5e5])
+    device.start()
+    expected = (540, 541, 542, 543, 544, 545, 34920, 34921, 34922, 34923, 34924, 34925)
+    assert tuple(fake.server.registers(0, 12)) == expected
 
 
 def test_a_stream_left_on_by_another_program_is_ended_first() -> None:
@@ -154,41 +185,3 @@ def test_an_answer_that_is_no_success_is_a_refusal(function: int) -> None:
     device = AtiSerial(SimulatedTransport(Refusing()))
     with pytest.raises(DriverError, match=f"refused function {function:#04x}"):
         device.start()
-
-
-def test_a_lost_answer_to_the_start_of_the_stream_is_asked_for_again() -> None:
-    cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
-    device = AtiSerial(cable)
-    device.identify()
-
-    def lose(data: bytes) -> bytes:
-        if data[:2] != bytes([protocol.SLAVE, protocol.STREAM]):
-            return data
-        cable.incoming = lambda later: later
-        return b""
-
-    cable.incoming = lose
-    device.start()
-    assert device.counters["retries"] == 1
-    assert len(device.read(0.1)) > 100
-
-
-def test_the_server_keeps_silent_where_a_slave_does_and_refuses_what_it_must() -> None:
-    fake = AtiSerialFake()
-    damaged = bytearray(protocol.read_registers(0, 1))
-    damaged[-1] ^= 1
-    body = bytes([protocol.SLAVE + 1]) + protocol.read_registers(0, 1)[1:-2]
-    elsewhere = body + protocol.crc16(body).to_bytes(2, "little")
-    for message in (bytes(damaged), elsewhere, protocol.JAM, b""):
-        fake.receive(message)
-        assert fake.transmit() == b""
-    fake.receive(protocol.read_registers(0x0FFF, 2))
-    assert protocol.decode(fake.transmit()) == (protocol.READ | protocol.FAILED, b"\x02")
-    fake.receive(protocol.encode(protocol.STORAGE, protocol.UNLOCK))
-    fake.receive(protocol.write_registers(3, (7, 8)))
-    fake.receive(protocol.encode(protocol.STORAGE, protocol.LOCK))
-    fake.receive(protocol.write_registers(3, (1, 1)))
-    fake.transmit()
-    assert fake.server.registers(2, 4) == (0, 7, 8, 0)
-    fake.receive(protocol.read_registers(3, 2))
-    assert protocol.decode(fake.transmit()) == (protocol.READ, bytes.fromhex("04 0007 0008"))

@@ -5,8 +5,6 @@ from collections.abc import Iterator
 
 import can
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.errors import (
     BusOffError,
@@ -162,12 +160,6 @@ def test_a_refusal_is_explained(
     assert caught.value.__cause__ is raised
 
 
-@given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans())
-def test_a_frame_survives_packing(can_id: int, data: bytes, extended: bool) -> None:
-    frame = CanFrame(can_id if extended else can_id & 0x7FF, data, extended)
-    assert CanFrame.from_bytes(frame.to_bytes()) == frame
-
-
 def test_a_frame_that_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="0x7ff"):
         CanFrame(0x800)
@@ -206,30 +198,6 @@ def test_virtual_time_passes_by_reading_alone() -> None:
     bus.close()
     with pytest.raises(LinkLostError):
         bus.read(1.0)
-
-
-def test_faults_strike_frames() -> None:
-    bus = FaultyCanBus(SimulatedCanBus([Parrot()]), Faults())
-
-    def came(count: int) -> list[bytes]:
-        for number in range(count):
-            bus.send(CanFrame(1, bytes([number])))
-        frames = []
-        while (frame := bus.read(0.1)) is not None:
-            frames.append(frame.data)
-        return frames
-
-    bus.faults.inject(Fault.DROP)
-    assert came(2) == [b"\x01"]
-    bus.faults.inject(Fault.DUPLICATE)
-    assert came(2) == [b"\x00", b"\x00", b"\x01"]
-    bus.faults.inject(Fault.DELAY, duration_s=0.05)
-    assert came(2) == [b"\x01", b"\x00"]
-    bus.faults.inject(Fault.STALL, duration_s=0.05)
-    assert came(2) == [b"\x00", b"\x01"]
-    bus.faults.inject(Fault.DISCONNECT)
-    with pytest.raises(LinkLostError):
-        bus.read(0.1)
 
 
 def test_a_late_frame_comes_though_its_time_is_but_a_rounding_away() -> None:

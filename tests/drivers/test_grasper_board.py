@@ -14,7 +14,6 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.grasper_board import INPUTS
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
-from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.bench_physics import TICK_FUNCTION
 from tests.drivers.raw_host import RawHost
@@ -66,15 +65,6 @@ def host_on(library: Path, inputs: NDArray[np.int32], gains: NDArray[Any] = GAIN
 
 
 STILL = [[0] * 50] * 3
-
-
-def test_its_contract_and_its_sample_differ_from_every_other_frame() -> None:
-    assert GRASPER.protocol_hash != REFERENCE.protocol_hash
-    sizes = {layout.itemsize for kind, layout in GRASPER.layouts.items() if kind is not Kind.SAMPLE}
-    assert GRASPER.sample.itemsize == 56
-    assert GRASPER.sample.itemsize not in sizes
-    assert (GRASPER.sample.itemsize - 4) % GRASPER.setpoint.itemsize
-    assert GRASPER.rate_hz == 2000
 
 
 def test_a_whole_session_at_2_khz_with_three_motors_each_on_its_own_way(library: Path) -> None:

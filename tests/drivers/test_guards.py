@@ -5,11 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.teensy import protocol
-from drivers.teensy.control import control_tick, new_state
 from drivers.teensy.core import BoardStart, CoreGuard, FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.teensy.reference import Limits
@@ -61,33 +58,6 @@ def test_the_edges_of_every_channel(library: Path, channel: str, limits: Limits)
     else:
         assert not any(crossed.values())
     assert saturated == (channel in ("proximal", "distal", "current", "fsr"))
-
-
-@settings(max_examples=40)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.sampled_from([10, 3000, 2**29]),
-    st.lists(st.floats(-50, 50), min_size=3, max_size=3),
-    st.floats(0, 1),
-    st.floats(0, 10000),
-)
-def test_the_plain_boards_controller_rounds_as_the_cores(
-    library: Path, seed: int, size: int, pid: list[float], weight: float, limit: float
-) -> None:
-    random = np.random.default_rng(seed)
-    inputs = np.zeros((100, 7), np.int32)
-    inputs[:, :2] = random.integers(-size - 1, size, (100, 2), endpoint=True)
-    wanted = random.integers(-size - 1, size, 100, endpoint=True)
-    gains = np.array([*(gain * 100 / size for gain in pid), weight, limit])
-    host = armed_on(library, inputs, gains=gains)
-    host.setpoints(wanted, np.zeros(100, int))
-    host.run(100)
-    state = new_state()
-    commands = [
-        control_tick(state, gains, int(target), int(row[1]), int(row[0]))
-        for target, row in zip(wanted, inputs, strict=True)
-    ]
-    assert host.samples()["command_e4"].tolist() == commands
 
 
 HELD = {"safe_state": SafeState.HOLD, "hold_command_e4": 300}

@@ -130,35 +130,6 @@ def test_a_torque_turns_the_output_and_the_end_is_without_force() -> None:
         device.read(0.1)
 
 
-@pytest.mark.parametrize("torque", [math.nan, math.inf, 0.11, -0.11])
-def test_a_torque_that_must_not_be_is_refused(torque: float) -> None:
-    device = armed(MoteusFake())
-    with pytest.raises(DriverError, match=r"limit is 0\.1"):
-        device.set_torque(torque)
-    device.close()
-
-
-def test_a_host_that_falls_silent_is_noticed_by_the_controller_and_said() -> None:
-    fake = MoteusFake()
-    device = armed(fake)
-    device.set_torque(0.01)
-    device.read(0.1)
-    fake.advance(100)
-    assert fake.torque_n_m == pytest.approx(0.01)
-    fake.advance(1)
-    assert fake.mode == protocol.TIMEOUT
-    assert fake.torque_n_m == 0.0
-    with pytest.raises(DriverError, match="timed out"):
-        device.read(0.1)
-    with pytest.raises(DriverError, match="not armed"):
-        device.set_torque(0.01)
-    device.arm()
-    device.set_torque(0.01)
-    device.read(0.1)
-    assert fake.torque_n_m == pytest.approx(0.01)
-    device.close()
-
-
 def test_a_fault_is_said_in_words_and_cleared_by_arming() -> None:
     fake = MoteusFake()
     device = armed(fake)
@@ -181,18 +152,6 @@ def test_a_controller_that_is_stopped_by_somebody_is_said() -> None:
     fake.advance(200)  # it is not started again behind the caller's back
     assert fake.mode == protocol.TIMEOUT
     device.close()
-
-
-def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
-    cable = FaultyTransport(SimulatedTransport(MoteusFake()))
-    device = Moteus(cable)
-    device.start()
-    device.arm()
-    cable.incoming = lambda data: b""
-    with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*0\.1 s"):
-        device.disarm()
-    with pytest.raises(DisarmUnconfirmedError):
-        device.close()
 
 
 def test_a_disarm_is_not_believed_while_the_mode_says_otherwise() -> None:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.teensy import protocol
@@ -13,7 +12,7 @@ from drivers.teensy.fake import PythonBoard
 from drivers.teensy.protocol import Kind, Result, Trip
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import Board
-from tests.drivers.bench_physics import START_SPINDLE, PlainBench, ScriptedBench
+from tests.drivers.bench_physics import START_SPINDLE, PlainBench
 from tests.drivers.raw_host import GAINS, RawHost
 
 QUICK = Limits(watchdog_us=100_000)
@@ -174,119 +173,5 @@ def test_offers_differ_between_starts_of_a_board(library: object) -> None:
 
 
 # what a line, a second program or an attacker may send: old frames, in any order, cut or whole
-MIN_SPINDLE, MAX_SPINDLE = 900, 1800
-OWN = Limits(
-    min_spindle=MIN_SPINDLE,
-    max_spindle=MAX_SPINDLE,
-    max_load_ma=400,
-    max_current=1500,
-    watchdog_us=50_000,
-    dry_ticks=60,
-    hold_ticks=100,
-)
 numbers = st.integers(0, 6)
 sessions = st.sampled_from(["offer", "live", "zero", "old"])
-steps = st.one_of(
-    st.tuples(st.just("arm"), sessions, st.booleans()),
-    st.tuples(st.just("move"), sessions, st.integers(-3000, 5000), st.integers(-900, 900)),
-    st.tuples(st.just("ping"), sessions),
-    st.tuples(st.just("clear"), st.integers(0, 21)),
-    st.tuples(st.just("plain"), st.sampled_from([Kind.START, Kind.STOP, Kind.DISARM, Kind.HELLO])),
-    st.tuples(st.just("again"), st.integers(0, 40)),
-    st.tuples(st.just("bytes"), st.binary(max_size=40)),
-    st.tuples(st.just("run"), st.integers(1, 80)),
-    st.tuples(st.just("stop"), st.booleans()),
-)
-
-
-class Adversary:
-    """Plays steps against a core with limits of its own and keeps what must hold."""
-
-    def __init__(self) -> None:
-        inputs = np.zeros((1, 7), np.int32)
-        inputs[:, 1] = HERE
-        self.bench = ScriptedBench(inputs)
-        self.board = FirmwareBoard(self.bench, own=([0, 0, 0, 0, 3000], OWN))
-        self.host = RawHost(self.board, gains=[20.0, 0.05, -1.0, 0.2, 3000.0])
-        self.host.command(Kind.START)
-        self.sent: list[bytes] = []
-        self.live: int | None = None
-        self.old = 1
-
-    def session(self, which: str) -> int:
-        if which == "offer":
-            return self.host.hello().offer
-        return {"live": self.live or 0, "zero": 0, "old": self.old}[which]
-
-    def step(self, step: tuple) -> None:
-        before = self.host.armed
-        what = step[0]
-        payload = b""
-        offer = self.host.hello().offer
-        if what == "arm":
-            wide = Limits(watchdog_us=OWN.watchdog_us)
-            session = self.session(step[1])
-            payload = self.host.arm_payload(wide if step[2] else OWN, session)
-        elif what == "move":
-            self.host.session = self.session(step[1])
-            payload = self.host.setpoints_payload([step[2]] * 3, [step[3]] * 3)
-        elif what == "ping":
-            number = self.host.next_number()
-            payload = protocol.encode_ping(number, 0, self.session(step[1]))
-        elif what == "clear":
-            payload = protocol.encode_clear(self.host.next_number(), step[1])
-        elif what == "plain":
-            payload = protocol.encode_command(step[1], self.host.next_number())
-        elif what == "again" and self.sent:
-            payload = self.sent[step[1] % len(self.sent)]
-        elif what == "bytes":
-            self.host.send(step[1])
-        elif what == "run":
-            self.host.run(step[1])
-        elif what == "stop":
-            self.board.stop(step[1])
-        if payload:
-            self.host.send(payload)
-        after = self.host.armed
-        if after and not before:
-            is_arm = payload[1:2] == bytes([Kind.ARM])
-            assert is_arm, step
-            assert payload[4:8] == offer.to_bytes(4, "little"), step
-            assert payload not in self.sent, "bytes that were sent before have armed the board"
-            self.old, self.live = self.live or 1, offer
-        if payload:
-            self.sent.append(payload)
-
-    def judge(self) -> None:
-        samples = self.host.samples()
-        assert (np.abs(samples["command_e4"].astype(int)) <= 3000).all()
-        assert (np.abs(samples["load_ma"].astype(int)) <= 400).all()
-        asked = samples["command_e4"] != 0
-        assert (samples["target"][asked] >= MIN_SPINDLE).all()
-        assert (samples["target"][asked] <= MAX_SPINDLE).all()
-        force = protocol.STATUS_ARMED | protocol.STATUS_HOLDING
-        out = (samples["status"] & force) == 0
-        assert not samples["command_e4"][out].any()
-        assert not samples["load_ma"][out].any()
-
-
-@settings(max_examples=60)
-@given(st.lists(steps, max_size=60))
-def test_no_sequence_arms_without_a_live_session_or_moves_beyond_the_boards_limits(
-    library: object, script: list[tuple]
-) -> None:
-    adversary = Adversary()
-    for step in script:
-        adversary.step(step)
-    adversary.judge()
-
-
-@pytest.mark.long
-@pytest.mark.timeout(3600)
-@settings(max_examples=5_000)
-@given(st.lists(steps, min_size=20, max_size=60))
-def test_no_sequence_of_many_does_either(library: object, script: list[tuple]) -> None:
-    adversary = Adversary()
-    for step in script:
-        adversary.step(step)
-    adversary.judge()

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,16 +111,6 @@ def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board: MakeBoard) 
     logger.close()
 
 
-def test_nothing_to_read_is_an_empty_batch_after_the_timeout(make_board: MakeBoard) -> None:
-    transport = SimulatedTransport(make_board())
-    logger = TeensyLogger(transport)
-    logger.identify()
-    batch = logger.read(0.25)
-    assert len(batch.samples) == len(batch.tick_us) == batch.lost == 0
-    assert transport.now_s == pytest.approx(0.25)
-    logger.close()
-
-
 def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: MakeBoard) -> None:
     logger = logger_of(make_board())
     logger.start()
@@ -146,23 +135,6 @@ def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: Ma
     logger.close()
 
 
-def test_a_crossed_limit_takes_the_motor_out_of_force_in_the_same_tick(library: Path) -> None:
-    logger = logger_of(FirmwareBoard(PlainBench(), library=library))
-    logger.start()
-    limits = Limits(1500, 1000, 5800, 32767, -4000, 4000)
-    logger.arm(GAINS, limits)
-    logger.queue(np.full(200, -4000), np.zeros(200, np.int64))
-    samples = joined(read_for(logger, 200))
-    tripped = np.flatnonzero(samples["status"] & protocol.STATUS_LIMIT_TRIPPED)[0]
-    assert abs(int(samples["current"][tripped])) > 1500 or samples["proximal"][tripped] > 5800
-    before = samples[:tripped]
-    assert (np.abs(before["current"].astype(int)) <= 1500).all()
-    assert (before["proximal"] <= 5800).all()
-    assert before["command_e4"][-1] != 0
-    assert not samples["command_e4"][tripped:].any()
-    logger.close()
-
-
 def test_a_dry_queue_holds_the_last_target_and_says_so(make_board: MakeBoard) -> None:
     logger = logger_of(make_board())
     logger.start()
@@ -177,23 +149,6 @@ def test_a_dry_queue_holds_the_last_target_and_says_so(make_board: MakeBoard) ->
     assert np.flatnonzero(dry)[0] == 10
     assert set(samples["target"]) == {START_SPINDLE - 70}
     assert set(samples["load_ma"]) == {5}
-    logger.close()
-
-
-def test_the_board_refuses_what_must_not_be(library: Path) -> None:
-    logger = logger_of(FirmwareBoard(PlainBench(), library=library))
-    with pytest.raises(CommandRefusedError, match="finite"):
-        logger.arm([np.nan, 0, 0, 0.5, 1], WIDEST)
-    with pytest.raises(CommandRefusedError):
-        logger.arm([1, 0, 0, 0.5, 10_001], WIDEST)
-    logger.arm(GAINS, Limits(1000, 500, 1000, 1000, -100, 100))
-    with pytest.raises(CommandRefusedError, match="limits"):
-        logger.queue(np.array([101]), np.array([0]))
-    with pytest.raises(CommandRefusedError):
-        logger.queue(np.array([0]), np.array([501]))
-    with pytest.raises(CommandRefusedError, match="full") as refusal:
-        logger.queue(np.zeros(2001, np.int64), np.zeros(2001, np.int64))
-    assert refusal.value.result == Result.QUEUE_FULL
     logger.close()
 
 
@@ -213,21 +168,6 @@ def test_setpoints_are_whole_numbers_in_range(targets: np.ndarray, loads: np.nda
     logger.arm(GAINS, WIDEST)
     with pytest.raises(DriverError):
         logger.queue(targets, loads)
-    logger.close()
-
-
-def test_a_clock_exchange_comes_back_with_the_samples(make_board: MakeBoard) -> None:
-    transport = SimulatedTransport(make_board())
-    logger = TeensyLogger(transport)
-    logger.start()
-    read_for(logger, 100)
-    sent_s = transport.now_s
-    logger.heartbeat()
-    logger.read(0.1)
-    assert logger.last_exchange is not None
-    assert logger.last_exchange.sent_s == sent_s
-    assert logger.last_exchange.received_s >= sent_s
-    assert logger.last_exchange.tick_us == round(sent_s * 1e6) - 1000
     logger.close()
 
 
@@ -299,15 +239,6 @@ def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: Ma
     cable.incoming = lambda data: b"" if data and next(came) == 1 else data  # behind the hello's
     with pytest.raises(CommandRefusedError, match="not any more"):
         logger.arm(GAINS, Limits(watchdog_us=50_000))
-    assert logger.counters.retries == 1
-    logger.close()
-
-
-def test_a_damaged_command_is_sent_again(make_board: MakeBoard) -> None:
-    cable, logger = behind_a_bad_cable(make_board())
-    logger.identify()
-    cable.outgoing = once(lambda data: data[:2] + b"\x55" + data[3:])
-    logger.arm(GAINS, WIDEST)
     assert logger.counters.retries == 1
     logger.close()
 

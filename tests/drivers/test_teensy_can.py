@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from drivers.errors import LinkError
 from drivers.framing import cobs_encode, encode_frame
-from drivers.teensy import protocol
 from drivers.teensy.can_device import open_teensy_can
 from drivers.teensy.can_fake import BoardNode
 from drivers.teensy.can_segments import Joiner, Splitter
@@ -19,7 +18,6 @@ from drivers.teensy.fake import PythonBoard
 from drivers.transport.simulated_can import SimulatedCanBus
 from rig.bench.session import Session
 from rig.simulation.bench import SimulatedBench
-from tests.drivers.bench_physics import PlainBench
 from tests.rig.simulated import simulated
 
 pytestmark = pytest.mark.integration
@@ -100,14 +98,6 @@ def test_a_session_runs_over_can_unchanged() -> None:
     setpoint = np.concatenate([r.setpoint for r in readings])
     assert np.array_equal(setpoint[setpoint >= 0], np.arange(300))
     assert readings[-1].lost == 0
-
-
-def test_a_sample_takes_seven_frames() -> None:
-    node = BoardNode(PythonBoard(PlainBench()))
-    node.board.receive(encode_frame(protocol.encode_command(protocol.Kind.START, 1)))
-    node.transmit()
-    node.advance(1)
-    assert len(node.transmit()) == 7
 
 
 @pytest.mark.parametrize("ids", [(0x690, 0x690), (0, 0x6A0), (0x690, 0x800)])

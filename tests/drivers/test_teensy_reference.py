@@ -64,16 +64,6 @@ def test_a_shaft_that_turns_is_not_referenced(library: Path) -> None:
             logger.reference([0, 0, 0])
 
 
-def test_an_armed_board_is_not_referenced(library: Path) -> None:
-    with logger_of(library) as logger:
-        logger.start()
-        at_rest(logger)
-        logger.reference([0, 0, 0])
-        logger.arm(GAINS, Limits())
-        with pytest.raises(CommandRefusedError):
-            logger.reference([5, 5, 5])
-
-
 def test_a_trip_that_doubts_an_encoder_takes_its_reference(library: Path) -> None:
     jumps = STANDS.copy()
     jumps[600:, 1] += 500

@@ -184,12 +184,6 @@ def test_an_unknown_scheme_is_named() -> None:
         open_transport("smoke://signals")
 
 
-def test_a_registered_scheme_opens() -> None:
-    board = CountingBoard()
-    register_scheme("test-board", lambda url: SimulatedTransport(board, url))
-    assert open_transport("test-board://1").url == "test-board://1"
-
-
 class CountingBoard:
     """Sends one byte every 40 ticks and returns the bytes it receives."""
 

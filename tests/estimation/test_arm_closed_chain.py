@@ -8,7 +8,6 @@ import pytest
 from estimation.arm.closed_chain import (
     closed_jacobians,
     closed_regressor,
-    parameter_names,
     tree,
 )
 from estimation.arm.identification import damped_around
@@ -24,24 +23,6 @@ PERIOD_S = 0.01
 def motion():
     phase = 2 * np.pi * np.arange(400)[:, None] / 400
     return periodic_motion(0.3 * np.sin(phase * (1 + np.arange(5)) + np.arange(5)), PERIOD_S, 5.0)
-
-
-def test_eight_bodies_have_96_raw_parameters():
-    assert len(parameter_names(HYDRAULIC)) == 96
-    assert closed_regressor(HYDRAULIC, motion(), 0.01).shape == (400, 5, 96)
-
-
-def test_the_tie_bar_stays_parallel_to_the_second_link():
-    model, q = tree(HYDRAULIC), np.array([0.3, -0.2, 0.5, 0.1, 0.2]) @ HYDRAULIC.closure.T
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    bar, link = (
-        data.oMi[model.getJointId(name)].rotation for name in ("tie bar", "shoulder elevation")
-    )
-    parted = [tree(HYDRAULIC).createData(), np.zeros(8)]
-    pin.forwardKinematics(model, parted[0], parted[1])
-    start = [parted[0].oMi[model.getJointId(n)].rotation for n in ("tie bar", "shoulder elevation")]
-    np.testing.assert_allclose(bar.T @ link, start[0].T @ start[1], atol=1e-12)
 
 
 def test_gravity_torque_is_the_derivative_of_the_energy_through_the_loop():
@@ -99,9 +80,3 @@ def test_a_perfect_guess_is_kept_and_a_wrong_one_is_left():
     np.testing.assert_allclose(damped_around(columns, torque, np.zeros(3), 1e-3), truth, atol=1e-6)
     with pytest.raises(ArmError, match="not positive"):
         damped_around(columns, torque, truth, 0.0)
-
-
-def test_a_motion_of_other_joints_is_refused():
-    wrong = replace(motion(), position=np.zeros((400, 3)))
-    with pytest.raises(ArmError, match="5 actuated joints"):
-        closed_regressor(HYDRAULIC, wrong, 0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation.arm.effects import row_count
-from estimation.arm.elements import creep, hats, slip
+from estimation.arm.elements import slip
 from estimation.arm.motion import motion_of
 from estimation.arm.signed import Block, Normal, Products, solve
 from estimation.arm.tables import PSM
@@ -20,12 +20,6 @@ def test_an_elastic_slip_element_turns_within_twice_its_threshold():
     assert np.isclose(stretch[105], 0.0)  # relaxed one threshold after the turn
     assert np.isclose(stretch[110], -1.0)  # slips the other way two thresholds after it
     assert np.isclose(stretch[-1], -1.0)
-
-
-def test_its_loop_does_not_depend_on_speed():
-    angle = np.sin(np.linspace(0, 12, 4001))
-    slow, fast = slip(angle[:, None], 0.2)[::4], slip(angle[::4, None], 0.2)
-    np.testing.assert_allclose(slow, fast, atol=0.02)
 
 
 def wave() -> np.ndarray:
@@ -54,21 +48,6 @@ def test_the_wrists_drives_do_the_work_that_its_joints_do():
         np.testing.assert_allclose(power, drive_speed[:, drive] ** 2, atol=1e-12)
 
 
-def test_creep_follows_a_step_with_its_time_constant():
-    lagged = creep(np.ones((1000, 1)), 0.5, 0.01)[:, 0]
-    assert np.isclose(lagged[49], 1 - np.exp(-1), atol=1e-3)
-    assert np.isclose(lagged[-1], 1.0, atol=1e-6)
-
-
-def test_hats_are_shares_of_one_and_go_on_flat_beyond_their_ends():
-    shares = hats(np.linspace(-2, 2, 81), -1.0, 1.0, 5)
-    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
-    np.testing.assert_array_equal(shares[0], [1, 0, 0, 0, 0])
-    np.testing.assert_allclose(
-        shares @ np.linspace(-1, 1, 5), np.clip(np.linspace(-2, 2, 81), -1, 1)
-    )
-
-
 def test_dissipative_parameters_are_never_negative_and_others_are_least_squares():
     rng = np.random.default_rng(3)
     columns, truth = rng.normal(size=(200, 2, 4)), np.array([2.0, -1.0, 0.5, -0.3])
@@ -86,12 +65,3 @@ def test_dissipative_parameters_are_never_negative_and_others_are_least_squares(
     left = torque - columns @ bounded
     expected = np.sqrt(np.mean(left**2, axis=0))
     np.testing.assert_allclose(products.rms(np.arange(4), bounded), expected, rtol=1e-9)
-
-
-def test_rarely_visited_columns_stay_small():
-    rng = np.random.default_rng(4)
-    columns = rng.normal(size=(500, 1, 2)) * [1.0, 1e-3]
-    torque = columns @ np.array([1.0, 100.0])
-    normal = Normal.of(Products.of(columns, torque), np.ones(1))
-    (one,) = (Block("map", np.arange(2), np.zeros(2, bool), 0.1),)
-    assert abs(solve(normal, [one])[1]) < 1e-2

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.arm.kinematics import ArmError, body_jacobian, spatial_jacobian, tip_pose
+from estimation.arm.kinematics import body_jacobian, spatial_jacobian, tip_pose
 from estimation.arm.tables import PSM, DhRow
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
@@ -64,16 +64,3 @@ def test_the_body_jacobian_is_the_derivative_of_the_tips_pose(q):
         twist = np.linalg.inv(pose) @ rate  # skew angular part and linear part, in the tip's frame
         linear, angular = twist[:3, 3], (twist[2, 1], twist[0, 2], twist[1, 0])
         np.testing.assert_allclose(body_jacobian(PSM, q)[:, k], [*linear, *angular], atol=1e-8)
-
-
-def test_the_first_three_joints_keep_the_shaft_through_the_remote_centre():
-    for q in ([0.5, -0.3, 0.1, 0, 0, 0], [-1.0, 0.7, 0.17, 2.0, 0, 0]):
-        shaft = joint_frames(np.array(q))[3]
-        axis, point = shaft[:3, 2], tip_pose(PSM, np.array(q))[:3, 3]
-        assert np.linalg.norm(np.cross(axis, shaft[:3, 3])) < 1e-12
-        assert point[2] < 0  # below the remote centre: gravity's sign is right
-
-
-def test_a_wrong_number_of_positions_is_named():
-    with pytest.raises(ArmError, match="6 joints"):
-        tip_pose(PSM, np.zeros(7))

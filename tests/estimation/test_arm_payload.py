@@ -55,17 +55,6 @@ def test_a_mass_off_the_axis_is_found_within_its_interval():
     assert 0.02 < found.from_lever_kg / found.mass_kg < 0.04
 
 
-def test_two_periods_are_too_few_to_know_the_scatter():
-    short = np.zeros((2 * SAMPLES, 2))
-    with pytest.raises(ArmError, match="2 whole periods"):
-        added_mass(short, (short, short, short), short, np.ones(2), SAMPLES)
-
-
-def test_a_link_without_a_mass_of_its_own_is_refused():
-    with pytest.raises(ArmError, match="Link 5"):
-        point_mass(PSM, motion(), 5, np.zeros(3))
-
-
 def test_an_arm_carries_its_payload_and_its_tool_as_data():
     moved = motion()
     weight = PointMass("weight", 2, (0.0, 0.5, 0.0), 0.105)

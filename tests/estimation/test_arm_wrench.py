@@ -9,7 +9,6 @@ from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import (
     LiveWrench,
-    body_jacobians,
     by_pseudo_inverse,
     most_likely,
     spatial_jacobians,
@@ -60,13 +59,6 @@ def test_a_singular_pose_gives_a_finite_wrench_and_a_wide_covariance():
     widest = np.sqrt(np.linalg.eigvalsh(found.covariance[0])[-1])
     ordinary = most_likely(spatial_jacobians(PSM, np.full((1, 6), 0.1)), ERROR[None], ERROR)
     assert widest > 3 * np.sqrt(np.linalg.eigvalsh(ordinary.covariance[0])[-1])
-
-
-def test_a_body_wrench_is_the_spatial_one_seen_from_the_tip():
-    q = poses(1)
-    torque = np.einsum("nij,i->nj", body_jacobians(PSM, q), [0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
-    force = by_pseudo_inverse(spatial_jacobians(PSM, q), torque)[0, :3]
-    assert np.isclose(np.linalg.norm(force), 2.0)
 
 
 def test_the_live_wrench_is_the_one_applied_half_a_window_ago():

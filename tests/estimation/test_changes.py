@@ -77,11 +77,6 @@ def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter,
     assert found.p <= 0.05
 
 
-def test_a_parameter_that_nothing_mimics_is_named_alone():
-    (found,) = compare(record(1), record(2, mass=2.2), [axis()]).changes
-    assert (found.verdict, found.alternatives) == ("moved", ())
-
-
 def test_an_effect_that_came_and_one_that_went():
     worn = record(2, asymmetry=2.0)
     (came,) = compare(record(1), worn, [axis()]).changes

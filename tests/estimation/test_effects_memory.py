@@ -10,7 +10,6 @@ import pytest
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.verdict import diagnose
-from estimation.derived import zero_phase_channels
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.fitting import fit
@@ -91,24 +90,6 @@ def inputs_of(kind, channels) -> dict[str, np.ndarray]:
 
 
 @EVERY
-def test_a_fit_finds_what_was_put_in(name):
-    kind = effect(name)
-    shape, amplitudes = TRUE[name]
-    made = []
-    for recording in runs():
-        channels = zero_phase_channels(recording, [*kind.roles.values(), "motor_angle_rad"])
-        torque = Term(kind).columns(channels, shape) @ np.array(amplitudes)
-        made.append(recording.with_columns(made_torque_n_m=torque))
-    model = Model("one effect", "motor", "made_torque_n_m", (Term(kind),), run_offsets=False)
-    fitted = fit(model, Campaign.of(made), every=20, bootstrap=0)
-    values = [v.value for v in fitted.terms[0].values.values()]
-    if name == "change.step.campaign":  # between two runs one moment is as good as another
-        assert 72 < values[1] <= 120
-        values[1] = shape[0]
-    assert values == pytest.approx([*amplitudes, *shape], rel=0.05, abs=1e-3)
-
-
-@EVERY
 def test_columns_do_not_depend_on_the_rate_of_the_samples(name):
     kind = effect(name)
     shape, _ = TRUE[name]
@@ -117,16 +98,6 @@ def test_columns_do_not_depend_on_the_rate_of_the_samples(name):
     expected = kind.columns(fast, shape)[::10]
     error = kind.columns(thinned, shape) - expected
     assert np.sqrt(np.mean(error**2)) < 0.01 * np.abs(expected).max()
-
-
-@EVERY
-@pytest.mark.parametrize("value", [0.0, 1.0, -1.0])
-def test_a_rig_that_stands_still_gives_finite_columns(name, value):
-    kind = effect(name)
-    still = {role: np.full(50, value) for role in kind.roles}  # the clock too: the same sample
-    for place in (0.0, 1.0):
-        shape = [p.grid()[round(place * (p.points - 1))] for p in kind.shape]
-        assert np.isfinite(kind.columns(still, shape)).all()
 
 
 @pytest.mark.parametrize(
@@ -183,14 +154,6 @@ def test_break_away_is_higher_after_a_longer_rest_and_is_worn_off_by_sliding():
         assert column[-1] < 0.5
     assert peaks == sorted(peaks)
     assert peaks[-1] > 0.95
-
-
-def test_a_straight_wrist_adds_no_wrap():
-    kind = effect("friction.capstan.wrist")
-    still = {"speed": np.ones(3), "load": np.ones(3), "other_angle": np.array([0.0, 0.5, -0.5])}
-    lost = kind.columns(still, (0.5, 0.1))[:, 0]
-    assert lost[0] == 0.0
-    assert lost[1] == lost[2] > 0
 
 
 def started(recording: Recording, start_s: float | None) -> Recording:
@@ -271,12 +234,3 @@ def test_a_run_begins_as_settled_under_its_first_load_as_declared(name):
     for settled in (0.0, 0.25, 1.0):
         column = kind.columns(inputs, (0.8, settled))[:, 0]
         assert np.abs(column) == pytest.approx((1.0 - settled) * size, abs=1e-9)
-
-
-def test_a_springs_loop_begins_as_loaded_from_where_it_had_settled():
-    kind = effect("hysteresis.bouc_wen.twist")
-    load = np.full(10, 0.5)
-    start = [kind.columns({"load": load}, (0.1, 2.0, settled))[0, 0] for settled in (0.0, 0.9, 1.0)]
-    assert start[0] == pytest.approx(1.0, abs=1e-3)  # far beyond its reach
-    assert 0.3 < start[1] < 0.6
-    assert start[2] == 0.0

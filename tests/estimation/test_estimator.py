@@ -10,7 +10,6 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.cross_validation import closing_score
-from estimation.derived import TRAVEL_WINDOW_S, causal_channels, zero_phase_channels
 from estimation.estimator import Estimator, Recipe, load
 from estimation.estimators.bank import BankRecipe
 from estimation.estimators.model import ModelRecipe
@@ -143,14 +142,3 @@ def test_samples_outside_the_training_range_are_flagged(fitted, runs):
     assert network.inside(runs[1])[closing].mean() > 0.9
     far = runs[1].with_columns(motor_current_a=runs[1]["motor_current_a"] + 5)
     assert not network.inside(far).any()
-
-
-def test_travel_is_the_way_from_the_lowest_angle_of_the_last_half_second(runs):
-    run, name = runs[0], "spindle_travel_rad"
-    window = round(TRAVEL_WINDOW_S * 1000)
-    for source in (zero_phase_channels, causal_channels):
-        found = source(run, [name, "spindle_angle_rad"])
-        angle = found["spindle_angle_rad"]
-        expected = [angle[k] - angle[max(k - window + 1, 0) : k + 1].min() for k in range(2000)]
-        np.testing.assert_allclose(found[name][:2000], expected, atol=1e-12)
-    assert found[name].min() >= 0

@@ -68,22 +68,6 @@ def test_rows_that_cannot_be_learnt_from_are_refused(monkeypatch):
         train(x, y, (IN, OUT[:1]))
 
 
-def test_rows_held_out_choose_the_step():
-    truth, random = make(3), np.random.default_rng(4)
-    x, held = rows(60), rows(400, seed=6)
-    half = np.ptp(truth.output_range, axis=0) / 2
-    y, wanted = (truth(r) + 0.3 * half * random.normal(size=(len(r), 2)) for r in (x, held))
-
-    def error(**more: object) -> float:
-        settings = Settings(nodes=6, iterations=60)
-        found = train(x, y, (IN, OUT), settings, **more).network  # type: ignore[arg-type]
-        return float(np.mean(((found(held) - wanted) / half) ** 2))
-
-    chosen = error(validation=(held, wanted))
-    assert chosen <= error()
-    assert chosen == error(validation=(held, wanted))
-
-
 def test_training_goes_on_from_another_network():
     source = make(3)
     x = rows(400)

@@ -1,7 +1,6 @@
 """A machine as a value: its file, the equations that follow from it, and what it cannot measure."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,60 +30,6 @@ from estimation.signals import Combination, Direction, Share
 from estimation.stream import Stream
 
 REFERENCE = to_toml(shipped_plant("reference"))
-
-
-def test_the_reference_rig_has_the_equations_it_always_had():
-    found = {
-        model.balance: (
-            model.target,
-            [(t.effect.id, t.sign, *t.channels.values()) for t in model.terms],
-        )
-        for model in model_file.reference_rig()
-    }
-    speed, spindle = "motor_velocity_rad_s", "spindle_velocity_rad_s"
-    inertia = "motor_acceleration_rad_s2"
-    offset = ("sensor.offset", 1, "time_s")
-    assert found == {
-        "motor": (
-            "proximal_torque_n_m",
-            [
-                ("motor.torque_constant", 1, "motor_current_a"),
-                ("inertia.missing", -1, inertia),
-                ("friction.viscous", -1, speed),
-                ("friction.coulomb", -1, speed),
-                offset,
-            ],
-        ),
-        "gearbox": (
-            "gearbox_differential_rad",
-            [
-                ("compliance.link", 1, "proximal_torque_n_m"),
-                ("transmission.damping", -1, "proximal_torque_rate_n_m_s"),
-                offset,
-            ],
-        ),
-        "cable": (
-            "proximal_torque_n_m",
-            [
-                ("transmission.ratio", 1, "distal_torque_n_m"),
-                ("inertia.missing", 1, inertia),
-                ("friction.viscous", 1, spindle),
-                ("friction.coulomb", 1, spindle),
-                offset,
-            ],
-        ),
-        "stretch": (
-            "jaw_angle_rad",
-            [
-                ("transmission.ratio", 1, "spindle_angle_rad"),
-                ("compliance.link", -1, "distal_torque_n_m"),
-                offset,
-            ],
-        ),
-    }
-    model = model_file.read(Path("motor"))
-    assert (model.low_pass.cutoff_hz, model.low_pass.order, model.run_offsets) == (50.0, 3, True)
-    assert model.signals.rest == {speed: 0.7, spindle: 0.02}
 
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
@@ -297,17 +242,6 @@ def test_a_delay_that_is_stated_is_taken_out():
     assert np.abs(found - wanted)[200:-200].max() < 1e-4
     (model,) = declared(replace(SLIDE, sensors=(sensor,)))
     assert model_file.parse(model_file.to_toml(model)) == model
-
-
-def test_a_resting_speed_follows_the_counts_of_the_sensor():
-    shaft = replace(SLIDE.sensors[0], name="carriage_angle_rad", counts=651.9)
-    turned = replace(SLIDE, axes=(Axis("carriage", "rad"),), sensors=(shaft,))
-    turned = replace(turned, actuators=(Actuator("drive_torque_n_m", "carriage"),))
-    assert signals(turned).rest["carriage_velocity_rad_s"] == pytest.approx(50.0 / 651.9)
-    coarse = replace(SLIDE, sensors=(replace(SLIDE.sensors[0], counts=1e3),))
-    assert signals(coarse).rest["carriage_velocity_m_s"] == pytest.approx(1e-3 * 50.0)
-    stated = replace(coarse, axes=(Axis("carriage", "m", rest_speed=0.01),))
-    assert signals(stated).rest["carriage_velocity_m_s"] == 0.01
 
 
 @given(ratio=st.floats(0.5, 200.0), sign=st.sampled_from([1.0, -1.0]))

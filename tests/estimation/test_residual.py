@@ -8,7 +8,7 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.fitting import fit
 from estimation.model_file import read
-from estimation.residual import ResidualError, largest_structure, residuals
+from estimation.residual import ResidualError, largest_structure
 from tests.estimation.synthetic import TRUE, campaign
 
 
@@ -42,12 +42,6 @@ def test_a_ripple_is_seen_at_its_order():
     assert "identifies no effect" in first.sentence()
 
 
-def test_a_spring_is_seen_over_the_spindle_angle():
-    first = screened(lambda angle, speed, load: 0.01 * angle / 35)[0]
-    assert first.variable == "spindle_angle"
-    assert first.explained_fraction > 0.5
-
-
 def test_missing_coulomb_friction_is_seen_over_the_direction():
     def extra(angle, speed, load):
         return (
@@ -73,14 +67,6 @@ def test_what_differs_between_runs_is_seen_only_when_it_is_no_nuisance():
         found[declared] = largest_structure(model, runs)[0]
     assert not found[True].stands_out
     assert found[False].amplitude > 5 * found[True].amplitude
-
-
-def test_residuals_are_target_less_estimate():
-    runs = campaign()
-    model = fit(read(Path("motor")), runs, bootstrap=0)
-    (part, *others) = residuals(model, runs)
-    assert len(others) == 8
-    assert part.values + part.estimate == pytest.approx(part.run["proximal_torque_n_m"])
 
 
 def test_one_run_is_too_few():

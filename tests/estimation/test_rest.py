@@ -7,8 +7,6 @@ import pytest
 
 from estimation import model_file
 from estimation.campaign import Campaign
-from estimation.derived import settled_places, zero_phase_channels
-from estimation.filters import PAPER
 from estimation.fitting import fit
 from estimation.recording import Recording
 from estimation.rest import in_motion
@@ -20,18 +18,6 @@ def test_rest_is_where_the_motor_stands_and_a_little_around_it():
     assert moving[:450].all()
     assert moving[1050:].all()
     assert not moving[490:1010].any()
-
-
-def test_the_cable_rests_when_the_spindle_does():
-    time_s = np.arange(4000) * 1e-3
-    spindle_rad = 0.3 * np.clip(np.sin(2 * np.pi * 0.25 * time_s), -0.8, 0.8)
-    angles = {"motor_angle_rad": 35 * spindle_rad + 2 * time_s, "spindle_angle_rad": spindle_rad}
-    run = Recording("a", time_s, angles)
-    for speed, rests in (("spindle_velocity_rad_s", True), ("motor_velocity_rad_s", False)):
-        channels = zero_phase_channels(run, [speed])
-        kept = settled_places(channels, PAPER, samples="motion")
-        held = np.abs(spindle_rad[kept]) > 0.2399
-        assert held.any() != rests
 
 
 def test_torque_that_friction_holds_at_rest_does_not_move_the_torque_constant():

@@ -11,6 +11,7 @@ import click
 import pytest
 import typer
 
+from benchmarks import results
 from rig.cli.main import app, main
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +38,10 @@ def stated(page: Path) -> list[str]:
     return found
 
 
-COMMANDS = sorted({command for page in PAGES for command in stated(page)})
+COMMANDS = sorted(
+    {command for page in PAGES for command in stated(page)}
+    | {made.command for made in results.PAGES if made.command.startswith("rig ")}
+)
 
 
 def resolved(words: list[str]) -> tuple[click.Command, list[str]]:

@@ -213,3 +213,21 @@ def test_provenance_names_the_commit(tmp_path):
     assert made.seed == 7
     assert "/" not in made.command
     assert re.fullmatch(r"unknown|[0-9a-f]{7,}(\+changes)?", made.commit)
+
+
+def test_a_page_written_before_does_not_change_the_commit_of_the_next(tmp_path):
+    def git(*words):
+        author = ["-c", "user.name=n", "-c", "user.email=e"]
+        subprocess.run(["git", "-C", str(tmp_path), *author, *words], check=True)
+
+    (tmp_path / "docs").mkdir()
+    page, code = tmp_path / "docs/page.md", tmp_path / "code.py"
+    for path in (page, code):
+        path.write_text("1\n")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-q", "-m", "first")
+    page.write_text("2\n")
+    assert re.fullmatch(r"[0-9a-f]{7,}", commit(tmp_path))
+    code.write_text("2\n")
+    assert commit(tmp_path).endswith("+changes")

@@ -1,4 +1,4 @@
-"""A look at a table before it is imported: ranges, rates, and what looks wrong.
+"""A preview of a table before it is imported: ranges, rates, and what may be wrong.
 
 Each remark is a question to the person who knows the machine; nothing is corrected here.
 """
@@ -48,12 +48,12 @@ class ChannelView:
     least: float  # Least value
     greatest: float  # Greatest value
     mean: float  # Mean
-    wrong: tuple[str, ...]  # What looks wrong with it, in words
+    wrong: tuple[str, ...]  # What may be wrong with it, in words
 
 
 @dataclass(frozen=True)
 class RunView:
-    """One run: its length, rate, conditions, flagged samples, and what looks wrong with its clock.
+    """One run: its length, rate, conditions, flagged samples, and what may be wrong with its clock.
 
     `rate_hz` is None for a run of one sample.
     """
@@ -74,12 +74,12 @@ class Preview:
     runs: tuple[RunView, ...]  # Every run
     channels: tuple[ChannelView, ...]  # Every channel
     first: dict[str, list[float]]  # Channel and time to the values of the first samples
-    wrong: tuple[str, ...]  # What looks wrong with channels together, in words
+    wrong: tuple[str, ...]  # What may be wrong with channels together, in words
     remarks: tuple[str, ...]  # What was assumed, left out or filled in, in words
 
     @property
     def questions(self) -> list[str]:
-        """Everything that looks wrong, in words, each with the channel or run it is about."""
+        """Everything that may be wrong, in words, each with the channel or run it is about."""
         found = [f"{c.name}: {text}" for c in self.channels for text in c.wrong]
         found += [f"{r.name}: {text}" for r in self.runs for text in r.wrong]
         return [*found, *self.wrong]

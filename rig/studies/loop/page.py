@@ -23,8 +23,9 @@ def notes(study: LoopStudy) -> list[str]:
     """Return remarks for a comparison."""
     sealed = study.sealed
     found = [
-        f"Data: {study.source}. {len(sealed.discover)} runs discover, {len(sealed.confirm)} confirm"
-        f" and were opened once, after the last effect was chosen; seal {sealed.seal[:16]}.",
+        f"Data: {study.source}. {len(sealed.discover)} training runs, {len(sealed.confirm)} test"
+        " runs, which were used once, after the last effect was chosen; fingerprint of the split"
+        f" {sealed.seal[:16]}.",
         "Errors are root mean squares over the samples after the zero-phase 50 Hz filter, each"
         " run's mean left in. No effect may read the torque it estimates, the jaw's encoder, or how"
         f" long a run has lasted ({', '.join(TIMELESS)} are left out).",

@@ -57,7 +57,7 @@ def selected(
         fitting = [term for term in tried if len(term.parameters) <= room]
         base = [_table(model.terms, run) for run in runs]
         aims = [run.thin[model.target] for run in runs]
-        before = _left_out(base, aims)
+        before = _left_out(_grams(base, aims))
         first = before if first is None else first
         best = min(_scored(base, aims, runs, fitting), key=lambda one: one[0], default=None)
         if best is None or before - best[0] < FLOOR * first:
@@ -100,29 +100,25 @@ def _scored(
             columns = [term.sign * run.columns(term, shape) for run in runs]
             if not all(np.isfinite(c).all() and c.any() for c in columns):
                 continue
-            whole = [np.hstack(pair) for pair in zip(base, columns, strict=True)]
-            if not _within_bounds(whole, aims, term.effect.amplitudes):
+            grams = _grams([np.hstack(pair) for pair in zip(base, columns, strict=True)], aims)
+            if not _within_bounds(grams, term.effect.amplitudes):
                 continue
             values = {p.name: Estimate(x) for p, x in zip(term.effect.shape, shape, strict=True)}
-            yield _left_out(whole, aims), replace(term, values=amplitudes | values)
+            yield _left_out(grams), replace(term, values=amplitudes | values)
 
 
 def _table(terms: Sequence[Term], run: FitRun) -> FloatArray:
     return np.hstack([t.sign * run.columns(t, t.numbers(t.effect.shape)) for t in terms])
 
 
-def _within_bounds(
-    tables: Sequence[FloatArray], aims: Sequence[FloatArray], bounds: Sequence[Parameter]
-) -> bool:
+def _within_bounds(grams: FloatArray, bounds: Sequence[Parameter]) -> bool:
     """Whether the last columns' amplitudes, fitted with all others, are physically meaningful."""
-    weights = _solved(np.sum([_gram(t, y) for t, y in zip(tables, aims, strict=True)], axis=0))
-    own = weights[-len(bounds) :]
+    own = _solved(grams.sum(axis=0))[-len(bounds) :]
     return all(p.lower <= x <= p.upper for p, x in zip(bounds, own, strict=True))
 
 
-def _left_out(tables: Sequence[FloatArray], aims: Sequence[FloatArray]) -> float:
+def _left_out(grams: FloatArray) -> float:
     """Return the squared error of each run under the fit on the others, summed."""
-    grams = np.array([_gram(t, y) for t, y in zip(tables, aims, strict=True)])
     whole, total = grams.sum(axis=0), 0.0
     for own in grams:
         vector = np.append(_solved(whole - own), -1.0)
@@ -130,9 +126,10 @@ def _left_out(tables: Sequence[FloatArray], aims: Sequence[FloatArray]) -> float
     return total
 
 
-def _gram(table: FloatArray, aim: FloatArray) -> FloatArray:
-    both = np.column_stack([table, aim])
-    return np.asarray(both.T @ both)
+def _grams(tables: Sequence[FloatArray], aims: Sequence[FloatArray]) -> FloatArray:
+    """Return each run's products of columns and aim, shape (runs, columns + 1, columns + 1)."""
+    both = [np.column_stack(pair) for pair in zip(tables, aims, strict=True)]
+    return np.array([table.T @ table for table in both])
 
 
 def _solved(gram: FloatArray) -> FloatArray:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from estimation.campaign import Campaign
 from estimation.recording import Flag
 from rig.importers.dvrk_psm import IMPORTER as PSM
 from rig.importers.jaw_steps import jaw_zeros
@@ -65,21 +64,6 @@ def test_closing_is_positive_in_every_channel(reference, run):
     assert np.median(distal) > 0
 
 
-@pytest.mark.parametrize("run", [0, 9, 25])
-def test_motor_and_spindle_agree_once_mirrored(reference, run):
-    recording = reference.runs[run].recording()
-    spindle = recording["spindle_angle_rad"]
-    zero = recording.conditions["motor_zero_offset_rad"]
-    twist = (recording["motor_angle_rad"] - zero) / 35 - spindle
-    assert np.std(twist) < 0.016
-    torque = recording["proximal_torque_n_m"]
-    stiffness_inverse, rest = fit(torque, twist)
-    assert stiffness_inverse > 0
-    assert np.std(twist - stiffness_inverse * torque - rest) < 0.0065
-    raw_sign = (recording["motor_angle_rad"] - zero) / 35 + spindle
-    assert np.std(raw_sign) > 0.6
-
-
 def test_the_runaway_of_run_07_is_flagged(reference):
     recording = reference.runs[7].recording()
     at = np.flatnonzero(~recording.valid)
@@ -108,33 +92,6 @@ def test_the_jaws_zero_steps_before_run_39_and_back_before_run_43(reference):
     assert (first.run, second.run) == ("39", "43")
     assert np.rad2deg(first.step_rad) == pytest.approx(0.54, abs=0.1)
     assert np.rad2deg(second.step_rad) == pytest.approx(-0.56, abs=0.1)
-
-
-@pytest.mark.parametrize("folder", ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"])
-def test_a_jaw_that_keeps_its_zero_has_no_step(campaign, folder):
-    runs = campaign(folder)
-    assert jaw_zeros(runs).steps == ()
-    slipped = [
-        recording.with_columns(jaw_angle_rad=recording["jaw_angle_rad"] + 0.02 * (k >= 12))
-        for k, recording in enumerate(runs)
-    ]
-    (step,) = jaw_zeros(Campaign.of(slipped)).steps
-    assert step.run == runs.names[12]
-    assert step.step_rad == pytest.approx(0.02, abs=0.004)
-
-
-def test_older_folders_target_in_rad_coarse_command_wrong_header(campaign):
-    recording = campaign("Tool_4_Maryland_L_2").runs[5].recording()
-    slope, rest = fit(recording["spindle_angle_rad"], recording["target_angle_rad"])
-    assert slope == pytest.approx(1, abs=0.05)
-    assert abs(rest) < 0.05
-    assert recording.conditions["command_quantum_ratio"] == 0.01
-    assert recording.conditions["frequency_hz"] == 0.2
-    assert recording.conditions["load_command_a"] == 0.2
-    assert recording.instrument.serial == "tool 4"
-    assert recording.instrument.lot is None
-    tool_5 = campaign("Tool_5_Maryland_L_2").runs[0].recording()
-    assert tool_5.instrument.lot == "M10110805 915"
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,11 @@
 import io
 import json
 import tarfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimation.campaign import Campaign
 from rig.cli.main import main
 from rig.errors import DataError
 from rig.importers import archive
@@ -56,12 +54,6 @@ def test_a_folder_is_a_campaign_in_file_order(one):
     assert [r.name for r in campaign] == ["00", "01", "10"]
 
 
-def test_the_read_me_becomes_part_of_the_notes(one):
-    recording = IMPORTER.open(one).runs[0].recording()
-    assert "This is a roll of 0 degrees" in recording.notes
-    assert "Please press" not in recording.notes
-
-
 def test_runs_load_when_asked(one):
     (one / "01.TXT").write_text("not a log\n")
     campaign = IMPORTER.open(one)
@@ -89,18 +81,6 @@ def test_an_archive_holds_what_its_folder_holds(one, tmp_path, suffix):
         assert (a.conditions, a.instrument, a.notes) == (b.conditions, b.instrument, b.notes)
         for name in b.columns:
             np.testing.assert_array_equal(a[name], b[name])
-
-
-def test_an_archive_of_several_folders(several, tmp_path):
-    packed = pack(several, tmp_path / "set.tar.xz")
-    assert IMPORTER.open(packed).names == IMPORTER.open(several).names
-
-
-def test_an_archive_is_unpacked_once_a_process_and_only_its_texts(one, tmp_path):
-    packed = pack(one, tmp_path / "set.tar.xz")
-    folder = archive.unpack_text(packed)
-    assert archive.unpack_text(packed) == folder
-    assert {p.suffix.lower() for p in folder.rglob("*.*")} == {".txt"}
 
 
 def member(name: str, content: bytes = b"%x\n", **attributes) -> tuple[tarfile.TarInfo, io.BytesIO]:
@@ -205,14 +185,6 @@ def test_a_jaw_step_is_found_between_runs_of_the_same_load_and_taken_off(slipped
     np.testing.assert_array_equal(
         whole[9]["jaw_angle_rad"], campaign.runs[9].recording()["jaw_angle_rad"]
     )
-
-
-def test_runs_that_share_no_condition_show_no_step(slipped):
-    campaign = IMPORTER.open(slipped)
-    alone = Campaign.of(
-        [replace(r, conditions={"load_command_a": 0.1 * k}) for k, r in enumerate(campaign)]
-    )
-    assert jaw_zeros(alone).steps == ()
 
 
 def test_a_fit_of_the_jaws_angle_states_the_steps(slipped, capsys):

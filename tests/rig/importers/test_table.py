@@ -92,46 +92,48 @@ def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path
     assert run.sample_rate_hz == pytest.approx(200)
 
 
-def test_counts_and_a_raw_converter_become_si(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    text_table(path, {"t": [0.0, 0.1, 0.2], "enc": [0, 1024, 4096], "adc": [512, 612, 412]})
-    (run,) = open_table(
-        path,
-        machine(
-            """
-            [data.columns]
-            time_s = "t"
-            motor_angle_rad = "enc:rev/4096"
-            motor_current_a = { column = "adc", unit = "mA", gain = 4.88, zero = 512 }
-            """
-        ),
-    )
-    np.testing.assert_allclose(run["motor_angle_rad"], [0, np.pi / 2, 2 * np.pi])
-    np.testing.assert_allclose(run["motor_current_a"], [0, 0.488, -0.488])
+READ = {
+    "counts": ("t,enc\n0,0\n0.1,1024\n0.2,4096\n", "motor_angle_rad", '"enc:rev/4096"',
+               [0, np.pi / 2, 2 * np.pi]),
+    "a raw converter": ("t,adc\n0,512\n0.1,612\n0.2,412\n", "motor_current_a",
+                        '{ column = "adc", unit = "mA", gain = 4.88, zero = 512 }',
+                        [0, 0.488, -0.488]),
+    "a counter that starts again": (
+        "t,enc\n0,3072\n0.1,4095\n0.2,1024\n", "motor_angle_rad",
+        '{ column = "enc", unit = "rev/4096", wraps_at = 4096 }',
+        np.array([3072, 4095, 5120]) / 2048 * np.pi),
+    "sign and magnitude": ("t,load\n0,30\n0.1,1054\n0.2,0\n0.3,1024\n", "drive_ratio",
+                           '{ column = "load", gain = 0.001, sign_bit = 1024 }',
+                           [0.03, -0.03, 0.0, 0.0]),
+}  # fmt: skip
+"""A table, a channel, its line in the mapping, and the values that are read."""
 
 
-def test_a_counter_that_starts_again_is_continued(tmp_path, machine):
+@pytest.mark.parametrize("case", READ.values(), ids=READ)
+def test_what_a_column_holds_becomes_si(tmp_path, machine, case):
+    text, channel, line, expected = case
     path = tmp_path / "run.csv"
-    text_table(path, {"t": [0.0, 0.1, 0.2, 0.3], "enc": [3000, 4000, 904, 1904]})
-    text = """
-        [data.columns]
-        time_s = "t"
-        motor_angle_rad = { column = "enc", unit = "rev/4096", wraps_at = 4096 }
-        """
+    path.write_text(text)
+    (run,) = open_table(path, machine(f'[data.columns]\ntime_s = "t"\n{channel} = {line}\n'))
+    np.testing.assert_allclose(run[channel], expected, atol=1e-12)
+
+
+def test_a_decimal_comma_lines_before_the_head_and_names_that_are_channels(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("Recorder 7\n# zeroed\ntime_s;motor_angle_rad;Remark\n0,0;1,5;0\n0,1;2,5;0\n")
+    (run,) = open_table(path, machine('[data]\ndecimal = ","\nskip_lines = 1\ncomment = "#"\n'))
+    assert set(run.columns) == {"motor_angle_rad"}
+    assert run["motor_angle_rad"].tolist() == [1.5, 2.5]
+
+
+def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,motor_angle_rad,drive_ratio\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n")
+    text = '[[data.invalid]]\nwhen = "drive_ratio < 1"\nreason = "the drive was off"\n'
     (run,) = open_table(path, machine(text))
-    np.testing.assert_allclose(np.diff(run["motor_angle_rad"]), 1000 / 4096 * 2 * np.pi)
-
-
-def test_a_register_of_sign_and_magnitude_is_read(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    text_table(path, {"t": [0.0, 0.1, 0.2, 0.3], "load": [30, 1054, 0, 1024]})
-    text = """
-        [data.columns]
-        time_s = "t"
-        drive_ratio = { column = "load", gain = 0.001, sign_bit = 1024 }
-        """
-    (run,) = open_table(path, machine(text))
-    np.testing.assert_allclose(run["drive_ratio"], [0.03, -0.03, 0.0, 0.0])
+    assert run.valid.tolist() == [True, False, False, False]
+    (stretch,) = run.stretches
+    assert (stretch.start_s, stretch.stop_s, stretch.reason) == (0.2, 0.3, "the drive was off")
 
 
 def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path, machine):
@@ -279,25 +281,6 @@ def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, m
     assert second.conditions["load_mass_kg"] == pytest.approx(0.2)
 
 
-def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    path.write_text("t,enc,on\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n0.4,5,1\n")
-    text = """
-        [data.columns]
-        time_s = "t"
-        motor_angle_rad = "enc:deg"
-        drive_ratio = "on"
-        [[data.invalid]]
-        when = "drive_ratio < 1"
-        reason = "the drive was off"
-        """
-    (run,) = open_table(path, machine(text))
-    assert run.valid.tolist() == [True, False, False, False, True]
-    (stretch,) = run.stretches
-    assert stretch.reason == "the drive was off"
-    assert (stretch.start_s, stretch.stop_s) == (0.2, 0.3)
-
-
 def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
@@ -306,26 +289,3 @@ def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     (run,) = open_table(path, machine(text))
     np.testing.assert_allclose(np.diff(run.time_s), 0.01)
     np.testing.assert_allclose(run["motor_angle_rad"], 10 * (run.time_s + time_s[0]), atol=1e-9)
-
-
-def test_a_decimal_comma_and_lines_before_the_head(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    path.write_text("Recorder 7\n# zeroed\nt;enc\n0,0;1,5\n0,1;2,5\n")
-    text = """
-        [data]
-        decimal = ","
-        skip_lines = 1
-        comment = "#"
-        [data.columns]
-        time_s = "t"
-        motor_angle_rad = "enc:deg"
-        """
-    (run,) = open_table(path, machine(text))
-    np.testing.assert_allclose(np.degrees(run["motor_angle_rad"]), [1.5, 2.5])
-
-
-def test_columns_named_as_channels_need_no_mapping(tmp_path):
-    path = tmp_path / "run.csv"
-    text_table(path, {"time_s": [0, 0.1], "motor_angle_rad": [1, 2], "Remark": [0, 0]})
-    (run,) = open_table(path, read_mapping(None, []))
-    assert set(run.columns) == {"motor_angle_rad"}

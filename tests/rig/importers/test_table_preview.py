@@ -106,9 +106,3 @@ def test_plots_are_a_page_or_a_picture(tmp_path, name, start):
     content = (tmp_path / name).read_bytes()
     assert content.startswith(start)
     assert name.endswith("png") or b"motor_angle_rad" in content
-
-
-def test_without_an_output_the_way_out_is_stated(tmp_path, capsys):
-    table = csv(tmp_path / "bench.csv", time_s=TIME, motor_angle_rad=WAVE)
-    assert main(["import", str(table)]) == 2
-    assert "--preview" in capsys.readouterr().err

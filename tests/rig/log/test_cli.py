@@ -70,17 +70,6 @@ def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
     assert str(folder / "a.mcap") in rig("check", folder)[1]
 
 
-def test_info_for_machines(rig, log):
-    code, out, err = rig("info", log, "--json")
-    assert (code, err) == (0, "")
-    (found,) = out["logs"]
-    assert found["run"]["conditions"] == {"load_command_a": 0.3, "object": "spring"}
-    assert found["topics"][0]["messages"] == 600
-    assert found["topics"][0]["fields"]["proximal_torque_n_m"] == "N m"
-    assert found["end"]["drift_verdict"] == "within limits"
-    assert found["damaged"] is False
-
-
 def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path, make_log):
     make_log(tmp_path / "a.mcap")
     assert rig("check", tmp_path)[0] == ExitCode.OK
@@ -193,8 +182,3 @@ def test_a_campaign_is_exported_as_one_table_with_units_and_conditions(rig, tmp_
         with pytest.raises(OutputError, match="not replaced"):
             rig("export", source, "--format", format_name, "--out", log, "--force", *more)
     assert log.read_bytes() == before
-
-
-def test_a_folder_without_logs(rig, tmp_path):
-    with pytest.raises(UsageError, match="no log"):
-        rig("check", tmp_path)

@@ -69,17 +69,6 @@ def test_flags_and_missing_values_are_exported(tmp_path, kind):
     np.testing.assert_array_equal(columns["flags"], [0, 4, 0])
 
 
-def test_units_are_in_the_parquet_schema(log, tmp_path):
-    (written,) = export_log(log, ExportFormat.PARQUET, tmp_path / "x.parquet", SAMPLE)
-    field = pyarrow.parquet.read_schema(written).field("proximal_torque_n_m")
-    assert field.metadata[b"unit"] == b"N m"
-
-
-def test_one_topic_goes_to_the_named_file(log, tmp_path):
-    target = tmp_path / "counts.csv"
-    assert export_log(log, ExportFormat.CSV, target, COUNTS) == [target]
-
-
 def test_all_topics_go_to_a_folder(log, tmp_path):
     written = export_log(log, ExportFormat.NPZ, tmp_path / "new" / "folder")
     assert {item.parent for item in written} == {tmp_path / "new" / "folder"}
@@ -114,8 +103,3 @@ def test_a_damaged_log_is_not_exported(log):
     log.write_bytes(log.read_bytes()[:-50])
     with pytest.raises(DamagedLogError, match="repair"):
         export_log(log, ExportFormat.CSV)
-
-
-def test_a_topic_that_is_not_there(log):
-    with pytest.raises(UsageError, match="no topic"):
-        export_log(log, ExportFormat.CSV, topic="/rig/nothing")

@@ -11,7 +11,6 @@ from estimation.channels import CHANNELS
 from estimation.recording import Flag, Instrument, Mark, Recording, Stretch
 from rig.errors import DataError
 from rig.importers.log import IMPORTER
-from rig.importers.registry import Importer
 from rig.log.convert import recording_from_log, write_recording
 from rig.log.messages import UnflaggedSampleError
 from rig.log.reader import DamagedLogError, read_log
@@ -93,12 +92,6 @@ def test_a_value_that_is_not_a_number_survives_where_it_is_flagged(tmp_path):
     )
 
 
-def test_log_times_are_the_start_plus_the_device_time(tmp_path):
-    write_recording(tmp_path / "a.mcap", simple(started_at_ns=10**18))
-    times = read_log(tmp_path / "a.mcap").topics["/rig/sample"].log_time_ns
-    np.testing.assert_array_equal(times, 10**18 + np.arange(50) * 1_000_000)
-
-
 @pytest.mark.parametrize(
     ("start_s", "started_at_ns", "fits"),
     [(-5.0, None, True), (-5.0, 10**18, True), (-5.0, 10**9, False), (1e12, None, False)],
@@ -113,10 +106,6 @@ def test_times_before_1970_or_beyond_reach_are_refused(tmp_path, start_s, starte
         with pytest.raises(DataError, match="times cannot be written"):
             write_recording(tmp_path / "a.mcap", recording)
         assert list(tmp_path.iterdir()) == []
-
-
-def test_the_importer_keeps_the_protocol():
-    assert isinstance(IMPORTER, Importer)
 
 
 def test_a_folder_opens_as_a_campaign_in_the_order_of_the_starts(tmp_path):
@@ -148,22 +137,6 @@ def test_a_single_log_opens_as_a_campaign_of_one(log):
     assert recording.conditions["load_command_a"] == 0.3
     assert recording.marks[0].text == "finger on the jaw"
     assert "proximal_torque_n_m" in recording
-
-
-def test_runs_are_read_only_when_asked_for(tmp_path):
-    write_recording(tmp_path / "a.mcap", simple("a"))
-    campaign = IMPORTER.open(tmp_path)
-    (tmp_path / "a.mcap").unlink()
-    assert campaign.names == ("a",)
-    with pytest.raises(Exception, match="cannot be read"):
-        campaign.runs[0].recording()
-
-
-def test_an_exclusion_is_known_without_reading_samples(tmp_path):
-    write_recording(tmp_path / "a.mcap", simple("a", excluded="cable slipped"))
-    campaign = IMPORTER.open(tmp_path)
-    assert campaign.runs[0].excluded == "cable slipped"
-    assert len(campaign.evidence) == 0
 
 
 def kill(path):

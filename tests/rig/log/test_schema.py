@@ -68,13 +68,3 @@ def test_a_layout_that_is_not_fixed_or_needs_padding_is_refused(fields, reason):
 def test_a_definition_of_variable_size_is_refused(line):
     with pytest.raises(LayoutError):
         Stream.from_definition("/t", "p/msg/P", f"float64 t\n{line}\n")
-
-
-def test_units_are_in_the_channel_metadata():
-    stream = Stream("/t", "p/msg/P", (Field("motor_current_a", "float64", "A", "drive"),), 1000.0)
-    assert stream.channel_metadata == {
-        "units": '{"motor_current_a": "A"}',
-        "descriptions": '{"motor_current_a": "drive"}',
-        "rate_hz": "1000.0",
-        "crc32": stream.checksum,
-    }

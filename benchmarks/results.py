@@ -1,0 +1,220 @@
+"""The pages of docs/results: the command that makes each, and which are older than their code.
+
+`python -m benchmarks.results` lists them: commit, day, and the commits to the page's code since.
+`--remake NAME,...` runs the commands of these pages one after the other (`old`: of all that are
+older than their code, the quickest first). A page that is not older is skipped, so an interrupted
+call resumes. RIG_DATA names the folder of the measured data.
+"""
+
+import argparse
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "docs/results"
+DATA = "{data}"
+CHANGES = "+changes"
+COMMIT = re.compile(rf"(?:commit |^\| )([0-9a-f]{{7,40}}(?:\{CHANGES})?)\b", re.MULTILINE)
+"""A page's commit in a sentence, or at the start of a table's row; the last is the newest."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """One page."""
+
+    name: str  # Name of its file, without the ending
+    # Command that makes it, from the project's folder; `{data}` is the folder of the measured data,
+    # `{state}` one where the command keeps finished parts
+    command: str
+    code: str  # Paths of the code it speaks of
+    minutes: int  # Processor time, rounded
+
+    def made(self) -> tuple[str, str]:
+        """Return the day and the commit the page was made on; `never`, `-` without a page."""
+        path = FOLDER / f"{self.name}.md"
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        commits = COMMIT.findall(text)
+        days = re.findall(r"\b20\d\d-\d\d-\d\d", text)
+        return (days[-1], commits[-1]) if commits and days else ("never", "-")
+
+    def commits_since(self) -> int | None:
+        """Return the number of commits to its code since; None if its commit is not known."""
+        commit = self.made()[1].removesuffix(CHANGES)
+        git = shutil.which("git") or "git"
+        words = [git, "rev-list", "--count", f"{commit}..HEAD", "--", *self.code.split()]
+        found = subprocess.run(  # noqa: S603 - git itself, with words of the table
+            words, cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        return int(found.stdout) if found.returncode == 0 else None
+
+    def words(self, data: str) -> list[str]:
+        """Return the words of its command, with this interpreter and its programs."""
+        state = ROOT / f"build/results/{self.name}"
+        program, *rest = shlex.split(self.command.format(data=data, state=state))
+        python = Path(sys.executable)
+        return [str(python if program == "python" else python.with_name(program)), *rest]
+
+
+_ESTIMATORS = "rig/importers rig/models estimation/bank estimation/estimators estimation/networks"
+_ARM = "rig/arm estimation/arm estimation/within_bounds.py"
+_DIAGNOSIS = "estimation/causes estimation/effects rig/diagnosis"
+_TOOL = "--data {data}/mrdlab-Tool"
+_LOOP = (
+    "rig/studies/loop rig/importers estimation/effects estimation/fitting.py estimation/model.py"
+    " estimation/diagnosis/split.py"
+)
+_CORE = "firmware/core firmware/proofs"
+
+PAGES = (
+    Page(
+        "adapt",
+        "rig study instruments --data {data} --out docs/results/adapt.md",
+        f"rig/studies/instruments {_ESTIMATORS}",
+        10,
+    ),
+    Page(
+        "bench",
+        "python -m benchmarks --out docs/results/bench.md",
+        "benchmarks/bench_*.py drivers/framing.py drivers/framing_compiled.py rig/log rig/importers"
+        " rig/simulation rig/cli/main.py estimation/estimators",
+        5,
+    ),
+    Page(
+        "changes",
+        "python -m benchmarks.changes --first 33 --pairs 9 --out docs/results/changes.md",
+        "benchmarks/changes.py estimation/changes estimation/causes benchmarks/rigs",
+        5,
+    ),
+    Page("core-mutants", "python -m benchmarks.core_mutants", _CORE, 60),
+    Page(
+        "delsol",
+        "rig study delsol --seeds 1 --state {state} --out docs/results/delsol.md"
+        " --figures docs/figures",
+        f"rig/studies/delsol {_ARM} {_DIAGNOSIS}",
+        30,
+    ),
+    Page(
+        "diagnosis-numbers",
+        "python -m benchmarks.diagnosis.calibrate",
+        f"benchmarks/diagnosis {_DIAGNOSIS} benchmarks/rigs",
+        60,
+    ),
+    Page("diagnosis-versions", "python -m benchmarks.diagnosis measure", _DIAGNOSIS, 60),
+    Page(
+        "excitation",
+        "rig study excitation --out docs/results/excitation.md",
+        "rig/arm/excitation.py estimation/arm/excitation.py estimation/arm/regressor.py",
+        1,
+    ),
+    Page("hunt", "python -m benchmarks.hunt", _CORE, 60),
+    Page(
+        "intervals",
+        "rig study intervals --data {data} --out docs/results/intervals.md",
+        "rig/studies/instruments rig/importers estimation/bank estimation/estimators",
+        10,
+    ),
+    Page(
+        "loop",
+        f"rig study loop {_TOOL}_4_Maryland_L_4.tar.xz --out docs/results/loop.md",
+        _LOOP,
+        15,
+    ),
+    Page(
+        "loop-tool5",
+        f"rig study loop {_TOOL}_5_Maryland_L_2.tar.xz --out docs/results/loop-tool5.md",
+        _LOOP,
+        15,
+    ),
+    Page(
+        "machines",
+        "rig study machines {data}/machines --out docs/results/machines.md",
+        f"rig/studies/machines {_DIAGNOSIS}",
+        10,
+    ),
+    Page(
+        "oneill",
+        "rig study oneill --data {data} --states --kinds --networks --every 24 --state {state}"
+        " --figures docs/figures --out docs/results/oneill.md",
+        f"rig/studies/oneill {_ESTIMATORS}",
+        60,
+    ),
+    Page(
+        "payload",
+        "rig study payload --data {data}/psm --on one19_insertion_105g --on one19 --on one18"
+        " --out docs/results/payload.md",
+        _ARM,
+        1,
+    ),
+    Page(
+        "pique",
+        "rig study pique --data {data}/psm --also one19 --out docs/results/pique.md"
+        " --figures docs/figures",
+        f"rig/studies/pique {_ARM}",
+        10,
+    ),
+    Page("reliability", "python -m benchmarks.reliability", "drivers firmware rig/recording", 90),
+    Page(
+        "wrench",
+        "rig study wrench --seeds 2 --state {state} --out docs/results/wrench.md"
+        " --figures docs/figures",
+        f"rig/studies/pique {_ARM}",
+        30,
+    ),
+    Page(
+        "zhang",
+        "rig study zhang --seeds 1 --state {state} --out docs/results/zhang.md"
+        " --figures docs/figures",
+        f"rig/studies/zhang {_ARM}",
+        30,
+    ),
+)
+
+
+def main() -> int:
+    """List the pages, or make those asked for again; exit 1 when a command failed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__)
+    parser.add_argument("--remake", default="", metavar="NAME,...", help="pages, or `old`")
+    asked = [name for name in parser.parse_args().remake.split(",") if name]
+    unknown = set(asked) - {page.name for page in PAGES} - {"old"}
+    if unknown:
+        parser.error(f"unknown page {', '.join(sorted(unknown))}")
+    since = {page: page.commits_since() for page in PAGES}
+    if not asked:
+        sys.stdout.write(f"{'page':20}{'made':12}{'commit':17}{'commits since':>15}{'min':>5}\n")
+        for page, count in since.items():
+            known = "unknown" if count is None else count
+            made, commit = page.made()
+            sys.stdout.write(f"{page.name:20}{made:12}{commit:17}{known:>15}{page.minutes:>5}\n")
+        return 0
+    chosen = [p for p in PAGES if p.name in asked or "old" in asked]
+    return max((_remake(p, since[p]) for p in sorted(chosen, key=lambda p: p.minutes)), default=0)
+
+
+def _remake(page: Page, since: int | None) -> int:
+    data = os.environ.get("RIG_DATA", "")
+    if since == 0 and not page.made()[1].endswith(CHANGES):
+        return _note(page, "not older than its code")
+    if DATA in page.command and not data:
+        return _note(page, "left out: needs the measured data, set RIG_DATA to its folder")
+    begun = time.monotonic()
+    words = page.words(data)
+    _note(page, shlex.join(words))
+    code = subprocess.run(words, cwd=ROOT, check=False).returncode  # noqa: S603 - of the table
+    _note(page, f"exit code {code} after {(time.monotonic() - begun) / 60:.1f} min")
+    return int(code != 0)
+
+
+def _note(page: Page, what: str) -> int:
+    sys.stderr.write(f"{page.name}: {what}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
