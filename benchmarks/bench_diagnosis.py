@@ -21,9 +21,14 @@ from estimation.causes.search import assessed
 from estimation.recording import Recording
 from rig.simulation.campaign import simulate_reference_campaign
 
-SECONDS = (3.5, 7.0, 14.0)  # Length of each run
-SHARES = (0.25, 0.5, 1.0)  # Of the catalogue
-TWICE = 2.5  # Twice as much may cost so many times as much: linear, within a quarter
+SECONDS = (3.5, 7.0, 14.0)
+"""Length of each run."""
+
+SHARES = (0.25, 0.5, 1.0)
+"""Of the catalogue."""
+
+TWICE = 2.5
+"""Twice as much may cost so many times as much: linear, within a quarter."""
 
 
 @dataclass(frozen=True)

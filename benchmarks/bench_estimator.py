@@ -19,11 +19,14 @@ from estimation.estimators.network import NetworkEstimator
 from estimation.networks.network import Network
 
 SAMPLES = 20_000
-BLOCK = 20  # Samples that arrive together at 50 refreshes a second of 1 kHz
+BLOCK = 20
+"""Samples that arrive together at 50 refreshes a second of 1 kHz."""
+
 RATE_HZ = 1000.0
 STATES_LIMIT_S, NETWORK_LIMIT_S = 0.2e-6, 0.5e-6
 LATENCY_LIMIT_S = 1e-3
-SHARE = 0.1  # Share of a core that decoding and estimating may take
+SHARE = 0.1
+"""Share of a core that decoding and estimating may take."""
 
 COUNTS = {
     "motor_angle_rad": ("motor", 2 * np.pi / 4096),

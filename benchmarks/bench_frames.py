@@ -11,7 +11,8 @@ from benchmarks.ratio import Ratio, best_of
 from drivers.framing import decode_frames, encode_frames
 from drivers.teensy.reference import SAMPLE_DTYPE
 
-FRAMES = 60_000  # One minute at 1 kHz
+FRAMES = 60_000
+"""One minute at 1 kHz."""
 _SAMPLE = struct.Struct("<BBHIIiiiihhhHhhH")
 
 

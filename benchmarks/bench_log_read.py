@@ -14,7 +14,8 @@ from rig.log.schema import Field, Stream
 from rig.log.writer import LogWriter
 
 MESSAGES = 300_000
-COLUMNS = 16  # Channels of float64; a sequence number and flags follow them
+COLUMNS = 16
+"""Channels of float64; a sequence number and flags follow them."""
 
 
 def write(path: Path) -> None:

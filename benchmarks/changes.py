@@ -32,10 +32,15 @@ MOVED: Mapping[str, tuple[str, ...]] = {
 }
 """Parameter of the simulated rig to the names that are right for it."""
 
-FACTORS = (1.3, 2.0)  # A parameter is multiplied or divided by a factor between these
-RUNS = 6  # Runs of each campaign
+FACTORS = (1.3, 2.0)
+"""A parameter is multiplied or divided by a factor between these."""
+
+RUNS = 6
+"""Runs of each campaign."""
+
 GEAR_RATIO = 35.0
-SECOND = 500_000  # Added to the seed of the sensors' noise in the second campaign
+SECOND = 500_000
+"""Added to the seed of the sensors' noise in the second campaign."""
 
 
 @dataclass(frozen=True)

@@ -203,7 +203,8 @@ TESTS: dict[str, Callable[[Path, Path], bool | None]] = {
     "contract": _contract,
 }
 """What a mutant is held against, in order."""
-LATER = ("small", "contract")  # Tests of a mutant that no test before them noticed
+LATER = ("small", "contract")
+"""Tests of a mutant that no test before them noticed."""
 
 
 def page(results: dict[str, dict[str, bool] | None], core: str) -> str:

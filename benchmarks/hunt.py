@@ -33,7 +33,8 @@ PROGRAM = FIRMWARE / "build" / "hunt"
 STATE = Path("build/hunt.json")
 PAGE = Path("docs/results/hunt.md")
 CHUNKS = {"commands": 20_000, "faults": 5_000}
-MOST_EVENTS = 5  # Events of a sequence that is worth a person's time
+MOST_EVENTS = 5
+"""Events of a sequence that is worth a person's time."""
 KNOWN = {
     ("all encoders dead",): "friction hides the current that creeps up (docs/decisions/0111); a"
     " monitor of the encoders' supply is the remedy",

@@ -22,9 +22,14 @@ from calibration.history import COVERAGE
 from calibration.sessions.encoder import PAIRS, Pair
 from estimation.recording import FloatArray, Recording
 
-VERIFIED = {"spindle": PAIRS["spindle"]}  # Encoders that recordings verify
-LEAST_RUNS = 3  # Runs below which a scatter over runs has no meaning
-MOVING = 0.1  # Share of a run's usual speed below which the direction of motion is not taken
+VERIFIED = {"spindle": PAIRS["spindle"]}
+"""Encoders that recordings verify."""
+
+LEAST_RUNS = 3
+"""Runs below which a scatter over runs has no meaning."""
+
+MOVING = 0.1
+"""Share of a run's usual speed below which the direction of motion is not taken."""
 
 
 class NoPairError(CalibrationError):

@@ -13,7 +13,8 @@ from calibration.quality import BadDataError
 from calibration.record import Fit
 from estimation.recording import FloatArray
 
-BISECTIONS = 60  # Halvings of the voltage range in the inverse: more than a double has bits
+BISECTIONS = 60
+"""Halvings of the voltage range in the inverse: more than a double has bits."""
 
 
 class FsrRangeError(CalibrationError):

@@ -6,8 +6,11 @@ from math import hypot, inf
 
 from calibration.record import LINE, CalibrationRecord
 
-COVERAGE = 2.0  # Standard deviations of an expanded uncertainty, about 95 %
-MOST = 5  # Earlier calibrations that one is compared with
+COVERAGE = 2.0
+"""Standard deviations of an expanded uncertainty, about 95 %."""
+
+MOST = 5
+"""Earlier calibrations that one is compared with."""
 
 
 @dataclass(frozen=True)

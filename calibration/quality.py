@@ -6,9 +6,14 @@ from numpy.typing import ArrayLike
 from calibration.errors import CalibrationError
 from estimation.recording import FloatArray
 
-SATURATED_SHARE = 0.01  # Largest share of samples at a rail that passes
-CLIPPED_SHARE = 0.05  # Largest share of samples that may have exactly the greatest value of all
-LEVEL_BINS = 20  # A level is one of this many equal parts of the range that holds samples
+SATURATED_SHARE = 0.01
+"""Largest share of samples at a rail that passes."""
+
+CLIPPED_SHARE = 0.05
+"""Largest share of samples that may have exactly the greatest value of all."""
+
+LEVEL_BINS = 20
+"""A level is one of this many equal parts of the range that holds samples."""
 
 
 class BadDataError(CalibrationError):

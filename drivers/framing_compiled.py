@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 CRC_START = 0xFFFF
 CRC_SIZE = 2
-MAX_BLOCK = 254  # Most bytes COBS carries behind one code byte
-MAX_PAYLOAD = 1024  # Longest payload a board takes or sends; longer frames are noise
+MAX_BLOCK = 254
+"""Most bytes COBS carries behind one code byte."""
+MAX_PAYLOAD = 1024
+"""Longest payload a board takes or sends; longer frames are noise."""
 MAX_BULK_PAYLOAD = MAX_BLOCK - CRC_SIZE
 """Longest payload of the bulk path: one code byte of overhead, whatever the content."""
 MAX_WIRE = MAX_PAYLOAD + CRC_SIZE + (MAX_PAYLOAD + CRC_SIZE) // MAX_BLOCK + 1

@@ -48,8 +48,12 @@ TURNED, FALL, RISE = "_turned_s", "_fall_", "_rise_"
 AGO = re.compile(r"^(?P<name>.+)_(?P<ms>\d+)ms_ago(?P<unit>_.+)$")
 RATE = "_rate_n_m_s"
 
-TURNING = "motor_angle_rad"  # The angle whose lowest value is where the drive last turned
-TRAVEL_WINDOW_S = 0.5  # Window of a travel, s. A longer memory could identify the run.
+TURNING = "motor_angle_rad"
+"""The angle whose lowest value is where the drive last turned."""
+
+TRAVEL_WINDOW_S = 0.5
+"""Window of a travel, s. A longer memory could identify the run."""
+
 CLOCKS = ("time_s", CAMPAIGN_TIME)
 
 Operator = Callable[[FloatArray], FloatArray]

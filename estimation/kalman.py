@@ -23,7 +23,8 @@ smallest torque errors on the public data set, fitted and used live."""
 ANGLE_NOISE_RAD = 2 * np.pi / 4096 / np.sqrt(12)
 """Quantisation of the reference rig's motor encoder, standard deviation."""
 
-UPDATES = 5000  # Updates after which the gain no longer changes
+UPDATES = 5000
+"""Updates after which the gain no longer changes."""
 
 
 @dataclass(frozen=True, eq=False)

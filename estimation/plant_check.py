@@ -20,8 +20,11 @@ from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.signals import Reading
 
-FOLLOWS = 0.02  # Share by which two readings of one travel may differ
-ALIKE = 3.0  # Factor between a noise that is stated and that of the recordings
+FOLLOWS = 0.02
+"""Share by which two readings of one travel may differ."""
+
+ALIKE = 3.0
+"""Factor between a noise that is stated and that of the recordings."""
 
 
 @dataclass(frozen=True)

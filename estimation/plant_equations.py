@@ -32,7 +32,8 @@ from estimation.plant import (
 from estimation.signals import Combination, Reading, Share, Signals
 
 OFFSET = Part("sensor.offset")
-RATE = {"N m": "_rate_n_m_s"}  # Unit of an effort to the ending of its rate
+RATE = {"N m": "_rate_n_m_s"}
+"""Unit of an effort to the ending of its rate."""
 
 
 @dataclass(frozen=True)

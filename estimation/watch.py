@@ -15,14 +15,21 @@ import numpy as np
 from estimation.model import Model, balance_channels, estimate, settled
 from estimation.recording import Recording
 
-SLACK = 0.5  # Spreads by which a run may be worse than usual without counting
+SLACK = 0.5
+"""Spreads by which a run may be worse than usual without counting."""
+
 LIMIT = 5.0
 """Sum at which the model no longer fits: with this slack a change is claimed by chance once in
 some 900 runs (normal errors)."""
 
-MOST = 4.0  # A run counts as this many spreads at most, so that no single run decides
-LEAST_SPREAD = 0.1  # Runs that the model was not fitted on differ by a tenth at least
-FIRST = 5  # Runs that replace those of the fit where the model's file has no error
+MOST = 4.0
+"""A run counts as this many spreads at most, so that no single run decides."""
+
+LEAST_SPREAD = 0.1
+"""Runs that the model was not fitted on differ by a tenth at least."""
+
+FIRST = 5
+"""Runs that replace those of the fit where the model's file has no error."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,8 @@ ANCHORS: dict[str, str] = {
 }
 """Room and class of an error to the section of the page; the nearest base of a class counts."""
 
-A_BUG = "a-fault-in-rig-itself"  # Section for an error that nobody raised on purpose
+A_BUG = "a-fault-in-rig-itself"
+"""Section for an error that nobody raised on purpose."""
 
 
 def anchor_of(kind: type[Exception]) -> str:

@@ -30,8 +30,12 @@ from estimation.files import write_text_atomic
 from estimation.model import Model
 
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
-GEAR_RATIO = 35.0  # Of all rigs: the derived channels of the reference rig are made for it
-KINDS = ("strong", "weak", "outside")  # Classes of cases with one cause in all runs
+GEAR_RATIO = 35.0
+"""Of all rigs: the derived channels of the reference rig are made for it."""
+
+KINDS = ("strong", "weak", "outside")
+"""Classes of cases with one cause in all runs."""
+
 SHARPNESS = (4.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0)
 FALSE_FINDINGS = 0.01
 PAGE = Path("docs/results/diagnosis-numbers.md")

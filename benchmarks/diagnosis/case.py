@@ -8,7 +8,8 @@ from typing import Any
 from estimation.recording import Recording
 from rig.log.convert import write_recording
 
-Report = Mapping[str, Any]  # The JSON answer of `rig diagnose`
+Report = Mapping[str, Any]
+"""The JSON answer of `rig diagnose`."""
 
 KINDS = {
     "strong": "strong",
@@ -21,8 +22,11 @@ KINDS = {
 }
 """Classes of simulated cases, and their headings on the results page."""
 
-MACHINE = "machine"  # Kind of a case that holds measured data of a machine somebody else built
-SURE = 0.9  # Confidence from which a wrong statement counts as sure and wrong
+MACHINE = "machine"
+"""Kind of a case that holds measured data of a machine somebody else built."""
+
+SURE = 0.9
+"""Confidence from which a wrong statement counts as sure and wrong."""
 
 
 def write_recordings(folder: Path, recordings: Iterable[Recording]) -> None:

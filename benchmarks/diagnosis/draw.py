@@ -26,7 +26,9 @@ from rig.simulation.plant import TICK_S
 from rig.simulation.play import play
 from rig.simulation.sensors import spindle_count_of
 
-WEAK = 0.3  # Strength of a weak case for one of a strong one
+WEAK = 0.3
+"""Strength of a weak case for one of a strong one."""
+
 CHAINS = ("plain", "coloured", "drifting", "skewed")
 """Faults of a logger in a case, in addition to white noise and counts."""
 
@@ -43,7 +45,9 @@ it from what depends on speed."""
 
 SPREAD = 0.1
 EPOCH_NS = 1_700_000_000_000_000_000
-APART_S = 30.0  # From the start of one run to that of the next
+APART_S = 30.0
+"""From the start of one run to that of the next."""
+
 FADE_S = 120.0
 WRIST_COUNTS = 8192
 

@@ -19,7 +19,8 @@ from estimation.fitting import fit
 from estimation.residual import centred, residuals
 from rig.importers.registry import open_campaign
 
-EVERY_HZ = 1e6  # Above any rate of recording: every sample counts
+EVERY_HZ = 1e6
+"""Above any rate of recording: every sample counts."""
 
 
 def errors_without(

@@ -26,7 +26,8 @@ from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
 from rig.errors import RigError
 
-MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)  # Columns of the board's inputs
+MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)
+"""Columns of the board's inputs."""
 _TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
 STEP_S = 0.005
 MOTOR_STEP = 3

@@ -10,7 +10,8 @@ from pathlib import Path
 
 CONFIGS = ("simulated", "pty", "canopen_simulated", "grasper")
 TABLES = ("tcp", "tcp6", "udp", "udp6")
-LISTENS = {"tcp": "0A", "udp": "07"}  # State of a socket that takes what strangers send
+LISTENS = {"tcp": "0A", "udp": "07"}
+"""State of a socket that takes what strangers send."""
 LOOK_S = 0.05
 
 

@@ -13,7 +13,8 @@ from rig.errors import SafetyTripError
 
 PERIOD_S = 4.0
 BLOCK_S = 60.0
-WATCHDOG_S = 0.05  # That of the shipped configurations of real rigs
+WATCHDOG_S = 0.05
+"""That of the shipped configurations of real rigs."""
 
 
 @dataclass(frozen=True)

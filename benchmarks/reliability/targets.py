@@ -36,7 +36,8 @@ from rig.configuration.config import SHIPPED, load_config, shipped_configs
 from rig.configuration.text import to_toml
 from rig.errors import RigError
 
-REFUSALS = (DriverError, RigError, EstimationError, CalibrationError)  # What a decoder may raise
+REFUSALS = (DriverError, RigError, EstimationError, CalibrationError)
+"""What a decoder may raise."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,9 @@ from estimation.campaign import with_campaign_time
 from rig.simulation.forms import Random
 
 TRIED_RUNS = 5
-DRAWS = 2  # Draws of an effect's form on one rig before another rig is drawn
+DRAWS = 2
+"""Draws of an effect's form on one rig before another rig is drawn."""
+
 WORST_TRACKING = 0.4
 """A rig follows when its error is below this share of what it is asked for, both rms."""
 

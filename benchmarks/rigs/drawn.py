@@ -13,7 +13,8 @@ from estimation.recording import FloatArray
 from rig.simulation.forms import POINTS, Random, Table, grid
 
 TICK_S = 1e-3
-MARGIN = 0.15  # How far a table reaches beyond the usual range of its variable, shares of it
+MARGIN = 0.15
+"""How far a table reaches beyond the usual range of its variable, shares of it."""
 
 
 @dataclass(frozen=True, eq=False)

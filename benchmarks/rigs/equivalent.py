@@ -20,13 +20,19 @@ from estimation.model import Term
 from estimation.recording import FloatArray, Recording
 from rig.simulation.reference_roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, candidates
 
-POINTS = 25  # Most points of a family's shapes that are tried
-ODDS = 6.0  # Twice the logarithm of likelihoods that noise cannot separate: odds of twenty to one
+POINTS = 25
+"""Most points of a family's shapes that are tried."""
+
+ODDS = 6.0
+"""Twice the logarithm of likelihoods that noise cannot separate: odds of twenty to one."""
+
 FORM = 0.1
 """Share of an effect's power that counts as its form, not as another cause: true forms are
 distorted, and the residual of the catalogue's form of the true family may be as large."""
 
-STRIDE = 4  # One in so many samples of 1 kHz is walked over by a family with memory
+STRIDE = 4
+"""One in so many samples of 1 kHz is walked over by a family with memory."""
+
 FREE = 0.5
 """Share of itself by which a declared gain may change next to a family: one that takes the whole
 torque from another column does not explain this machine."""

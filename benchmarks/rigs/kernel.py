@@ -36,7 +36,8 @@ from rig.simulation.plant import TICK_S, braking, clip
     COMMAND,
     LOAD,
 ) = range(8)
-LOGGED = 8  # Columns of a tick: the instant's true values, then the commands that act from it on
+LOGGED = 8
+"""Columns of a tick: the instant's true values, then the commands that act from it on."""
 
 (
     ONE,

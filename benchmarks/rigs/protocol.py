@@ -12,13 +12,16 @@ from rig.protocols import trajectory
 from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
 
-LEAD_S = 0.8  # Time before a run's first sample in which the load comes and nothing moves
+LEAD_S = 0.8
+"""Time before a run's first sample in which the load comes and nothing moves."""
+
 MOTIONS = ("sine", "sweep", "multisine", "trapezoid", "smooth", "dwell")
 LOADS = ("levels", "signed", "springs", "varying")
 SHAPED = ("load_position", "load_time")
 """Loads of protocols that confound: one function of the angle, or of time, in every run."""
 
-LONGEST_S = 220.0  # Most time of all runs together
+LONGEST_S = 220.0
+"""Most time of all runs together."""
 
 
 class LoadUnit(NamedTuple):

@@ -19,11 +19,14 @@ from estimation.rest import in_motion
 
 EQUATIONS = ("motor", "gearbox", "cable", "stretch")
 GEARBOX = "gearbox_differential_rad"
-EVERY = 10  # One in so many samples of 1 kHz is regressed on
+EVERY = 10
+"""One in so many samples of 1 kHz is regressed on."""
+
 WIDTHS = tuple(float(x) for x in np.geomspace(2e-3, 0.6, 14))
 """Widths of a friction's sign that are tried, shares of the usual fast speed."""
 
-FINER = 9  # Widths that are tried between the neighbours of the best one
+FINER = 9
+"""Widths that are tried between the neighbours of the best one."""
 
 
 @cache

@@ -8,8 +8,12 @@ from rig.errors import UsageError
 CALIBRATE = range(0, 1_000_000)
 """Seeds of the cases that the numbers of the diagnosis are calibrated on."""
 
-DEVELOP = range(1_000_000, 2_000_000)  # Seeds of the cases that people read while they work on it
-JUDGE = range(2_000_000, 3_000_000)  # Seeds of the cases that its figures are reported on
+DEVELOP = range(1_000_000, 2_000_000)
+"""Seeds of the cases that people read while they work on it."""
+
+JUDGE = range(2_000_000, 3_000_000)
+"""Seeds of the cases that its figures are reported on."""
+
 RANGES = {"calibrate": CALIBRATE, "develop": DEVELOP, "judge": JUDGE}
 
 

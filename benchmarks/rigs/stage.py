@@ -21,7 +21,8 @@ from estimation.recording import FloatArray, Instrument, Recording
 
 EPOCH_NS = 1_700_000_000_000_000_000
 RATE_HZ = 1000.0
-FIRST = round(LEAD_S * RATE_HZ)  # Sample at which a run begins, behind its lead
+FIRST = round(LEAD_S * RATE_HZ)
+"""Sample at which a run begins, behind its lead."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class Moved:
     added: FloatArray
 
 
-FEWEST = 100  # A run of fewer samples in motion, of 100 a second, barely moves
+FEWEST = 100
+"""A run of fewer samples in motion, of 100 a second, barely moves."""
 
 
 class UnstableError(Exception):

@@ -38,7 +38,9 @@ READ = {
 """Reading to the equations that read it."""
 
 TRIALS = 5
-CLOSE = 0.08  # A trial is good when its strength is so near to the wanted one, as a share of it
+CLOSE = 0.08
+"""A trial is good when its strength is so near to the wanted one, as a share of it."""
+
 Fits = Mapping[str, Fitted]
 
 

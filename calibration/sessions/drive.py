@@ -22,7 +22,8 @@ from estimation.recording import FloatArray
 
 CURRENT, COMMAND = "motor_current_a", "motor_command_ratio"
 LEAST_RUNS = 6
-MOST_LATE = 6  # Delays tried, samples
+MOST_LATE = 6
+"""Delays tried, samples."""
 
 
 @dataclass(frozen=True, kw_only=True)

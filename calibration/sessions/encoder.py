@@ -34,7 +34,8 @@ PAIRS = {
     "spindle": Pair("spindle_angle_rad", "motor_angle_rad", "proximal_torque_n_m", 1 / 35.0),
     "jaw": Pair("jaw_angle_rad", "spindle_angle_rad", "distal_torque_n_m", 1.0),
 }
-SPEEDS_RAD_S = (0.3, 0.5)  # More than one: at one speed, time and angle are collinear
+SPEEDS_RAD_S = (0.3, 0.5)
+"""More than one: at one speed, time and angle are collinear."""
 MARKS = 5
 MARK_SPREAD_COUNT = 6.0
 LEAST_PERIODS, MOST_PERIODS = 6, 40

@@ -26,8 +26,11 @@ TORQUE, MOTOR, SPINDLE = "proximal_torque_n_m", "motor_angle_rad", "spindle_angl
 LEAST_TORQUE_N_M = 0.02
 """Below this torque the gear may be anywhere in its backlash, and the sample is excluded."""
 
-ZEROS_N_M = np.arange(-0.06, 0.0601, 0.002)  # Readings of an unloaded gear that are tried
-Twist = tuple[FloatArray, FloatArray]  # One run's torque, N m, and twist, rad, each of shape (n,)
+ZEROS_N_M = np.arange(-0.06, 0.0601, 0.002)
+"""Readings of an unloaded gear that are tried."""
+
+Twist = tuple[FloatArray, FloatArray]
+"""One run's torque, N m, and twist, rad, each of shape (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True)

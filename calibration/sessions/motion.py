@@ -12,7 +12,8 @@ from estimation.filters import zero_phase
 from estimation.recording import FloatArray
 
 RATE_HZ = 1000.0
-START_RAD = -1.047  # Where a calibration starts: the jaw open
+START_RAD = -1.047
+"""Where a calibration starts: the jaw open."""
 MOVING_RAD_S = 0.2
 PAUSE_S, TRAVEL_RAD = 0.3, 0.9
 KEPT_HZ = 100.0

@@ -9,7 +9,8 @@ from drivers.errors import FrameError
 
 DEFAULT_ADDRESS = 0x54
 REPLY_SIZE = 2
-TURNS = 0x01  # Added to the address: ask a multi-turn encoder for its turns
+TURNS = 0x01
+"""Added to the address: ask a multi-turn encoder for its turns."""
 BITS = 14
 FULL_TURN = 1 << BITS
 RAD_PER_COUNT = 2 * math.pi / FULL_TURN

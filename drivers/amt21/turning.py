@@ -6,8 +6,10 @@ from drivers.amt21.protocol import FULL_TURN
 
 TOP_SPEED_RAD_S = 8000 * 2 * math.pi / 60
 """The fastest shaft of the series: 8000 turns a minute for the 12-bit types, 4000 for 14 bits."""
-TURN_NUMBERS = FULL_TURN  # Turns are counted in 14 bits, and wrap
-_PLAY_COUNTS = 4  # Counts a shaft at rest may differ by from one reading to the next
+TURN_NUMBERS = FULL_TURN
+"""Turns are counted in 14 bits, and wrap."""
+_PLAY_COUNTS = 4
+"""Counts a shaft at rest may differ by from one reading to the next."""
 
 
 def turns_at(angle: int, before: int, after: int) -> int | None:

@@ -16,7 +16,8 @@ from drivers.transport.faulty import Faults
 from drivers.transport.faulty_can import FaultyCanBus
 from drivers.transport.simulated_can import SimulatedCanBus
 
-Load = Callable[[int], NDArray[np.int64]]  # Gauge counts, shape (6,), at a tick
+Load = Callable[[int], NDArray[np.int64]]
+"""Gauge counts, shape (6,), at a tick."""
 
 MATRIX = np.array(
     [

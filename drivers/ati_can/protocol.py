@@ -19,8 +19,10 @@ DEFAULT_BASE = 0x20
 HIGHEST_BASE = 0x7F
 READ, READ_SECOND, MATRIX_ROW, SERIAL, CALIBRATION = 0x0, 0x1, 0x2, 0x5, 0x6
 COUNTS_PER_UNIT, UNIT_CODES, FIRMWARE = 0x7, 0x8, 0xF
-ASSUMED_COUNTS_PER_UNIT = 1_000_000  # Value for firmware before 3.7, which does not report it
-TELLS_UNITS = (3, 7)  # First firmware that answers for counts per unit and unit codes
+ASSUMED_COUNTS_PER_UNIT = 1_000_000
+"""Value for firmware before 3.7, which does not report it."""
+TELLS_UNITS = (3, 7)
+"""First firmware that answers for counts per unit and unit codes."""
 GAUGES = 6
 GAUGE_MIN, GAUGE_MAX = -(2**15), 2**15 - 1
 AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")

@@ -20,7 +20,8 @@ from drivers.transport.udp import split_address
 
 ANSWER_TIMEOUT_S = 1.0
 LONGEST_SILENCE_S = 0.1
-MOST_DATAGRAMS = 10_000  # Datagrams taken in one read: a second and a half of the fastest stream
+MOST_DATAGRAMS = 10_000
+"""Datagrams taken in one read: a second and a half of the fastest stream."""
 
 
 class AtiNet:

@@ -13,7 +13,8 @@ from drivers.errors import DriverError, LinkTimeoutError
 
 ASK_AGAIN_S = 0.5
 """Silence after which the stream is requested again, and at every such time from then on."""
-DEAD_S = 1.0  # Silence that is an error
+DEAD_S = 1.0
+"""Silence that is an error."""
 FROZEN_S = 0.1
 """Time for which the internal sample number may stay: 500 samples of the slowest sensor's."""
 LEAST_REPEATS = 5

@@ -19,7 +19,8 @@ from drivers.transport.transport import Transport
 
 TRIES = 3
 REPLY_TIMEOUT_S = 0.2
-QUIET_S = 0.05  # A stopped stream has ended when nothing arrives for this long, s
+QUIET_S = 0.05
+"""A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
 GAUGE_LIMIT = 32767
 

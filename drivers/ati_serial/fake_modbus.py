@@ -19,7 +19,8 @@ from pymodbus.simulator.simcore import SimCore
 from drivers.ati_serial import protocol
 
 REGISTERS = 0x1000
-_OWN_FUNCTION_SIZE = 5  # Slave, function, one byte, CRC
+_OWN_FUNCTION_SIZE = 5
+"""Slave, function, one byte, CRC."""
 
 
 class ModbusServer:

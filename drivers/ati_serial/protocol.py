@@ -16,9 +16,12 @@ SLAVE = 0x0A
 READ, WRITE, STREAM, STORAGE = 0x03, 0x10, 0x46, 0x6A
 START_STREAM = b"\x55"
 UNLOCK, LOCK = b"\xaa", b"\x18"
-SUCCESS = b"\x01"  # Answer to both functions of the sensor's own
-FAILED = 0x80  # Added to the function of a refused request
-JAM = bytes(16)  # Any 14 bytes or more, sent while it streams, end the stream
+SUCCESS = b"\x01"
+"""Answer to both functions of the sensor's own."""
+FAILED = 0x80
+"""Added to the function of a refused request."""
+JAM = bytes(16)
+"""Any 14 bytes or more, sent while it streams, end the stream."""
 ACTIVE_GAINS, STATUS = 0x0000, 0x001D
 FIRST_CALIBRATION, CALIBRATION_STEP = 0x00E3, 192
 PIECES = ((0, 104), (104, 29))

@@ -12,7 +12,8 @@ from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
 XL330_M288 = 1200
-ROM_END = 64  # Registers below can be written only while the motor is out of force
+ROM_END = 64
+"""Registers below can be written only while the motor is out of force."""
 _GOALS = range(100, 120)
 _COUNTS_S_PER_UNIT = 0.229 * protocol.COUNTS_A_TURN / 60
 _ACCELERATION, _FRICTION = 40.0, 4.0

@@ -15,7 +15,8 @@ STUFFED = b"\xff\xff\xfd"
 """Within a packet it is followed by one more 0xFD, so that no header is seen there."""
 PING, READ, WRITE, REBOOT, STATUS = 0x01, 0x02, 0x03, 0x08, 0x55
 HIGHEST_ID = 252
-ALERT = 0x80  # Bit of a status packet's error: the device has a hardware error
+ALERT = 0x80
+"""Bit of a status packet's error: the device has a hardware error."""
 RANGE_ERROR, ACCESS_ERROR = 4, 7
 ERRORS = {
     1: "it failed to carry out the instruction",

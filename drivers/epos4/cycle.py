@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 FEEDBACK_TIMEOUT_S = 0.01
 """Time for the answer to a SYNC; it takes a fraction of a millisecond on the wire."""
-SPACING = 0.4  # Least time between two SYNCs of which one was late, in periods
+SPACING = 0.4
+"""Least time between two SYNCs of which one was late, in periods."""
 
 
 class Cycle:

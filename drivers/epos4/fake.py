@@ -33,8 +33,10 @@ Motor = Callable[[float, int], int]
 
 WRONG_STATE, NOT_THERE, OUT_OF_RANGE = 0x08000022, 0x06020000, 0x06090030
 HOST_LOST, BUS_PASSIVE = 0x8130, 0x8120
-RAMP_MS = 200  # Time a quick stop takes
-_COMMUNICATION = range(0x8100, 0x8300)  # Error codes that 0x6007 decides on
+RAMP_MS = 200
+"""Time a quick stop takes."""
+_COMMUNICATION = range(0x8100, 0x8300)
+"""Error codes that 0x6007 decides on."""
 _ALLOWED = {(0x6007, 0): (2, 3), (0x605E, 0): (0, 1, 2), (0x1029, 1): (0, 1, 2)}
 _AFTER_LOST_HOST = {0: "PRE-OPERATIONAL", 2: "STOPPED"}
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82

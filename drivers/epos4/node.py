@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from drivers.epos4.canopen_link import CanopenLink
 
 DRIVE_HEARTBEAT_MS = 100
-SILENT_S = 3.5 * DRIVE_HEARTBEAT_MS / 1000  # Longest silence of the drive that is not a fault
-HOST_NODE = 127  # Node number under which the host sends its heartbeat
+SILENT_S = 3.5 * DRIVE_HEARTBEAT_MS / 1000
+"""Longest silence of the drive that is not a fault."""
+HOST_NODE = 127
+"""Node number under which the host sends its heartbeat."""
 STATE_TIMEOUT_S = 0.8
 BOOT_TIMEOUT_S = 3.0
 INSTANT_S = 1e-9

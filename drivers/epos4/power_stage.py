@@ -10,7 +10,8 @@ from drivers.epos4.protocol import State
 if TYPE_CHECKING:
     from drivers.epos4.canopen_link import CanopenLink
 
-GENERIC_ERROR = 0x1000  # Code of a fault for which the drive gives none
+GENERIC_ERROR = 0x1000
+"""Code of a fault for which the drive gives none."""
 _FAULTY = (State.FAULT, State.FAULT_REACTION)
 
 

@@ -12,25 +12,32 @@ from enum import Enum
 from drivers.errors import DriverError, FrameError
 
 VENDOR_ID = 0xFB
-CYCLIC_TORQUE = 10  # Mode of operation: cyclic synchronous torque
-CYCLIC_TORQUE_SUPPORTED = 1 << 9  # Its bit among the supported modes
+CYCLIC_TORQUE = 10
+"""Mode of operation: cyclic synchronous torque."""
+CYCLIC_TORQUE_SUPPORTED = 1 << 9
+"""Its bit among the supported modes."""
 PDO_INVALID = 1 << 31
-SYNCHRONOUS, EVENT_DRIVEN = 1, 255  # Transmission types: at every SYNC; at once
+SYNCHRONOUS, EVENT_DRIVEN = 1, 255
+"""Transmission types: at every SYNC; at once."""
 
 NMT_START, NMT_PRE_OPERATIONAL, NMT_RESET_COMMUNICATION = 0x01, 0x80, 0x82
-STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127  # Network states, as in a heartbeat
+STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
+"""Network states, as in a heartbeat."""
 
 DISABLE_ON_LOST_HOST = 2
 """0x6007: voltage off when the connection is lost; 3 brakes along the quick stop's ramp."""
-DISABLE_ON_FAULT = 0  # 0x605E: voltage off at a fault; 1 and 2 brake along a ramp
+DISABLE_ON_FAULT = 0
+"""0x605E: voltage off at a fault; 1 and 2 brake along a ramp."""
 PRE_OPERATIONAL_ON_LOST_HOST = 0
 """0x1029:1: objects can still be read and written; 1 stays operational, 2 stops the node."""
 
-SHUTDOWN, ENABLE_OPERATION, DISABLE_VOLTAGE, FAULT_RESET = 0x06, 0x0F, 0x00, 0x80  # Controlwords
+SHUTDOWN, ENABLE_OPERATION, DISABLE_VOLTAGE, FAULT_RESET = 0x06, 0x0F, 0x00, 0x80
+"""Controlwords."""
 
 TPDO_MAP = (0x60410010, 0x60640020, 0x30D20110)
 """Statusword, position, averaged torque: exactly 8 bytes."""
-RPDO_MAP = (0x60400010, 0x60710010)  # Controlword, target torque
+RPDO_MAP = (0x60400010, 0x60710010)
+"""Controlword, target torque."""
 _TPDO = struct.Struct("<Hih")
 _RPDO = struct.Struct("<Hh")
 _EMERGENCY = struct.Struct("<HB5s")

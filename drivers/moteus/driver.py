@@ -20,7 +20,8 @@ from drivers.registry import Driver, RateOption
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
-STARTS_S = 1.0  # Time to get into position mode: it measures its current sensors first
+STARTS_S = 1.0
+"""Time to get into position mode: it measures its current sensors first."""
 _ZERO_K = 273.15
 
 

@@ -13,7 +13,8 @@ from drivers.moteus.protocol import State
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
-PREPARES_MS = 20  # Time between stopped and position mode, in which it measures its current sensors
+PREPARES_MS = 20
+"""Time between stopped and position mode, in which it measures its current sensors."""
 _INERTIA_KG_M2, _FRICTION_N_M_S = 1e-5, 2e-4
 _TORQUE_CONSTANT_N_M_A = 0.03
 _MEASURED = 4

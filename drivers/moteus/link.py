@@ -10,7 +10,8 @@ from drivers.transport.transport import Transport
 
 T = TypeVar("T")
 TRIES = 3
-REPLY_TIMEOUT_S = 0.02  # Time for an answer: below a millisecond on the bus, and what USB takes
+REPLY_TIMEOUT_S = 0.02
+"""Time for an answer: below a millisecond on the bus, and what USB takes."""
 
 
 class FdcanusbLink:

@@ -15,10 +15,13 @@ HIGHEST_ID = 126
 HOST = 0
 WANTS_REPLY = 0x8000
 WRITE, READ, REPLY, NOP = 0x00, 0x10, 0x20, 0x50
-INT8, INT32, FLOAT = 0, 2, 3  # Types of values; a subframe's two bits above the two of its count
+INT8, INT32, FLOAT = 0, 2, 3
+"""Types of values; a subframe's two bits above the two of its count."""
 _FORMATS = {INT8: "b", 1: "h", INT32: "i", FLOAT: "f"}
-_FRAME_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)  # What a CAN-FD frame can carry, bytes
-LONGEST_LINE = 256  # Bytes; a reply has less than 180. More without a line feed is noise.
+_FRAME_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""What a CAN-FD frame can carry, bytes."""
+LONGEST_LINE = 256
+"""Bytes; a reply has less than 180. More without a line feed is noise."""
 
 MODE, POSITION, CURRENT, VOLTAGE, COMMAND = 0x000, 0x001, 0x004, 0x00D, 0x020
 """First registers of what is read and written: mode; position, velocity, torque; current in

@@ -18,7 +18,8 @@ from drivers.transport.transport import Transport
 TRIES = 3
 RATE_HZ = 1300.0
 REPLY_TIMEOUT_S = 0.2
-QUIET_S = 0.05  # A stopped stream has ended when nothing arrives for this long, s
+QUIET_S = 0.05
+"""A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
 
 

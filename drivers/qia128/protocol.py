@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 
 FRAME_SIZE = 4
-MIDDLE = 1 << 23  # Reading without input
+MIDDLE = 1 << 23
+"""Reading without input."""
 TOP = (1 << 24) - 1
 LOOP_BACK = (0x00, 0x01)
 STREAM = (0x00, 0x0C)
@@ -18,7 +19,8 @@ GET_SERIAL = (0x01, 0x00)
 GET_CALIBRATION = (0x03, 0x19)
 SET_RATE = (0x04, 0x1E)
 ZERO_POINT, FULL_SCALE_POINT = 0, 5
-RATE_1300 = 7  # Code of 1300 samples a second, the only one known
+RATE_1300 = 7
+"""Code of 1300 samples a second, the only one known."""
 
 
 def checksum(data: bytes) -> int:

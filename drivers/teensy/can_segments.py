@@ -10,7 +10,8 @@ FIRST, LAST, COUNTER = 0x80, 0x40, 0x3F
 PIECE = 7
 HOST_ID, BOARD_ID = 0x690, 0x6A0
 """Identifiers of what the host and what the board sends, unless set otherwise."""
-LONGEST = 1026  # Longest payload with its CRC
+LONGEST = 1026
+"""Longest payload with its CRC."""
 
 
 class Splitter:

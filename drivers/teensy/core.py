@@ -218,7 +218,8 @@ class CoreGuard:
         return row, code, channel, value, limit, late_us
 
 
-_MOST_INPUTS = 9  # Of any profile
+_MOST_INPUTS = 9
+"""Of any profile."""
 
 
 def settings_bytes(profile: Profile, gains: Sequence[Any], limits: ArmLimits) -> bytes:

@@ -16,7 +16,8 @@ from drivers.teensy.reference import REFERENCE
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
-LONGEST_SILENCE_S = 0.1  # A hundred samples
+LONGEST_SILENCE_S = 0.1
+"""A hundred samples."""
 
 
 class TeensyDevice:

@@ -36,8 +36,10 @@ from drivers.teensy.protocol import (
 )
 from drivers.teensy.reference_board import REFERENCE_LOGIC
 
-TRANSMIT_CAPACITY = 65536  # Bytes the board holds for a host that does not read
-FRAME_OVERHEAD = 4  # Bytes of a sample frame on the wire beyond its payload
+TRANSMIT_CAPACITY = 65536
+"""Bytes the board holds for a host that does not read."""
+FRAME_OVERHEAD = 4
+"""Bytes of a sample frame on the wire beyond its payload."""
 _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
 _SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT

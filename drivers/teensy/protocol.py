@@ -12,12 +12,14 @@ from enum import IntEnum
 import numpy as np
 
 VERSION = 1
-QUEUE_CAPACITY = 2000  # Setpoints the board holds: two seconds of motion at 1 kHz
+QUEUE_CAPACITY = 2000
+"""Setpoints the board holds: two seconds of motion at 1 kHz."""
 WATCHDOG_US = 250_000
 """Board time without a valid host frame after which an armed board goes to its safe state, unless
 the host sets another time."""
 MIN_WATCHDOG_US, MAX_WATCHDOG_US = 5_000, 1_000_000
-MISSING = -(2**31)  # Count of a sensor that gave nothing: a whole number's NaN
+MISSING = -(2**31)
+"""Count of a sensor that gave nothing: a whole number's NaN."""
 
 
 class Kind(IntEnum):
@@ -48,7 +50,8 @@ STATUS_LIMIT_TRIPPED = 16
 STATUS_HOLDING = 32
 STATUS_REFERENCED = 64
 """Bits of the board's state, in every sample and every acknowledgement. Trips stay until clear."""
-TRIP_SHIFT = 8  # The high byte of the state is the `Trip` that came first, until clear
+TRIP_SHIFT = 8
+"""The high byte of the state is the `Trip` that came first, until clear."""
 
 
 class Trip(IntEnum):
@@ -81,8 +84,10 @@ class Trip(IntEnum):
 class SafeState(IntEnum):
     """What a board does with the motor once it has tripped."""
 
-    RELEASE = 0  # No current
-    HOLD = 1  # Hold the spindle where it stands, with a low command; released by a second trip
+    RELEASE = 0
+    """No current."""
+    HOLD = 1
+    """Hold the spindle where it stands, with a low command; released by a second trip."""
 
 
 class Result(IntEnum):
@@ -134,7 +139,8 @@ HELLO_REPLY_DTYPE = layout(
 ACK_DTYPE = layout(*HEADER_FIELDS, "command u1", "result u1", "status u2", "queue_free u2")
 PONG_DTYPE = layout(*HEADER_FIELDS, "token u8", "tick_us u4")
 SESSION_DTYPE = layout(*SESSION_FIELDS)
-GAIN_NAMES = ("kp", "ki", "kd", "velocity_filter", "limit")  # Of one position loop
+GAIN_NAMES = ("kp", "ki", "kd", "velocity_filter", "limit")
+"""Of one position loop."""
 MOTOR_LIMIT_NAMES = (
     "max_motor_step",
     "continuous_current",
@@ -191,7 +197,8 @@ FIRMWARE_VERSION = 0x000500
 """Version of the firmware that goes with this program: major, minor, patch, one byte each."""
 
 
-TOP = 2**31 - 1  # A limit that nothing crosses
+TOP = 2**31 - 1
+"""A limit that nothing crosses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,9 +222,12 @@ class Identity:
     protocol_hash: int
     build_hash: int = 0
     """CRC-32 of the sources the firmware was built from; 0 where it was not built."""
-    boot: int = 0  # Number of this start of the board; it changes with every reset
-    status: int = 0  # State of the board
-    offer: int = 0  # The session the board takes at the next arming; it changes with every arming
+    boot: int = 0
+    """Number of this start of the board; it changes with every reset."""
+    status: int = 0
+    """State of the board."""
+    offer: int = 0
+    """The session the board takes at the next arming; it changes with every arming."""
 
     @property
     def referenced(self) -> bool:

@@ -23,7 +23,8 @@ from drivers.teensy.protocol import (
 )
 
 SAMPLE_RATE_HZ = 1000
-TICK_US = 1_000_000 // SAMPLE_RATE_HZ  # Period of a control tick and of a sample, microseconds
+TICK_US = 1_000_000 // SAMPLE_RATE_HZ
+"""Period of a control tick and of a sample, microseconds."""
 SAMPLE_DTYPE = layout(
     *SAMPLE_FIELDS,
     "motor i4",

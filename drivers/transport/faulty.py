@@ -12,19 +12,25 @@ from enum import StrEnum
 from drivers.errors import LinkLostError
 from drivers.transport.transport import Transport
 
-LONGEST_RUN = 16  # Most bytes of a stream one fault takes, changes or repeats
+LONGEST_RUN = 16
+"""Most bytes of a stream one fault takes, changes or repeats."""
 
 
 class Fault(StrEnum):
     """What can happen on the way from a device to the host."""
 
-    DROP = "drop"  # A run of bytes is missing; of packets, one is
+    DROP = "drop"
+    """A run of bytes is missing; of packets, one is."""
     CORRUPT = "corrupt"
     """A run of bytes is changed; a packet is thrown away by its network's own checksum."""
-    DUPLICATE = "duplicate"  # A run of bytes comes twice; of packets, one does
-    DELAY = "delay"  # Bytes come late, and those behind them too; a late packet is overtaken
-    STALL = "stall"  # Nothing comes for a while, then all of it at once
-    DISCONNECT = "disconnect"  # The link is gone for good
+    DUPLICATE = "duplicate"
+    """A run of bytes comes twice; of packets, one does."""
+    DELAY = "delay"
+    """Bytes come late, and those behind them too; a late packet is overtaken."""
+    STALL = "stall"
+    """Nothing comes for a while, then all of it at once."""
+    DISCONNECT = "disconnect"
+    """The link is gone for good."""
 
 
 class Faults:
@@ -119,7 +125,8 @@ class Faults:
         return [before + behind if fault is Fault.DROP else before + run + run + behind]
 
 
-Tap = Callable[[bytes], bytes]  # Changes bytes on their way; the returned bytes replace them
+Tap = Callable[[bytes], bytes]
+"""Changes bytes on their way; the returned bytes replace them."""
 
 
 class FaultyTransport:

@@ -27,7 +27,8 @@ from drivers.errors import (
 )
 from drivers.transport.transport import Transport, open_transport
 
-BAUD_RATE = 115200  # Has no effect on a Teensy's USB port; a real UART behind an adapter uses it
+BAUD_RATE = 115200
+"""Has no effect on a Teensy's USB port; a real UART behind an adapter uses it."""
 WRITE_TIMEOUT_S = 1.0
 _READ_SIZE = 65536
 _SETTING_ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError)

@@ -12,7 +12,8 @@ from typing import Protocol
 
 from drivers.errors import LinkLostError
 
-TICK_S = 1e-3  # Default tick of a board
+TICK_S = 1e-3
+"""Default tick of a board."""
 
 
 class Board(Protocol):

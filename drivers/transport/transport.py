@@ -46,7 +46,9 @@ class Transport(Protocol):
         ...
 
 
-Opener = Callable[[str], Transport]  # Opens the transport a URL names
+Opener = Callable[[str], Transport]
+"""Opens the transport a URL names."""
+
 _openers: dict[str, Opener] = {}
 
 

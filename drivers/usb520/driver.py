@@ -13,7 +13,8 @@ from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
 
-PATIENCE_S = 1.0  # Time for a first whole line; ten should have come
+PATIENCE_S = 1.0
+"""Time for a first whole line; ten should have come."""
 
 
 class Usb520:

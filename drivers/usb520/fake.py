@@ -11,7 +11,8 @@ from drivers.transport.simulated import SimulatedTransport
 from drivers.usb520 import protocol
 from drivers.usb520.driver import Usb520
 
-LINE_TICKS = 100  # Milliseconds between lines
+LINE_TICKS = 100
+"""Milliseconds between lines."""
 
 
 class Usb520Fake:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from drivers.errors import FrameError
 
-LONGEST_LINE = 64  # Bytes; the lines seen have about 18. More without a line feed is noise.
+LONGEST_LINE = 64
+"""Bytes; the lines seen have about 18. More without a line feed is noise."""
 _LINE = re.compile(rb"([+-]\d{1,9}\.\d{5}) ([A-Za-z-]{1,8})\r\n")
 
 

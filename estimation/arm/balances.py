@@ -21,7 +21,9 @@ from estimation.effects import effect
 from estimation.model import Model, Term
 from estimation.recording import FloatArray, Recording
 
-ARMS = (PSM,)  # Arms that recordings may be of
+ARMS = (PSM,)
+"""Arms that recordings may be of."""
+
 CORRECTIONS = 3
 """Corrections of the links' parameters that each joint's equation fits with every candidate."""
 

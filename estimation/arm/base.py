@@ -18,7 +18,8 @@ from estimation.recording import FloatArray
 
 SAMPLES = 500
 BESIDE = 100
-DEPENDENT = 1e-9  # Relative norm below which the residual of a column is rounding
+DEPENDENT = 1e-9
+"""Relative norm below which the residual of a column is rounding."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from estimation.arm.excitation import (
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
-SAMPLED = 20  # Instants of a period at which the limits are constraints
+SAMPLED = 20
+"""Instants of a period at which the limits are constraints."""
 
 
 def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:

@@ -17,9 +17,15 @@ from estimation.recording import FloatArray
 JOINT_SLIP_SHARE = (0.002, 0.006, 0.02)
 """Thresholds of a joint's slip elements, as shares of half its range."""
 
-SIGN_SHARE = 0.005  # Share of a joint's top speed over which its friction changes sign
-STRIBECK_SHARE = 0.03  # Share of a joint's top speed above which its friction has fallen
-CREEP_S = (0.2, 1.0)  # Time constants of creeping cables and belts
+SIGN_SHARE = 0.005
+"""Share of a joint's top speed over which its friction changes sign."""
+
+STRIBECK_SHARE = 0.03
+"""Share of a joint's top speed above which its friction has fallen."""
+
+CREEP_S = (0.2, 1.0)
+"""Time constants of creeping cables and belts."""
+
 TRACK_KNOTS = 20
 """Knots of a friction that changes along a joint's track: tight spots of a tenth of its range."""
 
@@ -29,7 +35,8 @@ TRACK_OVERHANG = 0.5
 RIPPLE_ORDERS = (8, 12, 16, 20, 24, 32)
 """Periods of a ripple tried in 2 pi rad of a revolute joint: gear and motor orders are unknown."""
 
-TRACK_DAMPING = 100.0  # Factor on the common damping: most of a track's knots are rarely visited
+TRACK_DAMPING = 100.0
+"""Factor on the common damping: most of a track's knots are rarely visited."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
-SIDE_STEP_M = 0.01  # Step of the derivative by the distance from the axis, m
+SIDE_STEP_M = 0.01
+"""Step of the derivative by the distance from the axis, m."""
+
 LEAST_PERIODS = 3
 
 

@@ -16,7 +16,9 @@ from estimation.recording import FloatArray
 SLIP_RAD = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Thresholds of slip elements: finer than the drives' backlash up to a third of a turn."""
 
-SIGN_RAD_S = 0.02  # Speed over which a motor's friction changes sign
+SIGN_RAD_S = 0.02
+"""Speed over which a motor's friction changes sign."""
+
 GRIPPER_SIGN_RAD_S = 0.025
 
 STRIBECK_RAD_S = 0.1

@@ -27,12 +27,15 @@ from estimation.recording import FloatArray
 STEPS = (0.5, 0.25, 0.5, 0.25)
 """Step of the grid and length of the kernel: of angle, load and pose a share of the range fitted,
 of speed in octaves."""
-OCTAVES = 2  # The coordinate in octaves
-TAIL = 0.005  # Share of the samples at each end that the grid need not hold: starts and stops
+OCTAVES = 2
+"""The coordinate in octaves."""
+TAIL = 0.005
+"""Share of the samples at each end that the grid need not hold: starts and stops."""
 VISITED = 0.02
 """Runs that make a node visited; a run counts as 1 where it dwelt for its mean time a node."""
 STANDING_RAD_S = 1e-6
-LEAST_SPAN = 1e-6  # Of a condition that all runs share, so that the grid has a step
+LEAST_SPAN = 1e-6
+"""Of a condition that all runs share, so that the grid has a step."""
 
 
 def coordinates(bank: Bank, rows: FloatArray) -> FloatArray:

@@ -39,7 +39,8 @@ would be scaled to the size of the others, beyond the numerical precision."""
 BETWEEN_RIDGE = 1e-2
 """Penalty of the weights that the runs' means are fitted with; runs are fewer than samples."""
 
-AS_GOOD = 1.02  # Squared errors that differ by less are alike, and the first choice is taken
+AS_GOOD = 1.02
+"""Squared errors that differ by less are alike, and the first choice is taken."""
 
 
 @dataclass(frozen=True, eq=False)

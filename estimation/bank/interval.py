@@ -26,7 +26,8 @@ from estimation.bank.states import Bank, Product
 from estimation.recording import FloatArray
 
 COVERAGE = 0.95
-NARROWEST = 0.5  # Smallest width, a share of the mean absolute error
+NARROWEST = 0.5
+"""Smallest width, a share of the mean absolute error."""
 
 SHAPE: tuple[Product, ...] = (
     (), ("q",), ("c",), ("q", "q"), ("c", "c"), ("q", "c"), ("v",), ("i",), ("a",), ("d",),

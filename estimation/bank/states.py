@@ -60,7 +60,8 @@ LOAD_SCALES = {"motor_command_ratio": 0.1, "motor_current_a": 0.21, "proximal_to
 POSITION_CENTRE_RAD, POSITION_SCALE_RAD = -0.5, 0.5
 ACCELERATION_SCALE_RAD_S2 = 1000.0
 SLOWEST_RAD_S = 0.2
-LIGHTEST = 0.2  # Load below which the travel of a load-proportional state shrinks no further
+LIGHTEST = 0.2
+"""Load below which the travel of a load-proportional state shrinks no further."""
 
 LEAVING_S, SLID_RAD = 0.1, 20.0
 """Over the last part of the window the travel since a turn grows by so much: the drive has slid."""

@@ -15,8 +15,11 @@ from estimation.recording import FloatArray, Recording
 
 SCHEMA = "rig.diff/1"
 
-LEAST_RUNS = 4  # Runs of each campaign: of fewer, 5 % of the choices of runs are less than one
-IN_SET = 0.95  # Share that a set of names covers
+LEAST_RUNS = 4
+"""Runs of each campaign: of fewer, 5 % of the choices of runs are less than one."""
+
+IN_SET = 0.95
+"""Share that a set of names covers."""
 
 A, B, ON = "A:", "B:", "C:"
 

@@ -18,14 +18,19 @@ import numpy as np
 from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.recording import FloatArray
 
-SAMPLES_A_RUN = 40.0  # Independent samples that a run is worth, as in the diagnosis
+SAMPLES_A_RUN = 40.0
+"""Independent samples that a run is worth, as in the diagnosis."""
+
 LEAST_SHARE = 1e-8
 """Share of a column below which its residual on the others counts as none: the same column."""
 
-NOISE_TAKEN = 0.8  # Share of the known noise that is subtracted, as in the diagnosis
+NOISE_TAKEN = 0.8
+"""Share of the known noise that is subtracted, as in the diagnosis."""
+
 TINY = 1e-300
 
-Columns = Mapping[str, FloatArray]  # Equation to columns at the samples that it counts, (n, k)
+Columns = Mapping[str, FloatArray]
+"""Equation to columns at the samples that it counts, (n, k)."""
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,21 @@ from estimation.changes.regression import (
 )
 from estimation.recording import FloatArray
 
-CHOICES = 299  # Random choices of runs
-LEVEL = 0.05  # Probability of a wrong change where nothing changed
-SURE = 0.9  # Weight from which a single name is given; below it the verdict is a set
-REPLICATES = 200  # Resampled sets of runs, for intervals and for how sure a name is
-KEPT = 200  # Candidates that stay in the search after its first step
+CHOICES = 299
+"""Random choices of runs."""
+
+LEVEL = 0.05
+"""Probability of a wrong change where nothing changed."""
+
+SURE = 0.9
+"""Weight from which a single name is given; below it the verdict is a set."""
+
+REPLICATES = 200
+"""Resampled sets of runs, for intervals and for how sure a name is."""
+
+KEPT = 200
+"""Candidates that stay in the search after its first step."""
+
 MOST_CHANGES = 4
 
 LEAST_TERM = 0.05

@@ -25,4 +25,5 @@ def behind(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArr
         rows[i, 0] = state[3]
 
 
-AT_REST = (0.0, 0.0, 0.0, 0.0)  # State of `behind` before the first sample
+AT_REST = (0.0, 0.0, 0.0, 0.0)
+"""State of `behind` before the first sample."""

@@ -7,7 +7,8 @@ import numpy as np
 
 from estimation.effects.effect import Parameter, Pointwise
 
-UNIT_LOAD = 0.1  # Reference load of the power law, N m: there the loss is mu times the load
+UNIT_LOAD = 0.1
+"""Reference load of the power law, N m: there the loss is mu times the load."""
 
 
 class PowerLoadFriction(Pointwise):

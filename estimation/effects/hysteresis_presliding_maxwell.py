@@ -7,7 +7,8 @@ import numba
 from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
-SPREAD = (1.0, 3.0, 9.0)  # Presliding distances of the elements, in units of the shortest
+SPREAD = (1.0, 3.0, 9.0)
+"""Presliding distances of the elements, in units of the shortest."""
 
 
 @numba.njit(cache=True)

@@ -5,7 +5,8 @@ from typing import Any, ClassVar
 
 from estimation.effects.effect import Parameter, Pointwise
 
-REFERENCE_K = 298.15  # Reference temperature of the torque constant in data sheets, K
+REFERENCE_K = 298.15
+"""Reference temperature of the torque constant in data sheets, K."""
 
 
 class MeasuredThermalLoss(Pointwise):

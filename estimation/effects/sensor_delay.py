@@ -7,7 +7,9 @@ import numba
 from estimation.effects.effect import Parameter, Remembering
 from estimation.recording import FloatArray
 
-PLACES = 64  # Number of samples in the ring buffer
+PLACES = 64
+"""Number of samples in the ring buffer."""
+
 SPAN = 60
 """Parts of a delay; samples closer together than one part are not all stored, so that the ring
 buffer covers the delay at any sample rate."""

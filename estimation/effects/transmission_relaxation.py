@@ -39,7 +39,8 @@ SETTLED = Parameter(
     "settled", "1", "fraction of the first load that has settled", 0, 1, linear=True, points=2
 )
 
-SLOWER = 8.0  # Ratio of the times of neighbouring elements of a Prony series
+SLOWER = 8.0
+"""Ratio of the times of neighbouring elements of a Prony series."""
 
 
 class Relaxation(Remembering):

@@ -37,7 +37,8 @@ Adaptable = BankEstimator | NetworkEstimator
 POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
 
-NORMAL_95 = 1.96  # Half widths of 95 % are so many standard deviations of a normal distribution
+NORMAL_95 = 1.96
+"""Half widths of 95 % are so many standard deviations of a normal distribution."""
 
 OUTPUT, NODE_SPREAD = 0.1, 0.3
 """Stiffness of the weights of a network's output layer, and the spread it is relative to: that of a

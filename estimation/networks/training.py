@@ -25,7 +25,8 @@ from estimation.recording import FloatArray
 if TYPE_CHECKING:
     from torch import Tensor
 
-BLOCK = 1024  # Rows whose derivatives are held at once: few enough to stay in a core's cache
+BLOCK = 1024
+"""Rows whose derivatives are held at once: few enough to stay in a core's cache."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,9 @@ from rig.simulation.forms import (
     spots,
 )
 
-OWN = "the simulation's own"  # The written form that a study's paper was matched with
+OWN = "the simulation's own"
+"""The written form that a study's paper was matched with."""
+
 SIGN_SHARE = 0.02
 """Speed over which a friction changes its sign, as a share of a joint's usual highest."""
 

@@ -26,7 +26,9 @@ from rig.errors import DataError
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable
 
-LINK = 2  # The mass turns with joints 1 and 2; the insertion does not move it
+LINK = 2
+"""The mass turns with joints 1 and 2; the insertion does not move it."""
+
 LIFTING = [0, 1]
 
 OTHER_MOUNTINGS = ("parallel",)

@@ -23,9 +23,15 @@ from rig.importers.registry import open_campaign
 EDGE_S = 1.0
 """Left out at either end: the filters' transients, and elements that have not slipped yet."""
 
-RATE_SHARE = 10.0  # Samples kept a second, in cutoffs of the torque's filter
-DAMPING = 1e-3  # Of the fits with effects: their columns are many and nearly collinear on one path
-LEAST_GAIN = 0.005  # Mean relative gain over the joints below which the search stops
+RATE_SHARE = 10.0
+"""Samples kept a second, in cutoffs of the torque's filter."""
+
+DAMPING = 1e-3
+"""Of the fits with effects: their columns are many and nearly collinear on one path."""
+
+LEAST_GAIN = 0.005
+"""Mean relative gain over the joints below which the search stops."""
+
 GRIPPER_SHARE = 0.3
 """Weight of the gripper's own torque: it helps to identify the wrist's drives and is not scored."""
 

@@ -23,7 +23,9 @@ HIDDEN_SHARE = np.array([0.055, 0.22, 1.1, 0.33, 2.6, 6.0])
 """Hidden torque of each joint, as a share of its declared torque's RMS on the excitation. Set so
 that the thesis' own method meets the thesis' table 3.2 on this arm."""
 
-NOISE_SHARE = 0.005  # White noise of the torque, as a share of the same
+NOISE_SHARE = 0.005
+"""White noise of the torque, as a share of the same."""
+
 HAND_SHARE = np.array([0.2, 0.7, 0.07, 0.35, 0.55, 0.35])
 """Shares of the joints' ranges that a hand uses; assumed, the thesis does not state its motion."""
 

@@ -22,8 +22,10 @@ from rig.log.schema import Field, Stream
 
 REFIT_S = 0.5
 ARRIVALS_KEPT = 2000
-BATCHES_KEPT = 20_000  # Batches kept without a reader; older ones are dropped
-MOST_READS = 64  # Most reads of one device a turn; a device that has more waits for the next
+BATCHES_KEPT = 20_000
+"""Batches kept without a reader; older ones are dropped."""
+MOST_READS = 64
+"""Most reads of one device a turn; a device that has more waits for the next."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

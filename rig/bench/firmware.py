@@ -19,7 +19,8 @@ from rig.errors import RigError, UsageError
 from rig.machines.choose import machine_of
 
 SOURCES = Path(__file__).parents[2] / "firmware"
-STDERR = 2  # Stream for the output of tools: stdout is for results
+STDERR = 2
+"""Stream for the output of tools: stdout is for results."""
 BOARDS = ("teensy35", "teensy41", "teensy41-grasper")
 
 

@@ -15,7 +15,8 @@ from drivers.teensy.protocol import STATUS_ARMED, STATUS_HOLDING
 from drivers.transport import open_transport
 from rig.errors import SafetyTripError, UsageError
 
-VENDOR, PRODUCT = 0x16C0, 0x0483  # USB identity of a Teensy with a serial port
+VENDOR, PRODUCT = 0x16C0, 0x0483
+"""USB identity of a Teensy with a serial port."""
 LOOK_S = 1.0
 
 

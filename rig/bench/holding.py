@@ -25,7 +25,8 @@ try:
 except ImportError:  # no such locks on this system
     fcntl = None  # type: ignore[assignment]
 
-ENDS_S = 5.0  # Time for a program to disarm and end: the way out takes a fraction of a second
+ENDS_S = 5.0
+"""Time for a program to disarm and end: the way out takes a fraction of a second."""
 LOOKS_EVERY_S = 0.02
 SIMULATED = "sim:"
 

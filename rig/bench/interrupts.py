@@ -15,10 +15,12 @@ from types import FrameType
 LEAVING_S = 3.0
 """Within this time after the first, further ones are not heard: the rig is being made safe."""
 
-STANDARD_STREAMS = (0, 1, 2)  # File descriptors of stdin, stdout and stderr
+STANDARD_STREAMS = (0, 1, 2)
+"""File descriptors of stdin, stdout and stderr."""
 
 
-_asked = False  # Whether a signal has requested the end of the session that is under way
+_asked = False
+"""Whether a signal has requested the end of the session that is under way."""
 
 
 def end_is_requested() -> bool:

@@ -9,7 +9,8 @@ from rig.errors import UsageError
 from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
 
-PTY_URL = "sim://pty"  # The firmware as a process, in real time
+PTY_URL = "sim://pty"
+"""The firmware as a process, in real time."""
 VIRTUAL_CAN_URL = "sim://virtual-can"
 """The fake of an EPOS4 on a virtual bus of python-can, in real time."""
 DRIVE, SENSOR = "drive", "sensor"

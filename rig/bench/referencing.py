@@ -10,7 +10,8 @@ from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.machines.choose import machine_of
 
-REST_SAMPLES = 300  # Samples that are read first, so that the board has seen whether a shaft turns
+REST_SAMPLES = 300
+"""Samples that are read first, so that the board has seen whether a shaft turns."""
 SILENT_READS = 5
 READ_S = 0.2
 

@@ -15,7 +15,8 @@ from drivers.teensy.protocol import Identity, Trip, TripReport
 from rig.errors import UsageError
 from rig.logic.pace import Pace
 
-FLAGS = "flags"  # Field of a device's own `SampleFlag` bits among the samples
+FLAGS = "flags"
+"""Field of a device's own `SampleFlag` bits among the samples."""
 _HEAD = (("sequence", "<u4"), ("tick_us", "<u4"), ("status", "<u2"), (FLAGS, "u1"))
 
 

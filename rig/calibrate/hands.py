@@ -19,7 +19,8 @@ from rig.simulation.logger import plant_and_sensors
 from rig.simulation.press import PressedFsr, press_force_n
 from rig.simulation.sensors import DISTAL, FSR, PROXIMAL
 
-MARK_COUNT = 1000  # Spindle count at which the simulated rig's index mark is lined up
+MARK_COUNT = 1000
+"""Spindle count at which the simulated rig's index mark is lined up."""
 
 
 class HandledBench:

@@ -30,7 +30,8 @@ def reading(procedure: Procedure, measured: Sequence[Measurement], lines: Calibr
     return ", ".join([f"{len(recording)} samples", *parts])
 
 
-SET_UP_S = 30.0  # Time allowed for what a person does before a step
+SET_UP_S = 30.0
+"""Time allowed for what a person does before a step."""
 
 
 def announced(procedure: Procedure) -> list[str]:

@@ -14,7 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-LAYOUT = 1  # Version of the tables; an index of another one is built again
+LAYOUT = 1
+"""Version of the tables; an index of another one is built again."""
+
 ENDINGS = (".mcap", ".mcap.part")
 DIAGNOSIS = Path("diagnosis") / "diagnosis.json"
 """Where a campaign's folder holds its latest diagnosis."""

@@ -18,9 +18,11 @@ from drivers.epos4.faults import DriveFaultError
 from drivers.errors import DriverError, LinkLostError, LinkTimeoutError
 from rig.configuration.config import Config
 
-STARTS_S = 90.0  # Time for the drive to be set up; the code is compiled the first time
+STARTS_S = 90.0
+"""Time for the drive to be set up; the code is compiled the first time."""
 ENDS_S = 3.0
-TAKES_S = 1.0  # Time for the process to read sent data; it polls every 2 ms
+TAKES_S = 1.0
+"""Time for the process to read sent data; it polls every 2 ms."""
 LARGEST_READ = 65536
 _KINDS: dict[str, type[DriverError]] = {
     name: kind

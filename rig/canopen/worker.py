@@ -22,9 +22,12 @@ from rig.configuration.config import Config
 from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
 
-PERIOD_S = 0.002  # Ticks between two polls of the host
-LATE_S = 0.05  # How late a SYNC may be on a real bus and still be sent
-SAID_EVERY_S = 0.5  # A persistent error is reported again after this time
+PERIOD_S = 0.002
+"""Ticks between two polls of the host."""
+LATE_S = 0.05
+"""How late a SYNC may be on a real bus and still be sent."""
+SAID_EVERY_S = 0.5
+"""A persistent error is reported again after this time."""
 LARGEST_READ = 65536
 
 

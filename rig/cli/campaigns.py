@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign, IndexedRun
     from rig.output.table import TextTable
 
-LONGEST = 40  # Letters of a note or a list of conditions that a row shows
+LONGEST = 40
+"""Letters of a note or a list of conditions that a row shows."""
 
 
 def campaigns(

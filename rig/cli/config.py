@@ -19,7 +19,8 @@ config_app = typer.Typer(
     rich_markup_mode=None,
 )
 
-TEENSY = "16c0:0483"  # USB vendor and product of the Teensy's serial port
+TEENSY = "16c0:0483"
+"""USB vendor and product of the Teensy's serial port."""
 
 ConfigArgument = Annotated[
     Path | None,

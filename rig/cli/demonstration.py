@@ -38,7 +38,9 @@ from rig.reports import diagnosis as diagnosis_page
 from rig.reports.first_look import first_look
 
 PROTOCOL = "diagnosis"
-MODEL = "motor"  # One equation keeps the demonstration short
+MODEL = "motor"
+"""One equation keeps the demonstration short."""
+
 DRAW = 212
 """Draws a ripple of the motor's torque; drawn, and not named, so that no log contains it.
 
@@ -51,7 +53,8 @@ and rubs in proportion to its load, which hides a small effect.
 
 FOLDS = 4
 
-Stage = Callable[[str], None]  # Called with a message at the start and the result of each stage
+Stage = Callable[[str], None]
+"""Called with a message at the start and the result of each stage."""
 
 
 @dataclass(frozen=True)

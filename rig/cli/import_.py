@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rig.importers.table.mapping import Mapping
     from rig.importers.table.preview import Preview
 
-MOST_RUNS = 12  # Runs listed on the screen; more are counted
+MOST_RUNS = 12
+"""Runs listed on the screen; more are counted."""
 
 
 ColumnOption = Annotated[

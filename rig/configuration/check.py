@@ -19,7 +19,8 @@ from rig.configuration.sections import DeviceSection, LoggerSection
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
-LOGGER = "logger"  # Name the logger goes under among the devices
+LOGGER = "logger"
+"""Name the logger goes under among the devices."""
 
 
 @dataclass(frozen=True, slots=True)

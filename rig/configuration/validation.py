@@ -11,7 +11,8 @@ from estimation.channels import UnknownUnitError, unit_of
 HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$")
 """The line that begins a table of TOML, or one of an array of tables."""
 
-KEY = re.compile(r"\s*([\w\"'.\s-]+?)\s*=")  # The beginning of a line that gives a key its value
+KEY = re.compile(r"\s*([\w\"'.\s-]+?)\s*=")
+"""The beginning of a line that gives a key its value."""
 
 
 def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -> str:

@@ -28,10 +28,14 @@ from rig.machines.choose import machine_of
 STEPS_RATIO = (0.02, 0.04, 0.06, 0.08, 0.10, 0.13, 0.16, 0.20)
 """Pulses, of a full command; none is larger than the configured controller's limit."""
 PULSE_S = 0.05
-REACH_RAD = 0.12  # How far the spindle may turn from where it stands; beyond it the board releases
-TURNED_RAD = 0.01  # What counts as a turn of the spindle
-SEEN_RAD = 0.003  # What an encoder must count when the spindle has turned
-CURRENT_SHARE = 0.5  # Least share of the commanded current that the read-back must show
+REACH_RAD = 0.12
+"""How far the spindle may turn from where it stands; beyond it the board releases."""
+TURNED_RAD = 0.01
+"""What counts as a turn of the spindle."""
+SEEN_RAD = 0.003
+"""What an encoder must count when the spindle has turned."""
+CURRENT_SHARE = 0.5
+"""Least share of the commanded current that the read-back must show."""
 OPEN_LOOP_SHARE = 0.3
 """Share of the reach at which the position loop would begin to lower the pulse."""
 ENCODERS = ("motor_angle_rad", "spindle_angle_rad", "jaw_angle_rad")

@@ -10,7 +10,8 @@ from rig.doctor.finding import Finding, Level
 from rig.doctor.udev import INSTALL, USB, has_rule
 
 ROOT = Path("/")
-CAN_LINK_TYPE = "280"  # ARPHRD_CAN of Linux's if_arp.h
+CAN_LINK_TYPE = "280"
+"""ARPHRD_CAN of Linux's if_arp.h."""
 
 
 @dataclass(frozen=True, slots=True)

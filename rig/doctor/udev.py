@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-RULES_FILE = "70-rig.rules"  # Before 73-seat-late.rules, which acts on the tag `uaccess`
+RULES_FILE = "70-rig.rules"
+"""Before 73-seat-late.rules, which acts on the tag `uaccess`."""
 
 USB = {
     "16c0:0483": "Teensy, USB serial",

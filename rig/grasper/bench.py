@@ -21,8 +21,10 @@ from rig.simulation import noise
 from rig.simulation.bench import call_board_tick
 
 MOTORS = GRASPER.motors
-COUNTS_A_TURN = 2048  # Of each motor's encoder
-FULL_SCALE_A = 2.0  # Current of a full command
+COUNTS_A_TURN = 2048
+"""Of each motor's encoder."""
+FULL_SCALE_A = 2.0
+"""Current of a full command."""
 COUNTS_A_NEWTON = 4095 / 4.4
 FORCE_ZERO = 100.0
 """Counts of a force sensor's amplifier without force, so that one that lives is seen to."""

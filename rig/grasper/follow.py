@@ -13,7 +13,8 @@ from rig.grasper.master import Master
 from rig.grasper.three_dof import JOINTS
 
 READ_S = 0.02
-LEAD_S = 0.05  # Setpoints are this far ahead of the motors, s: the delay for the user's hand
+LEAD_S = 0.05
+"""Setpoints are this far ahead of the motors, s: the delay for the user's hand."""
 SILENT_READS = 50
 
 

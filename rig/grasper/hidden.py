@@ -12,11 +12,15 @@ import numpy as np
 from rig.grasper.plant import FORM_VARIABLES, AxisParameters, FloatArray, Form
 from rig.simulation.forms import Random, course, falling, grid, power, rising, smooth, spots
 
-OWN = "the simulation's own"  # Friction in proportion to the load, by which the paper was matched
+OWN = "the simulation's own"
+"""Friction in proportion to the load, by which the paper was matched."""
+
 USUAL = {"load": 0.02, "speed": 0.8, "angle": 0.2, "time": 30.0, "acceleration": 12.0}
 """Ranges of the variables in the experiments, from 0: N m, rad/s, rad, s, rad/s^2."""
 
-LEAST = 0.2  # Share of the mean that stays where a form is least: no bearing is free of friction
+LEAST = 0.2
+"""Share of the mean that stays where a form is least: no bearing is free of friction."""
+
 Drawer = Callable[[Random], FloatArray]
 
 IN_CATALOGUE: Mapping[str, tuple[str, Drawer]] = {

@@ -4,7 +4,8 @@ import numpy as np
 
 from rig.grasper.plant import RATE_HZ, AxisParameters, FloatArray
 
-LEAD_S = 0.5  # Rest before the motion, and length of the motion itself
+LEAD_S = 0.5
+"""Rest before the motion, and length of the motion itself."""
 
 
 def hold(axis: AxisParameters, force_n: float, hold_s: float, rise_s: float = LEAD_S) -> FloatArray:

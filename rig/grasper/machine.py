@@ -27,10 +27,12 @@ from rig.protocols import trajectory
 from rig.protocols.joints import JointPlan
 from rig.protocols.motion import RELAX_CYCLES, RELAX_HZ
 
-AXES = ("yaw", "jaw_1", "jaw_2")  # What motor 1, 2 and 3 turn
+AXES = ("yaw", "jaw_1", "jaw_2")
+"""What motor 1, 2 and 3 turn."""
 APPROACH_SPEED_RAD_S = 0.5
 SHORTEST_MOVE_S = 0.5
-RELAX_RAD = 0.03  # Less than what is open before the jaws touch anything
+RELAX_RAD = 0.03
+"""Less than what is open before the jaws touch anything."""
 
 
 @dataclass(frozen=True, eq=False)

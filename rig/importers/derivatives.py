@@ -23,15 +23,18 @@ DERIVATIVE = {"rad": "rad/s", "rad/s": "rad/s^2", "m": "m/s", "m/s": "m/s^2", "N
 """Unit of the derivative of a channel, by the channel's unit."""
 QUANTITIES = ("angle", "position", "velocity", "speed", "rate", "acceleration", "torque")
 
-SPANS_S = (0.05, 0.2, 0.6)  # Spans that are tried; the one with the highest correlation counts
+SPANS_S = (0.05, 0.2, 0.6)
+"""Spans that are tried; the one with the highest correlation counts."""
 LONGEST_S = 60.0
 SEARCH_S = 1.0
-LEAST_CORRELATION = 0.9  # Below this, noise hides the relation and nothing is concluded
+LEAST_CORRELATION = 0.9
+"""Below this, noise hides the relation and nothing is concluded."""
 RATIO_TOLERANCE = 0.05
 """Measured velocities of an arm's joints agree with their angles within 0.017."""
 LARGEST_LAG_S = 0.02
 LARGEST_LAG_SAMPLES = 4
-LARGEST_LEAD_SAMPLES = 2  # Bounds of the lag; on the measured arm it is one sample of 5 ms
+LARGEST_LEAD_SAMPLES = 2
+"""Bounds of the lag; on the measured arm it is one sample of 5 ms."""
 SHIFT_GAIN = 2.0
 """A shift must halve the unexplained variance: the start of a slow motion is poorly visible."""
 

@@ -6,8 +6,11 @@ from pathlib import Path
 from estimation.campaign import Campaign
 from rig.importers.registry import importers
 
-MAX_DEPTH = 3  # Folders below the one given that are looked into
-MAX_NAMES = 8  # Files named in one line; more are counted
+MAX_DEPTH = 3
+"""Folders below the one given that are looked into."""
+
+MAX_NAMES = 8
+"""Files named in one line; more are counted."""
 
 
 def left_out(path: Path, campaign: Campaign) -> list[str]:

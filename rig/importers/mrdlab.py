@@ -15,7 +15,8 @@ from rig.importers.mrdlab_run import load_run
 from rig.importers.mrdlab_text import looks_like_log
 
 FIRST_BYTES = 4096
-MAX_DEPTH = 3  # Folders below the one given that are looked into
+MAX_DEPTH = 3
+"""Folders below the one given that are looked into."""
 
 
 class MrdlabImporter:

@@ -16,10 +16,14 @@ CURRENT_LIMIT_A = 0.5
 COMMAND_LIMIT_RATIO = 1.0
 TRACKING_LIMIT_RAD = 0.25
 SPEED_LIMIT_RAD_S = 1.5
-SPEED_SPAN_SAMPLES = 10  # Half width of the central difference the speeds are taken with
-MERGE_S = 0.25  # Bad samples closer than this are one event
-MARGIN_S = 0.02  # Added to both ends of an event: it begins before it is large enough to be seen
-START_S = 0.3  # An event that begins within this time of the first sample is a start transient
+SPEED_SPAN_SAMPLES = 10
+"""Half width of the central difference the speeds are taken with."""
+MERGE_S = 0.25
+"""Bad samples closer than this are one event."""
+MARGIN_S = 0.02
+"""Added to both ends of an event: it begins before it is large enough to be seen."""
+START_S = 0.3
+"""An event that begins within this time of the first sample is a start transient."""
 
 
 def saturated(time_s: FloatArray, current_a: FloatArray, command: FloatArray) -> list[Stretch]:

@@ -25,9 +25,11 @@ from rig.importers.one_rig import MixedRunsError, of_one_rig
 class Importer(Protocol):
     """Interface of a format's importer."""
 
-    name: str  # Short name of the format, as typed on the command line
+    name: str
+    """Short name of the format, as typed on the command line."""
 
-    description: str  # One line on the format
+    description: str
+    """One line on the format."""
 
     def recognises(self, path: Path) -> bool:
         """Whether the path looks like this format, from names and first lines only."""

@@ -15,7 +15,8 @@ from rig.live.block import SampleBlock
 
 HOST, PORT = "127.0.0.1", 8765
 LAYOUT = Path(__file__).with_name("foxglove.layout.json")
-RATE_HZ = 100.0  # Samples a second that are sent: a display needs no more
+RATE_HZ = 100.0
+"""Samples a second that are sent: a display needs no more."""
 
 SAMPLE, STATUS = "/rig/sample", "/rig/status"
 _NUMBER = {"type": ["number", "null"]}

@@ -25,7 +25,8 @@ GAIN_A_N_M = 3.0
 """Change of load a period for an error, A/N m; below one over the load motor's constant it settles
 whatever that constant is."""
 SLEW_A_S = 0.4
-SHARE = 0.8  # Share of a limit that may be asked for
+SHARE = 0.8
+"""Share of a limit that may be asked for."""
 
 
 @dataclass(frozen=True, slots=True)

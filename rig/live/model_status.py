@@ -14,7 +14,8 @@ from rig.live.estimator import ModelEstimator
 from rig.live.state import Value
 
 NAME = "estimate"
-STALE_DAYS = 180.0  # The days a calibration is good for unless stated; a fit is one
+STALE_DAYS = 180.0
+"""The days a calibration is good for unless stated; a fit is one."""
 
 
 class ModelStatus:

@@ -16,7 +16,8 @@ HELP = "space pause  + faster  - slower  f skip 5 s  q quits"
 SKIP_S = 5.0
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 """A shorter wait is none; keys are read at least as often as the longer one."""
-ESTIMATED = "estimated_"  # A column so prefixed holds the estimate that was made while recording
+ESTIMATED = "estimated_"
+"""A column so prefixed holds the estimate that was made while recording."""
 
 
 class EstimateStream(Protocol):

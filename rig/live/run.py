@@ -15,7 +15,8 @@ from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Summary
 from rig.live.writers import Writer, choose_writer
 
-MOST_SHOWN = 6  # Channels shown of a device whose main ones are not known
+MOST_SHOWN = 6
+"""Channels shown of a device whose main ones are not known."""
 
 
 def show(

@@ -16,7 +16,8 @@ from rig.live.block import DeviceStatus, FloatArray, LimitStatus, SampleBlock
 from rig.live.window import Window
 
 BIN_S = 0.02
-VALUE_S = 0.1  # A value is the mean of this long: the time between two frames
+VALUE_S = 0.1
+"""A value is the mean of this long: the time between two frames."""
 RATE_S = 2.0
 ERROR_S = 5.0
 TRACE_S = 10.0

@@ -23,7 +23,8 @@ NAMES = {
     "jaw_2_force_n": "Jaw 2 force",
 }
 
-TIP_CHANNEL = "distal_torque_n_m"  # The torque that a lever arm turns into the force at the jaw tip
+TIP_CHANNEL = "distal_torque_n_m"
+"""The torque that a lever arm turns into the force at the jaw tip."""
 
 STATES = {
     "ok": ("●", "good"),

@@ -25,9 +25,14 @@ STYLES = {
     "bad": "bold #D55E00",
 }
 
-WIDE = 64  # From this many columns on, the numbers are next to the digits and not below them
-LEAST_TRACES = 5  # Lines reserved for the traces
-MARGIN = 18  # Columns left of a trace, for its name and the edges of its scale
+WIDE = 64
+"""From this many columns on, the numbers are next to the digits and not below them."""
+
+LEAST_TRACES = 5
+"""Lines reserved for the traces."""
+
+MARGIN = 18
+"""Columns left of a trace, for its name and the edges of its scale."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,11 @@ from estimation.recording import Recording
 from estimation.watch import ResidualWatch, Sight
 from rig.live.block import DeviceStatus, SampleBlock
 
-PIECE_S = 5.0  # A stream has no runs; its pieces of this length stand for them
-PIECE_SPREAD = 0.25  # Pieces of one run differ more than runs do
+PIECE_S = 5.0
+"""A stream has no runs; its pieces of this length stand for them."""
+
+PIECE_SPREAD = 0.25
+"""Pieces of one run differ more than runs do."""
 
 
 def watched(blocks: Iterator[SampleBlock], model: Model) -> Iterator[SampleBlock]:

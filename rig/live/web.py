@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 
 HOST, PORT = "127.0.0.1", 8766
 
-FRAME_S = 0.08  # Device time of a frame at least, s: less than two blocks of 50 ms
-PIECES = 2  # Pieces of a frame ; each trace has the least and the greatest value of each
+FRAME_S = 0.08
+"""Device time of a frame at least, s: less than two blocks of 50 ms."""
+PIECES = 2
+"""Pieces of a frame ; each trace has the least and the greatest value of each."""
 
 
 def open_page(host: str, port: int) -> "PageServer":

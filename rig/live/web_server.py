@@ -30,8 +30,11 @@ FILES = {
     "plotly.js": (HERE.parent / "output" / "assets" / "plotly-basic.min.js", "text/javascript"),
 }
 
-HISTORY = 300  # Frames whose traces a page gets when it connects: 30 s
-MOST_UNSENT = 50  # Messages on the way to one browser, at most: 5 s of a display that stalls
+HISTORY = 300
+"""Frames whose traces a page gets when it connects: 30 s."""
+
+MOST_UNSENT = 50
+"""Messages on the way to one browser, at most: 5 s of a display that stalls."""
 
 
 class PageServer:

@@ -34,7 +34,8 @@ END_FRAME = _sequence("\x1b[?2026l")
 class Writer(Protocol):
     """One way to show a stream."""
 
-    period_s: float  # Device time from one frame to the next, s
+    period_s: float
+    """Device time from one frame to the next, s."""
 
     def running(self) -> AbstractContextManager[object]:
         """Hold the output while the stream runs."""

@@ -18,7 +18,8 @@ from rig.log.reader import LogFile, Topic, read_log
 from rig.log.scan import Damage
 from rig.log.writer import PART_SUFFIX
 
-PLAN_TOLERANCE = 1e-3  # Relative shortfall against the plan that two clocks explain
+PLAN_TOLERANCE = 1e-3
+"""Relative shortfall against the plan that two clocks explain."""
 
 
 class Verdict(Enum):

@@ -25,7 +25,9 @@ from rig.log.schema import CDR_HEADER, MESSAGE_OPCODE, Stream
 BATCH_BYTES = 1 << 19
 """Unpacked bytes a thread takes at a time: it fits in a core's cache, and hides the hand-over."""
 
-MAX_CHUNK_BYTES = 1 << 30  # A chunk that states more than this is taken for damaged, not unpacked
+MAX_CHUNK_BYTES = 1 << 30
+"""A chunk that states more than this is taken for damaged, not unpacked."""
+
 _MESSAGE = struct.Struct("<BQH")
 
 

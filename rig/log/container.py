@@ -44,7 +44,9 @@ from rig.log.schema import Stream
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
 
-LIBRARY = "rig"  # What our logs name as the writing library, before the version
+LIBRARY = "rig"
+"""What our logs name as the writing library, before the version."""
+
 CHUNK_HEAD = struct.Struct("<BQQQQII4sQ")
 """Opcode, length, first and last log time, unpacked size and CRC, string "zstd", packed size."""
 

@@ -18,7 +18,9 @@ from rig.log.reader import LogFile, Topic, read_log
 from rig.log.recalibrate import recalibrated
 from rig.log.writer import PART_SUFFIX
 
-CSV_ROWS = 10_000  # Rows of a CSV file that are held in memory at a time
+CSV_ROWS = 10_000
+"""Rows of a CSV file that are held in memory at a time."""
+
 Columns = dict[str, NDArray[np.generic]]
 
 

@@ -34,7 +34,9 @@ NUMPY_TYPES: dict[str, str] = {
 CDR_HEADER = int.from_bytes(b"\x00\x01\x00\x00", "little")
 """Encapsulation header of little-endian plain CDR, read as a little-endian uint32."""
 
-MESSAGE_OPCODE = 5  # MCAP opcode of a message record
+MESSAGE_OPCODE = 5
+"""MCAP opcode of a message record."""
+
 MESSAGE_HEAD_BYTES = 2 + 4 + 8 + 8
 """Bytes of an MCAP message record before its data: channel, sequence, log time, publish time."""
 

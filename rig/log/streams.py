@@ -13,7 +13,8 @@ SAMPLE = "/rig/sample"
 COUNTS = "/rig/counts"
 FLIGHT = "/rig/flight"
 RATE_HZ = 1000.0
-FLIGHT_BYTES = 56  # Bytes of commands in one message
+FLIGHT_BYTES = 56
+"""Bytes of commands in one message."""
 
 COUNTS_STREAM = Stream(
     COUNTS,

@@ -26,8 +26,10 @@ from rig.logic.pace import Pace
 READ_S = 0.02
 """Time of the ticks between two polls of the host; shorter than any watchdog of the board."""
 ANSWER_S = 0.005
-MOST_MISSED = 3  # Samples on end without an answer after which the motor's position is missing
-KEPT = 4096  # Samples of the drive that are kept for a reader
+MOST_MISSED = 3
+"""Samples on end without an answer after which the motor's position is missing."""
+KEPT = 4096
+"""Samples of the drive that are kept for a reader."""
 
 MOTOR, SPINDLE, CURRENT = 0, 1, 5
 """Columns of the inputs of a reference rig's board; the others are 0."""

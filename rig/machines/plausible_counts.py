@@ -7,7 +7,8 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP
 from rig.configuration.plausibility import PlausibilitySection
 
-JUMP_SPEEDS = 4  # A motor's count that goes so many times its fastest way in one tick has jumped
+JUMP_SPEEDS = 4
+"""A motor's count that goes so many times its fastest way in one tick has jumped."""
 
 
 def loop_limits(

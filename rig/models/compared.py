@@ -22,7 +22,8 @@ from rig.models.origins import file_hash
 from rig.output.provenance import Provenance
 
 SCHEMA = "rig.estimators.compared/1"
-CERTAIN = 0.05  # Largest p of the signed-rank test at which one estimator is called better
+CERTAIN = 0.05
+"""Largest p of the signed-rank test at which one estimator is called better."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,8 @@ def compare(
     )
 
 
-Stated = BankEstimator | NetworkEstimator  # Estimators that state their instrument and origin
+Stated = BankEstimator | NetworkEstimator
+"""Estimators that state their instrument and origin."""
 
 
 def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) -> RunErrors | None:

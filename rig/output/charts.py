@@ -15,7 +15,9 @@ from markupsafe import Markup
 from estimation.recording import FloatArray
 from rig.output.table import TextTable
 
-POINTS = 1200  # Most points a line is drawn with
+POINTS = 1200
+"""Most points a line is drawn with."""
+
 Line = Mapping[str, Any]
 """A trace of Plotly. Its `meta` has the `role` (`before`, `after`, `measured`, `level`), which sets
 its colour, and the `run` it belongs to, if one."""

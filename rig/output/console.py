@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
     from rig.output.table import TextTable
 
-PIPE_WIDTH = 240  # Columns of a table without a window to limit it
+PIPE_WIDTH = 240
+"""Columns of a table without a window to limit it."""
+
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
 

@@ -33,7 +33,9 @@ _STYLE: dict[Any, Any] = {
         ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK
     ),
 }
-POINTS = 1500  # Most points a line is drawn with
+POINTS = 1500
+"""Most points a line is drawn with."""
+
 LETTERS = 100
 """Names of a bar chart stand side by side up to so many letters together, then upright."""
 

@@ -17,7 +17,9 @@ from rig.protocols import trajectory
 
 JOINTS = ("yaw", "pitch", "grasp")
 Joint = Literal["yaw", "pitch", "grasp"]
-REST_S = 0.5  # Rest before and after the motion of a run
+REST_S = 0.5
+"""Rest before and after the motion of a run."""
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 SAMPLE_RATE_HZ = 1000.0
 
-DECAYS = 4.0  # Time constants of a relaxation's decay
+DECAYS = 4.0
+"""Time constants of a relaxation's decay."""
+
 FloatArray = NDArray[np.float64]
 
 

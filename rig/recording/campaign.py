@@ -41,7 +41,9 @@ from rig.recording.flight import FlightStream
 MANIFEST = "campaign.json"
 
 REST_S = 0.5
-BYTES_PER_SAMPLE = 400  # Upper bound of a sample's room on disk, both streams, before compression
+BYTES_PER_SAMPLE = 400
+"""Upper bound of a sample's room on disk, both streams, before compression."""
+
 Progress = Callable[[str, int, int], None]
 """Told the run's name, the samples recorded of it, and how many it will have."""
 

@@ -91,7 +91,8 @@ def _board_call(
     return signature, build
 
 
-call_board_tick: Any = intrinsic(_board_call)  # For compiled loops with a board behind a pointer
+call_board_tick: Any = intrinsic(_board_call)
+"""For compiled loops with a board behind a pointer."""
 
 
 def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]:

@@ -27,7 +27,8 @@ torque sensor at the jaw; and friction that sticks, which at a reversal holds an
 gear is wound up. Here all of it is plain friction of the spindle that changes sign smoothly.
 """
 
-NOISE_ABOVE_HZ = 150.0  # White noise is measured above this frequency, where the rig barely moves
+NOISE_ABOVE_HZ = 150.0
+"""White noise is measured above this frequency, where the rig barely moves."""
 
 
 def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -> PlantParameters:

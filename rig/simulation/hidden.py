@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from rig.errors import UsageError
 from rig.simulation.hidden_kinds import KINDS
 
-STRENGTH, FIRST, SECOND = range(3)  # Columns of the table the compiled code reads
+STRENGTH, FIRST, SECOND = range(3)
+"""Columns of the table the compiled code reads."""
 
-Row = Sequence[float]  # One row of the table; the compiled code passes a row of the array
+Row = Sequence[float]
+"""One row of the table; the compiled code passes a row of the array."""
 
 (
     MOTOR_RIPPLE,

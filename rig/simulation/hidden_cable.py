@@ -243,7 +243,9 @@ def jaw_detent_n_m(row: Row, jaw_angle_rad: float) -> float:
     return row[STRENGTH] * 24e-3 * x * bump * bump
 
 
-OLD_S = 10.0  # Age at which a contact's friction is at the stated level; a bench starts so rested
+OLD_S = 10.0
+"""Age at which a contact's friction is at the stated level; a bench starts so rested."""
+
 YOUNG_S = 0.05
 
 

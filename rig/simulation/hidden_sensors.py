@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
-RING = 64  # Ticks of the jaw angle that the delayed encoder remembers
+RING = 64
+"""Ticks of the jaw angle that the delayed encoder remembers."""
 
 
 @numba.njit()

@@ -8,7 +8,9 @@ they are the same on every machine. The mixer is the finaliser of SplitMix64 (St
 import numba
 import numpy as np
 
-STREAMS_PER_TICK = 16  # Random numbers that can be drawn in one tick
+STREAMS_PER_TICK = 16
+"""Random numbers that can be drawn in one tick."""
+
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)

@@ -50,7 +50,9 @@ from rig.simulation.places import (
     TWO_STATE,
 )
 
-TICK_S = 1e-3  # One tick of the logger, s
+TICK_S = 1e-3
+"""One tick of the logger, s."""
+
 _Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
 
 
@@ -81,7 +83,8 @@ def wrist_pitch_rad(p: Any, clock_s: float) -> float:
     return float(p.wrist_middle_rad + p.wrist_swing_rad * math.sin(phase))
 
 
-FULL = 6.0  # Creep speeds at which friction is taken to be full: tanh is there to 1e-5
+FULL = 6.0
+"""Creep speeds at which friction is taken to be full: tanh is there to 1e-5."""
 
 
 @numba.njit()

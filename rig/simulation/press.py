@@ -15,8 +15,10 @@ FloatArray = NDArray[np.float64]
 VOLT_PER_COUNT = 3.3 / 4095.0
 TOP_COUNT = 4095
 TICK_S = 1e-3
-PLAY_RATIOS = (0.02, 0.05, 0.1)  # Half-widths of the play operators over full scale
-FULL_SCALE_N = 1.755  # Force at 1 V by the cubic
+PLAY_RATIOS = (0.02, 0.05, 0.1)
+"""Half-widths of the play operators over full scale."""
+FULL_SCALE_N = 1.755
+"""Force at 1 V by the cubic."""
 
 
 def press_force_n(profile: str, top_n: float, duration_s: float, seed: int) -> FloatArray:

@@ -39,7 +39,8 @@ from rig.importers.table.open import read_runs
 
 MODELS = Path(__file__).parent
 ASYMMETRY = "friction.viscous_asymmetry"
-WRONG = 0.5  # Another single name with this confidence or more makes an answer wrong
+WRONG = 0.5
+"""Another single name with this confidence or more makes an answer wrong."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat
 from rig.importers.table.units import NotAUnitError, read_unit
 
 TIME = "time_s"
-DATE = "iso8601"  # Unit of a time column that holds dates
+DATE = "iso8601"
+"""Unit of a time column that holds dates."""
+
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 

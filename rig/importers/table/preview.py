@@ -32,9 +32,15 @@ COLDEST_K, HOTTEST_K = 200.0, 600.0
 GAP_PERIODS = 1.5
 """Step of time, in median steps, from which samples are missing between two; as for derivatives."""
 
-JITTER = 0.2  # Median deviation of the steps of time, in median steps, that is remarked on
-FAR = 10.0  # Deviations of a step of time from the median beyond which no jitter reaches
-PLATEAU = 3  # Equal samples in a row that make a plateau
+JITTER = 0.2
+"""Median deviation of the steps of time, in median steps, that is remarked on."""
+
+FAR = 10.0
+"""Deviations of a step of time from the median beyond which no jitter reaches."""
+
+PLATEAU = 3
+"""Equal samples in a row that make a plateau."""
+
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 

@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 
-Values = NDArray[np.generic]  # One column: float64, or text where a cell is not a number
-Remark = tuple[str, str]  # File or run, and what was assumed, left out or filled in there, in words
+Values = NDArray[np.generic]
+"""One column: float64, or text where a cell is not a number."""
+
+Remark = tuple[str, str]
+"""File or run, and what was assumed, left out or filled in there, in words."""
 
 
 @dataclass(frozen=True)

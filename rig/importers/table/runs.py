@@ -14,7 +14,8 @@ from rig.importers.table.formula import FormulaError, evaluate
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Remark
 
-KEPT_OF_A_LAP = 0.5  # A last lap that is shorter is left out where no shortest run is stated
+KEPT_OF_A_LAP = 0.5
+"""A last lap that is shorter is left out where no shortest run is stated."""
 
 
 def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Iterator[Recording]:

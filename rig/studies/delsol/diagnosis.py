@@ -46,7 +46,8 @@ class Named:
     after_n_m: float  # The same with it, N m
 
 
-Effects = tuple[tuple[int, Term], ...]  # Effects found, each with its joint, from 0
+Effects = tuple[tuple[int, Term], ...]
+"""Effects found, each with its joint, from 0."""
 
 
 def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named, ...], Effects]:

@@ -44,7 +44,8 @@ PEAK_PERCENT = 12.98
 STIFFNESS_N_M = 5000.0
 PEAK_N = 26.096 / 0.1298
 """Peak of the impact: what table 5 and the relative error of the text give together."""
-SLIDING_N = 30.0  # Friction of the rough foam; assumed
+SLIDING_N = 30.0
+"""Friction of the rough foam; assumed."""
 
 PAPER, DISCARDED = "paper's method", "the same, points above 100 discarded"
 OURS = "with what was found"

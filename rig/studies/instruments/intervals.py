@@ -21,7 +21,8 @@ from rig.studies.oneill.state_rows import CONDITIONS
 TARGETS = (PROXIMAL, DISTAL, JAW)
 BANK = Bank("motor_current_a")
 FOLDS = 5
-COUNTS = (1, 3)  # Runs adapted with
+COUNTS = (1, 3)
+"""Runs adapted with."""
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,11 @@ from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance
 from rig.studies.oneill.kinds import EVERY, LOAD, PAPER_INPUTS, TARGET
 
-USED = (("11",), ("22",), ("00", "11", "22"), ("03", "21", "42"))  # Runs adapted with
+USED = (("11",), ("22",), ("00", "11", "22"), ("03", "21", "42"))
+"""Runs adapted with."""
 
-THREE, DRAWS = 3, 40  # Runs of a draw, and draws
+THREE, DRAWS = 3, 40
+"""Runs of a draw, and draws."""
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,12 @@ from estimation.fitting import FitError, FitRun, fit, prepared
 from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray
 
-FLOOR = 0.002  # Least share of the first model's squared error that an effect must remove
-MOST_TOGETHER = 48  # Grid points of an effect with several shape parameters at most
+FLOOR = 0.002
+"""Least share of the first model's squared error that an effect must remove."""
+
+MOST_TOGETHER = 48
+"""Grid points of an effect with several shape parameters at most."""
+
 RIDGE = 1e-9
 """Added to every squared column, as a share of it: columns may be collinear on some runs."""
 

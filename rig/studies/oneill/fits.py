@@ -17,8 +17,11 @@ from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording
 from estimation.scores import Score, score
 
-AUTHORS_SKIP = 1 / 8  # The authors' linear fit omits this first part of the closing samples
-TEST_SHARE = 0.15  # Share of the samples that the paper's random split tests on
+AUTHORS_SKIP = 1 / 8
+"""The authors' linear fit omits this first part of the closing samples."""
+
+TEST_SHARE = 0.15
+"""Share of the samples that the paper's random split tests on."""
 
 SURROGATES = {
     "command": "motor_command_ratio",

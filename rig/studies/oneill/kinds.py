@@ -30,7 +30,8 @@ LOAD = "motor_current_a"
 TARGET = fits.TARGET
 PAPER_INPUTS = ("spindle_angle_rad", "spindle_velocity_rad_s", LOAD)
 FILTERS = ("zero-phase", "live")
-EVERY = 24  # Networks are trained on every so many-th closing sample
+EVERY = 24
+"""Networks are trained on every so many-th closing sample."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,9 @@ CHANNELS = (
     *BASE, *SURROGATES["all"], PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL,
 )  # fmt: skip
 STATE_NODES = 12
-ALONE = (PROXIMAL, DISTAL, JAW)  # Targets of the networks with physical states, one network each
+ALONE = (PROXIMAL, DISTAL, JAW)
+"""Targets of the networks with physical states, one network each."""
+
 MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
 """The rows of the paper that the physical states are compared with."""
 
@@ -120,7 +122,8 @@ class NetworkStudy:
         return None
 
 
-Kind = tuple[str, str, str, tuple[str, ...]]  # Pose, way, surrogate and targets of a job
+Kind = tuple[str, str, str, tuple[str, ...]]
+"""Pose, way, surrogate and targets of a job."""
 
 
 def jobs(poses: tuple[str, ...]) -> list[Job]:

@@ -41,8 +41,11 @@ PAPER: dict[tuple[str, str, str, str], tuple[float, float, float]] = {
 }
 """(pose, way, target, surrogate) to the printed row."""
 
-PAPER_POSE_SAMPLES = 962_936  # Closing samples of pitch and roll together, as the paper states them
-GRIP_ARM_M = 0.012  # Moment arm of the paper's grip force
+PAPER_POSE_SAMPLES = 962_936
+"""Closing samples of pitch and roll together, as the paper states them."""
+
+GRIP_ARM_M = 0.012
+"""Moment arm of the paper's grip force."""
 
 PAPER_GRIP_N, PAPER_GRIP_SHARE = 0.37, 0.035
 """The paper's error of the grip force, and its share of the peak."""

@@ -23,7 +23,8 @@ LOADS = {
 CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
 """What each protocol that holds a level out holds out."""
 
-RESAMPLED = 2000  # Campaigns resampled from the runs, for the standard error of a share
+RESAMPLED = 2000
+"""Campaigns resampled from the runs, for the standard error of a share."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ from rig.studies.oneill.state_rows import CONDITIONS, LOADS, POSES, StateJob, St
 FOLDS = 5
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
-DRAWN = (Bank(LOADS["command"]), "live")  # Content of the figures
+DRAWN = (Bank(LOADS["command"]), "live")
+"""Content of the figures."""
 
 
 @dataclass(frozen=True)

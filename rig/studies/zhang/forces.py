@@ -23,7 +23,8 @@ from rig.studies.zhang.psm_grasp import (
 )
 from rig.studies.zhang.psm_motion import lead_samples
 
-EVERY = 5  # Of the samples, so many are kept of what is drawn over time
+EVERY = 5
+"""Of the samples, so many are kept of what is drawn over time."""
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,22 @@ NETWORKS, BARE, OURS = "paper's networks", "physical model alone", "physical mod
 SHORT = "paper's networks on our minutes"
 FLOOR = "white noise of the torque alone"
 
-MINUTES = 15.0  # Of free motion a condition, split 5:1:1 into training, validation and test
+MINUTES = 15.0
+"""Of free motion a condition, split 5:1:1 into training, validation and test."""
+
 OUR_MINUTES = 3.0
 """Of free motion that ours is fitted on, half with the gripper moving, half closed."""
 
-OTHER_MINUTES = (3.0, 1.0, 1.0)  # Of another instrument: training, validation, test
+OTHER_MINUTES = (3.0, 1.0, 1.0)
+"""Of another instrument: training, validation, test."""
+
 OUR_OTHER_MINUTES = 1.0
 PARTS = 4
-SETTLE = 100  # Samples at the start of every test that are not scored, for any method
-Cells = dict[str, tuple[float, ...]]  # Errors by `experiment | condition | method`
+SETTLE = 100
+"""Samples at the start of every test that are not scored, for any method."""
+
+Cells = dict[str, tuple[float, ...]]
+"""Errors by `experiment | condition | method`."""
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,15 @@ from estimation.networks.training import Settings, train
 from estimation.recording import FloatArray
 from rig.studies.zhang.psm import GRIPPER, PsmRun
 
-WINDOW = (0, 5, 10)  # Samples back of the states in the window: 0, 0.1 and 0.2 s
-GRIPPER_FROM = 2  # First joint (from 0) whose network takes the gripper's states
-EVERY = 10  # Of the samples, so many are trained on: one in 0.2 s
+WINDOW = (0, 5, 10)
+"""Samples back of the states in the window: 0, 0.1 and 0.2 s."""
+
+GRIPPER_FROM = 2
+"""First joint (from 0) whose network takes the gripper's states."""
+
+EVERY = 10
+"""Of the samples, so many are trained on: one in 0.2 s."""
+
 SETTINGS = Settings(nodes=8, iterations=20)
 TRANSFER = Settings(nodes=8, iterations=10)
 

@@ -26,7 +26,9 @@ from rig.arm.search import DAMPING, Prepared, blocks_of, of_columns, search
 from rig.studies.zhang.psm import GRIPPER, JOINTS, RATE_HZ, PsmRun
 from rig.studies.zhang.rest import rest_network, rest_rows
 
-EVERY = 5  # Of the samples, so many are fitted: ten a second
+EVERY = 5
+"""Of the samples, so many are fitted: ten a second."""
+
 SETTLE = 100
 """Samples at the start of a run that are not fitted: slip elements have not slipped yet."""
 
@@ -34,10 +36,17 @@ WINDOW, DEGREE = 15, 4
 """Past samples that velocity and acceleration come from, and the degree of their polynomial. At
 its end, they barely lag; differences of past velocities lag, which shows as late torque."""
 
-CLOSED_RAD = 0.03  # Angle below which the jaws touch
-LEAKS = (2, 3, 4, 5)  # Joints (from 0) that show a share of the gripper's torque
-LONG_SLIP_SHARE = (0.01, 0.03, 0.1, 0.2)  # Thresholds of slip, as shares of half a joint's range
-DRAG_RAD_S = (0.05, 0.2)  # Speeds over which the drag of the gripper's cables turns
+CLOSED_RAD = 0.03
+"""Angle below which the jaws touch."""
+
+LEAKS = (2, 3, 4, 5)
+"""Joints (from 0) that show a share of the gripper's torque."""
+
+LONG_SLIP_SHARE = (0.01, 0.03, 0.1, 0.2)
+"""Thresholds of slip, as shares of half a joint's range."""
+
+DRAG_RAD_S = (0.05, 0.2)
+"""Speeds over which the drag of the gripper's cables turns."""
 
 
 def motion_of_run(run: PsmRun) -> Motion:

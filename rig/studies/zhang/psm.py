@@ -25,7 +25,9 @@ from rig.studies.zhang.psm_instruments import KINDS, Kind
 RATE_HZ = 50.0
 JOINTS = 7
 GRIPPER = 6
-WRIST = slice(3, 7)  # Roll, pitch, yaw and gripper: what the instrument's four motors drive
+WRIST = slice(3, 7)
+"""Roll, pitch, yaw and gripper: what the instrument's four motors drive."""
+
 MEMORY = np.array([0.9, 1.45, 0.72, 0.0, 0.0, 0.0])
 """Friction with memory of each joint, as a share of its declared torque's RMS."""
 
@@ -53,7 +55,9 @@ RINGING_HZ, RINGING_S = 8.0, 0.03
 COUPLING_ERROR = 0.12
 """Standard deviation of the true coupling matrix's elements, relative to the nominal ones."""
 
-SPREAD = 0.15  # Standard deviation of the logarithm of each strength between instruments
+SPREAD = 0.15
+"""Standard deviation of the logarithm of each strength between instruments."""
+
 SLIP_SHARE = np.array([0.05, 0.05, 0.04, 0.02, 0.02, 0.02])
 """Motion over which a joint's friction turns, as a share of its range."""
 
@@ -61,7 +65,8 @@ CABLE_SLIP_RAD, GRIPPER_SLIP_RAD = 0.15, 0.15
 NOISE_RAD, NOISE_RAD_S = 2e-5, 2e-3
 """Noise of positions and velocities; in m and m/s of the insertion."""
 
-CHUNK = 8000  # Samples whose regressor is held at once
+CHUNK = 8000
+"""Samples whose regressor is held at once."""
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,19 @@ from rig.arm.hidden import bouc_wen
 from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, Psm
 from rig.studies.zhang.psm_motion import moving_gripper, random_path, with_gripper
 
-ARM_M = 0.02  # From the gripper's axis to what it holds: the inverse of the paper's 50 per metre
-JAW_N_RAD = 15.0  # Force by which a held thing answers the angle; assumed
+ARM_M = 0.02
+"""From the gripper's axis to what it holds: the inverse of the paper's 50 per metre."""
+
+JAW_N_RAD = 15.0
+"""Force by which a held thing answers the angle; assumed."""
 
 OPEN_RAD, TOUCH_RAD, HELD_RAD = 0.8, 0.4, 0.2
-PEAK_N = 4.24  # Range of force of the paper's grasps: 0.37 N over 8.73 %
+PEAK_N = 4.24
+"""Range of force of the paper's grasps: 0.37 N over 8.73 %."""
 
 FREE_S, COMING_S = 12.0, 2.0
-CONFIGURATIONS_DEG = ((0, 0), (60, 0), (30, 0), (0, 60), (0, 30))  # J5 and J6 of C1 to C5
+CONFIGURATIONS_DEG = ((0, 0), (60, 0), (30, 0), (0, 60), (0, 30))
+"""J5 and J6 of C1 to C5."""
 
 CONTACT_SHARE, CONTACT_DEPTH_M = 0.2, 0.05
 """Share of the ranges moved while touching, and insertion beyond the middle; assumed."""

@@ -12,8 +12,12 @@ from estimation.arm.tables import PSM
 from estimation.recording import FloatArray
 from rig.studies.zhang.psm import RATE_HZ
 
-LEAD_S = 4.0  # Before a run: the gripper closes from open, so that its cables are in a known state
-HELD_S = 0.8  # Time between two random numbers
+LEAD_S = 4.0
+"""Before a run: the gripper closes from open, so that its cables are in a known state."""
+
+HELD_S = 0.8
+"""Time between two random numbers."""
+
 SMOOTHING_HZ = 0.6
 SHARE = 0.9
 LEAST_OPEN = 0.05

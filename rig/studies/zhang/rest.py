@@ -20,10 +20,14 @@ from estimation.recording import FloatArray
 JOINT_SLIP_SHARE = (0.01, 0.03, 0.06, 0.1, 0.2, 0.4)
 """Ways after which the springs of joints 1 to 4 slip, as shares of half a joint's range."""
 
-MOTOR_SLIP_RAD = (0.03, 0.1, 0.2, 0.4)  # The same of the wrist's motors
+MOTOR_SLIP_RAD = (0.03, 0.1, 0.2, 0.4)
+"""The same of the wrist's motors."""
+
 SETTINGS = Settings(nodes=4, iterations=60)
 
-HELD_OUT = 6  # Every so many pieces of the samples choose the step, and whether the network is kept
+HELD_OUT = 6
+"""Every so many pieces of the samples choose the step, and whether the network is kept."""
+
 LEAST_GAIN = 0.1
 """Share of the squared residual on those segments that a network must remove to be kept. Below,
 it fits noise: the residual does not depend on these states."""

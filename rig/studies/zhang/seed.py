@@ -19,7 +19,8 @@ from rig.studies.zhang.free import (
 )
 from rig.studies.zhang.psm import with_instrument
 
-STREAM = 20220  # Of random numbers: other arms than those on which the simulation was chosen
+STREAM = 20220
+"""Of random numbers: other arms than those on which the simulation was chosen."""
 
 
 @dataclass(frozen=True)

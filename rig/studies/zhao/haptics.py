@@ -29,10 +29,13 @@ MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
 PLACES, GRASPS = 7, 3
 TISSUE_N_M_RAD, INCLUSION_RATIO = 0.15, 2.0
 PEAK_N = 1.5
-RISE_S = 4.0  # A palpating grasp is slow: the filters' lag must not pass for a slope
+RISE_S = 4.0
+"""A palpating grasp is slow: the filters' lag must not pass for a slope."""
 SCHEMA = "rig.study.haptics/1"
 DOF = "grasp"
-LEVEL = 0.95  # Confidence from which an answer counts as sure
+LEVEL = 0.95
+"""Confidence from which an answer counts as sure."""
+
 Estimate = Callable[[Recording], tuple[FloatArray, FloatArray]]
 """Gives the force and the angle of a run, N and rad, filtered alike."""
 

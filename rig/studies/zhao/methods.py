@@ -26,9 +26,12 @@ from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, var
 from rig.studies.zhao.paper import INPUTS, LEVELS_N, LONG_S, SHORT_S
 
 FILTER = LowPass(cutoff_hz=25.0, order=2)
-EVERY = 8  # Samples that are averaged to one where a model is fitted or diagnosed
+EVERY = 8
+"""Samples that are averaged to one where a model is fitted or diagnosed."""
+
 Axes = tuple[AxisParameters, ...]
-ToForce = Callable[[Recording], FloatArray]  # Run to estimated force, N, shape (n,)
+ToForce = Callable[[Recording], FloatArray]
+"""Run to estimated force, N, shape (n,)."""
 
 
 @dataclass(frozen=True)

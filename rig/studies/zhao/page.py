@@ -23,7 +23,8 @@ from rig.studies.zhao.study import LOOKED_AT, Cell, Study
 TITLE = "Force from motor current: Tables 2 to 4 of Zhao and Nelson 2016, on simulated graspers"
 NEAR = 0.25
 LEAST_N = 0.03
-THIRD = PROTOTYPES["third"].name  # The prototype that the paper's tables are of
+THIRD = PROTOTYPES["third"].name
+"""The prototype that the paper's tables are of."""
 
 
 ADJUSTED = TextTable(

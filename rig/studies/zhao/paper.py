@@ -15,4 +15,5 @@ PAPER_ERRORS_N: Mapping[str, tuple[float, float, float]] = {
     "yaw": (-0.03, 0.07, 0.05),
 }
 """Table 3, in the order of `INPUTS`."""
-PAPER_DELAYS_MS: Mapping[str, float] = {"grasp": 0.0, "pitch": -20.0, "yaw": 0.0}  # Table 4
+PAPER_DELAYS_MS: Mapping[str, float] = {"grasp": 0.0, "pitch": -20.0, "yaw": 0.0}
+"""Table 4."""
