@@ -33,11 +33,17 @@ TWICE = 2.5
 
 @dataclass(frozen=True)
 class Cost:
-    """One timing."""
+    """One timing.
 
-    samples: int  # Samples of all runs
-    candidates: int  # Effects at points of their grids
-    seconds: float  # Processor time, the shortest of several
+    Attributes:
+        samples: Samples of all runs.
+        candidates: Effects at points of their grids.
+        seconds: Processor time, the shortest of several.
+    """
+
+    samples: int
+    candidates: int
+    seconds: float
 
 
 def costs_over_samples() -> list[Cost]:

@@ -45,14 +45,21 @@ SECOND = 500_000
 
 @dataclass(frozen=True)
 class Pair:
-    """One pair of campaigns and its answer."""
+    """One pair of campaigns and its answer.
 
-    seed: int  # Seed of the rig
-    planted: str  # What changed, in words; empty where nothing did
-    kind: str  # `nothing`, `parameter` or `effect`
-    # The names of the changes found, those that share one place joined by `or`
+    Attributes:
+        seed: Seed of the rig.
+        planted: What changed, in words; empty where nothing did.
+        kind: `nothing`, `parameter` or `effect`.
+        found: The names of the changes found, those that share one place joined by `or`.
+        outcome: `named`, `in a set`, `missed`, `wrong`, or `right` where nothing changed.
+    """
+
+    seed: int
+    planted: str
+    kind: str
     found: tuple[str, ...]
-    outcome: str  # `named`, `in a set`, `missed`, `wrong`, or `right` where nothing changed
+    outcome: str
 
 
 def pairs(seeds: range) -> Iterator[Pair]:

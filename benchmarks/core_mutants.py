@@ -57,12 +57,19 @@ _NO_CODE = re.compile(r"\s*(//|#|\"|static_assert|using|template|constexpr char|
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One change of one file of the core."""
+    """One change of one file of the core.
 
-    file: str  # Name of the file
-    line: int  # Its line, from 1
-    before: str  # The line
-    after: str  # The line in its place
+    Attributes:
+        file: Name of the file.
+        line: Its line, from 1.
+        before: The line.
+        after: The line in its place.
+    """
+
+    file: str
+    line: int
+    before: str
+    after: str
 
     @property
     def name(self) -> str:

@@ -48,14 +48,22 @@ _FOUND = re.compile(r"seed (\d+): ([^:]+):((?: \[[^]]+\])+)")
 
 @dataclass(frozen=True)
 class Search:
-    """What one kind of search has come to."""
+    """What one kind of search has come to.
 
-    sequences: int = 0  # Sequences run
-    hours: float = 0.0  # Hours of the rig's time
-    armings: int = 0  # How often a board was armed
-    trips: int = 0  # How often one tripped
-    farthest_rad: float = 0.0  # Farthest the shaft went, rad
-    # Seed, rule and events of each sequence that broke a rule
+    Attributes:
+        sequences: Sequences run.
+        hours: Hours of the rig's time.
+        armings: How often a board was armed.
+        trips: How often one tripped.
+        farthest_rad: Farthest the shaft went, rad.
+        found: Seed, rule and events of each sequence that broke a rule.
+    """
+
+    sequences: int = 0
+    hours: float = 0.0
+    armings: int = 0
+    trips: int = 0
+    farthest_rad: float = 0.0
     found: list[tuple[int, str, list[str]]] = field(default_factory=list)
 
     @property

@@ -27,11 +27,17 @@ SETTLED = slice(1000, None)
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """What one channel does in a run."""
+    """What one channel does in a run.
 
-    low: float  # 5th percentile
-    middle: float  # Median
-    high: float  # 95th percentile
+    Attributes:
+        low: 5th percentile.
+        middle: Median.
+        high: 95th percentile.
+    """
+
+    low: float
+    middle: float
+    high: float
 
     @property
     def span(self) -> float:

@@ -46,11 +46,17 @@ UNOBSERVABLE = {
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One change of one file."""
+    """One change of one file.
 
-    driver: str  # Folder of the driver
-    what: str  # The change, in a few words
-    source: str  # The whole changed file
+    Attributes:
+        driver: Folder of the driver.
+        what: The change, in a few words.
+        source: The whole changed file.
+    """
+
+    driver: str
+    what: str
+    source: str
 
 
 def mutants_of(driver: str, text: str) -> Iterator[Mutant]:

@@ -7,13 +7,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Ratio:
-    """One line of the benchmark table."""
+    """One line of the benchmark table.
 
-    name: str  # What was measured, against which baseline
-    ratio: float  # The measured ratio
-    target: float  # What it should reach
-    higher_is_better: bool = True  # Whether the target is a floor (True) or a ceiling
-    detail: str = ""  # The two figures the ratio was made of
+    Attributes:
+        name: What was measured, against which baseline.
+        ratio: The measured ratio.
+        target: What it should reach.
+        higher_is_better: Whether the target is a floor (True) or a ceiling.
+        detail: The two figures the ratio was made of.
+    """
+
+    name: str
+    ratio: float
+    target: float
+    higher_is_better: bool = True
+    detail: str = ""
 
     @property
     def holds(self) -> bool:

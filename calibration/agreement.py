@@ -38,20 +38,31 @@ class NoPairError(CalibrationError):
 
 @dataclass(frozen=True)
 class Agreement:
-    """One encoder against its reference."""
+    """One encoder against its reference.
 
-    encoder: str  # Its name, a key of `VERIFIED`
-    channel: str  # Its channel
-    reference: str  # Channel of the encoder it is compared with
-    runs: int  # Number of runs
-    scale: float  # Slope over the nominal ratio; 1 if both agree
-    # Expanded uncertainty of it, two standard deviations of the mean of runs
+    Attributes:
+        encoder: Its name, a key of `VERIFIED`.
+        channel: Its channel.
+        reference: Channel of the encoder it is compared with.
+        runs: Number of runs.
+        scale: Slope over the nominal ratio; 1 if both agree.
+        scale_uncertainty: Expanded uncertainty of it, two standard deviations of the mean of runs.
+        offset_rad: Angle where the reference is at zero.
+        offset_uncertainty_rad: Expanded uncertainty of it.
+        travel_rad: Usual travel of a run.
+        within_run_rad: Half width of the middle 95 % of their difference in a usual run, by twist,
+            lost motion and noise.
+    """
+
+    encoder: str
+    channel: str
+    reference: str
+    runs: int
+    scale: float
     scale_uncertainty: float
-    offset_rad: float  # Angle where the reference is at zero
-    offset_uncertainty_rad: float  # Expanded uncertainty of it
-    travel_rad: float  # Usual travel of a run
-    # Half width of the middle 95 % of their difference in a usual run, by twist, lost motion and
-    # noise
+    offset_rad: float
+    offset_uncertainty_rad: float
+    travel_rad: float
     within_run_rad: float
 
     @property

@@ -31,16 +31,25 @@ def is_monotone(coefficients: Sequence[float] | FloatArray, low: float, high: fl
 
 @dataclass(frozen=True)
 class FsrCurve:
-    """Force over voltage, F = c0 + c1 x + c2 x^2 + ..., x in V and F in N."""
+    """Force over voltage, F = c0 + c1 x + c2 x^2 + ..., x in V and F in N.
 
-    coefficients: tuple[float, ...]  # c0, c1, ..
-    low_v: float  # Least voltage it holds for
-    high_v: float  # Greatest voltage it holds for
-    # Of the coefficients, shape (p, p); empty if unknown
+    Attributes:
+        coefficients: c0, c1, ...
+        low_v: Least voltage it holds for.
+        high_v: Greatest voltage it holds for.
+        covariance: Of the coefficients, shape (p, p); empty if unknown.
+        residual_rms_n: Root mean square residual, N; NaN if unknown.
+        runs: Number of runs fitted on.
+        points: Number of samples fitted on.
+    """
+
+    coefficients: tuple[float, ...]
+    low_v: float
+    high_v: float
     covariance: tuple[tuple[float, ...], ...] = ()
-    residual_rms_n: float = float("nan")  # Root mean square residual, N; NaN if unknown
-    runs: int = 0  # Number of runs fitted on
-    points: int = 0  # Number of samples fitted on
+    residual_rms_n: float = float("nan")
+    runs: int = 0
+    points: int = 0
 
     def __post_init__(self) -> None:
         if not (self.low_v < self.high_v and np.isfinite(self.coefficients).all()):

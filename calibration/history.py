@@ -15,12 +15,18 @@ MOST = 5
 
 @dataclass(frozen=True)
 class Change:
-    """One parameter in two calibrations."""
+    """One parameter in two calibrations.
 
-    parameter: str  # Its name
-    earlier: float  # Value before
-    now: float  # Value now
-    # Expanded uncertainty of the difference, or None where a record states none
+    Attributes:
+        parameter: Its name.
+        earlier: Value before.
+        now: Value now.
+        uncertainty: Expanded uncertainty of the difference, or None where a record states none.
+    """
+
+    parameter: str
+    earlier: float
+    now: float
     uncertainty: float | None
 
     @property

@@ -15,24 +15,40 @@ MINIMUM_SAMPLES = 100
 
 @dataclass(frozen=True, slots=True)
 class SensorZero:
-    """A sensor at rest."""
+    """A sensor at rest.
 
-    channel: str  # SI channel
-    mean_counts: float  # Mean reading, counts
-    std_counts: float  # Standard deviation of one reading, counts
-    samples: int  # Number of readings
+    Attributes:
+        channel: SI channel.
+        mean_counts: Mean reading, counts.
+        std_counts: Standard deviation of one reading, counts.
+        samples: Number of readings.
+    """
+
+    channel: str
+    mean_counts: float
+    std_counts: float
+    samples: int
 
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How far a zero moved over a run."""
+    """How far a zero moved over a run.
 
-    channel: str  # SI channel
-    unit: str  # Its unit
-    before: float  # Zero before the run relative to the calibration's own, SI
-    after: float  # The same after the run, SI
-    limit: float  # Largest change that passes, SI
-    passes: bool  # Whether the change is within the limit
+    Attributes:
+        channel: SI channel.
+        unit: Its unit.
+        before: Zero before the run relative to the calibration's own, SI.
+        after: The same after the run, SI.
+        limit: Largest change that passes, SI.
+        passes: Whether the change is within the limit.
+    """
+
+    channel: str
+    unit: str
+    before: float
+    after: float
+    limit: float
+    passes: bool
 
 
 def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, SensorZero]:

@@ -13,13 +13,20 @@ class DeviceCounters(LinkCounters):
     """Counters of a link since it was opened; see also `drivers.link.LinkCounters`.
 
     `crc_errors` counts checksums that do not fit, whatever their kind.
+
+    Attributes:
+        timeouts: Answers that did not come in time, after the retries.
+        stalls: Silences of a stream longer than it should ever be silent.
+        late: Packets dropped because later ones had come before them.
+        device_errors: Samples in which the device itself reports a fault.
+        restarts: Number of restarts of the device's own numbering.
     """
 
-    timeouts: int = 0  # Answers that did not come in time, after the retries
-    stalls: int = 0  # Silences of a stream longer than it should ever be silent
-    late: int = 0  # Packets dropped because later ones had come before them
-    device_errors: int = 0  # Samples in which the device itself reports a fault
-    restarts: int = 0  # Number of restarts of the device's own numbering
+    timeouts: int = 0
+    stalls: int = 0
+    late: int = 0
+    device_errors: int = 0
+    restarts: int = 0
 
 
 class Arrivals:

@@ -72,14 +72,21 @@ def decode_frame(encoded: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class DecodedFrames:
-    """What a stretch of a byte stream held."""
+    """What a stretch of a byte stream held.
 
-    # Good frames of the expected size, shape (n, payload_size), uint8, in order
+    Attributes:
+        payloads: Good frames of the expected size, shape (n, payload_size), uint8, in order.
+        others: Payloads of good frames of any other size, in order.
+        bad: Frames dropped: not COBS, wrong CRC, or too long.
+        bad_bytes: Bytes in those frames, delimiters included.
+        tail: Bytes behind the last delimiter: the start of the next frame.
+    """
+
     payloads: NDArray[np.uint8]
-    others: list[bytes]  # Payloads of good frames of any other size, in order
-    bad: int  # Frames dropped: not COBS, wrong CRC, or too long
-    bad_bytes: int  # Bytes in those frames, delimiters included
-    tail: bytes  # Bytes behind the last delimiter: the start of the next frame
+    others: list[bytes]
+    bad: int
+    bad_bytes: int
+    tail: bytes
 
 
 def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:

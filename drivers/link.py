@@ -18,16 +18,27 @@ REPLY_TIMEOUT_S = 0.1
 
 @dataclass(slots=True)
 class LinkCounters:
-    """Counters of a link since it was opened."""
+    """Counters of a link since it was opened.
 
-    frames: int = 0  # Good frames received
-    crc_errors: int = 0  # Frames dropped: wrong CRC, not COBS, or too long
-    discarded_bytes: int = 0  # Bytes in dropped frames, and those before the first whole frame
-    unknown_frames: int = 0  # Good frames of an unexpected kind or version
-    gaps: int = 0  # Places where samples are missing
-    lost: int = 0  # Samples missing in those places
-    duplicates: int = 0  # Samples dropped because they had come before
-    retries: int = 0  # Commands sent again because no answer came
+    Attributes:
+        frames: Good frames received.
+        crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
+        discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
+        unknown_frames: Good frames of an unexpected kind or version.
+        gaps: Places where samples are missing.
+        lost: Samples missing in those places.
+        duplicates: Samples dropped because they had come before.
+        retries: Commands sent again because no answer came.
+    """
+
+    frames: int = 0
+    crc_errors: int = 0
+    discarded_bytes: int = 0
+    unknown_frames: int = 0
+    gaps: int = 0
+    lost: int = 0
+    duplicates: int = 0
+    retries: int = 0
 
     def as_dict(self) -> dict[str, int]:
         """Return the counters by name."""

@@ -35,11 +35,17 @@ UNIT_BY_SUFFIX: dict[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One column of a recording."""
+    """One column of a recording.
 
-    name: str  # Column name, ends in the unit's suffix
-    unit: str  # SI unit symbol
-    description: str  # Quantity and place of the measurement
+    Attributes:
+        name: Column name, ends in the unit's suffix.
+        unit: SI unit symbol.
+        description: Quantity and place of the measurement.
+    """
+
+    name: str
+    unit: str
+    description: str
 
 
 class UnknownUnitError(EstimationError):

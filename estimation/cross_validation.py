@@ -16,13 +16,21 @@ from estimation.scores import Score, score
 
 @dataclass(frozen=True, slots=True)
 class HeldOutError:
-    """Error of a model on runs it was not fitted on, in the target's unit."""
+    """Error of a model on runs it was not fitted on, in the target's unit.
 
-    rmse: float  # Root mean square over all samples, each run's mean error removed
-    rmse_with_means: float  # The same with the means left in
-    rmse_by_run: dict[str, float]  # Run to its own error, mean removed
-    runs: int  # Number of runs
-    folds: int  # Number of folds; every run is in just one of them
+    Attributes:
+        rmse: Root mean square over all samples, each run's mean error removed.
+        rmse_with_means: The same with the means left in.
+        rmse_by_run: Run to its own error, mean removed.
+        runs: Number of runs.
+        folds: Number of folds; every run is in just one of them.
+    """
+
+    rmse: float
+    rmse_with_means: float
+    rmse_by_run: dict[str, float]
+    runs: int
+    folds: int
 
 
 def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 0) -> HeldOutError:

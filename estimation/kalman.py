@@ -29,10 +29,14 @@ UPDATES = 5000
 
 @dataclass(frozen=True, eq=False)
 class Tracker:
-    """The filter's constant gain."""
+    """The filter's constant gain.
 
-    period_s: float  # Sample period
-    # Correction of angle, speed and acceleration for an innovation of 1 rad, shape (3,)
+    Attributes:
+        period_s: Sample period.
+        gain: Correction of angle, speed and acceleration for an innovation of 1 rad, shape (3,).
+    """
+
+    period_s: float
     gain: FloatArray
 
     @property

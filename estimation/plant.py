@@ -37,56 +37,86 @@ class PlantError(EstimationError):
 
 @dataclass(frozen=True)
 class Axis:
-    """A shaft or a carriage."""
+    """A shaft or a carriage.
 
-    name: str  # Its name
-    unit: str  # `rad` of a shaft, `m` of a carriage
-    # Speed below which it is at rest, in its unit a second; None where one count of its sensor in a
-    # period of the filter decides
+    Attributes:
+        name: Its name.
+        unit: `rad` of a shaft, `m` of a carriage.
+        rest_speed: Speed below which it is at rest, in its unit a second; None where one count of
+            its sensor in a period of the filter decides.
+        description: In words.
+    """
+
+    name: str
+    unit: str
     rest_speed: float | None = None
-    description: str = ""  # In words
+    description: str = ""
 
 
 @dataclass(frozen=True)
 class Transmission:
-    """What joins two axes."""
+    """What joins two axes.
 
-    name: str  # Its name, also of the equation of what it loses
-    input: str  # Axis on the side of the drive
-    output: str  # Axis it drives
-    # Travel of the input per travel of the output, negative where it reverses the direction; None
-    # where it is fitted
+    Attributes:
+        name: Its name, also of the equation of what it loses.
+        input: Axis on the side of the drive.
+        output: Axis it drives.
+        ratio: Travel of the input per travel of the output, negative where it reverses the
+            direction; None where it is fitted.
+        compliant: Whether it bends measurably.
+        damped: Whether the bend lags behind the load.
+        deflection: Name of the equation of its bend.
+        description: In words.
+    """
+
+    name: str
+    input: str
+    output: str
     ratio: float | None = None
-    compliant: bool = False  # Whether it bends measurably
-    damped: bool = False  # Whether the bend lags behind the load
-    deflection: str = ""  # Name of the equation of its bend
-    description: str = ""  # In words
+    compliant: bool = False
+    damped: bool = False
+    deflection: str = ""
+    description: str = ""
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """What drives an axis."""
+    """What drives an axis.
 
-    # Channel of the drive: a current, a voltage, a share of full scale, a force or torque
+    Attributes:
+        name: Channel of the drive: a current, a voltage, a share of full scale, a force or torque.
+        axis: Axis it drives.
+        description: In words.
+    """
+
     name: str
-    axis: str  # Axis it drives
-    description: str = ""  # In words
+    axis: str
+    description: str = ""
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """What is measured."""
+    """What is measured.
 
-    name: str  # Channel
-    axis: str = ""  # Axis it reads; empty where it is of none
-    reads: Reads = "other"  # What it reads. An effort is what the axis passes on.
-    # Counts in one unit of the channel, such as a radian; None where it is not known
+    Attributes:
+        name: Channel.
+        axis: Axis it reads; empty where it is of none.
+        reads: What it reads. An effort is what the axis passes on.
+        counts: Counts in one unit of the channel, such as a radian; None where it is not known.
+        rate_hz: Samples a second; None where it is not known.
+        noise: Standard deviation in the unit of the channel; None where it is not known.
+        delay_s: Age of a value when it is recorded; None where it is not known.
+        description: In words.
+    """
+
+    name: str
+    axis: str = ""
+    reads: Reads = "other"
     counts: float | None = None
-    rate_hz: float | None = None  # Samples a second; None where it is not known
-    # Standard deviation in the unit of the channel; None where it is not known
+    rate_hz: float | None = None
     noise: float | None = None
-    delay_s: float | None = None  # Age of a value when it is recorded; None where it is not known
-    description: str = ""  # In words
+    delay_s: float | None = None
+    description: str = ""
 
     @property
     def step(self) -> float | None:
@@ -96,55 +126,87 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Load:
-    """A known force or torque that an axis carries, such as the weight of a pendulum."""
+    """A known force or torque that an axis carries, such as the weight of a pendulum.
 
-    name: str  # Channel of it, recorded or computed when a recording is read
-    axis: str  # Axis that carries it
-    description: str = ""  # In words
+    Attributes:
+        name: Channel of it, recorded or computed when a recording is read.
+        axis: Axis that carries it.
+        description: In words.
+    """
+
+    name: str
+    axis: str
+    description: str = ""
 
 
 @dataclass(frozen=True)
 class Part:
-    """One effect of an equation."""
+    """One effect of an equation.
 
-    id: str  # Id of the effect in the catalogue
-    sign: int = 1  # Its side: 1 adds to the target, -1 subtracts from it
-    # Role to channel; the effect's default where a role is left out
+    Attributes:
+        id: Id of the effect in the catalogue.
+        sign: Its side: 1 adds to the target, -1 subtracts from it.
+        channels: Role to channel; the effect's default where a role is left out.
+    """
+
+    id: str
+    sign: int = 1
     channels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Written:
-    """An equation as it is written down: a target and its effects."""
+    """An equation as it is written down: a target and its effects.
 
-    name: str  # Its name
-    target: str  # Channel on the left-hand side
-    parts: tuple[Part, ...]  # Effects on the right-hand side
-    description: str = ""  # In words
-    samples: Samples | None = None  # Which samples count; None for what suits the effects
+    Attributes:
+        name: Its name.
+        target: Channel on the left-hand side.
+        parts: Effects on the right-hand side.
+        description: In words.
+        samples: Which samples count; None for what suits the effects.
+    """
+
+    name: str
+    target: str
+    parts: tuple[Part, ...]
+    description: str = ""
+    samples: Samples | None = None
 
 
 @dataclass(frozen=True)
 class Plant:
     """A machine.
 
+    Attributes:
+        name: Its name.
+        axes: Shafts and carriages.
+        transmissions: What joins them.
+        actuators: What drives them.
+        sensors: What is measured.
+        loads: Known weights.
+        equations: Equations of its owner's, in addition to those that follow.
+        derived: Derived channels of its owner's, in addition.
+        description: In words.
+        cutoff_hz: Cutoff of the filter of every channel.
+        order: Order of that filter.
+        run_offsets: Whether an offset of each run is a nuisance of a fit.
+
     Raises:
         PlantError: The parts do not fit together.
     """
 
-    name: str  # Its name
-    axes: tuple[Axis, ...] = ()  # Shafts and carriages
-    transmissions: tuple[Transmission, ...] = ()  # What joins them
-    actuators: tuple[Actuator, ...] = ()  # What drives them
-    sensors: tuple[Sensor, ...] = ()  # What is measured
-    loads: tuple[Load, ...] = ()  # Known weights
-    # Equations of its owner's, in addition to those that follow
+    name: str
+    axes: tuple[Axis, ...] = ()
+    transmissions: tuple[Transmission, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    loads: tuple[Load, ...] = ()
     equations: tuple[Written, ...] = ()
-    derived: tuple[Combination, ...] = ()  # Derived channels of its owner's, in addition
-    description: str = ""  # In words
-    cutoff_hz: float = 50.0  # Cutoff of the filter of every channel
-    order: int = 3  # Order of that filter
-    run_offsets: bool = True  # Whether an offset of each run is a nuisance of a fit
+    derived: tuple[Combination, ...] = ()
+    description: str = ""
+    cutoff_hz: float = 50.0
+    order: int = 3
+    run_offsets: bool = True
 
     def __post_init__(self) -> None:
         _check_names(self)

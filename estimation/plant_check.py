@@ -29,40 +29,64 @@ ALIKE = 3.0
 
 @dataclass(frozen=True)
 class Identified:
-    """A parameter of an equation."""
+    """A parameter of an equation.
 
-    effect: str  # Id of its effect
-    name: str  # Its name
-    unit: str  # Its unit
-    description: str  # In words
-    value: float | None = None  # Fitted on the recordings; None without them
+    Attributes:
+        effect: Id of its effect.
+        name: Its name.
+        unit: Its unit.
+        description: In words.
+        value: Fitted on the recordings; None without them.
+    """
+
+    effect: str
+    name: str
+    unit: str
+    description: str
+    value: float | None = None
 
 
 @dataclass(frozen=True)
 class CheckedEquation:
-    """One equation of a machine."""
+    """One equation of a machine.
 
-    name: str  # Its name
-    sentence: str  # The equation in words
-    parameters: tuple[Identified, ...]  # What it identifies
-    target: str  # Channel on its left-hand side
-    unit: str  # Unit of the target
-    # Root mean square of what the fit does not explain over that of the target; None without
-    # recordings
+    Attributes:
+        name: Its name.
+        sentence: The equation in words.
+        parameters: What it identifies.
+        target: Channel on its left-hand side.
+        unit: Unit of the target.
+        relative_error: Root mean square of what the fit does not explain over that of the target;
+            None without recordings.
+        trouble: Why it cannot be fitted on the recordings; empty where it can.
+    """
+
+    name: str
+    sentence: str
+    parameters: tuple[Identified, ...]
+    target: str
+    unit: str
     relative_error: float | None = None
-    trouble: str = ""  # Why it cannot be fitted on the recordings; empty where it can
+    trouble: str = ""
 
 
 @dataclass(frozen=True)
 class CheckedPlant:
-    """What can be identified of a machine."""
+    """What can be identified of a machine.
 
-    equations: tuple[CheckedEquation, ...]  # The equations that its sensors allow
-    missing: tuple[Missing, ...]  # What they do not identify
-    unused: tuple[str, ...]  # Channels that no equation reads
-    # Where the recordings contradict the file, sentences
+    Attributes:
+        equations: The equations that its sensors allow.
+        missing: What they do not identify.
+        unused: Channels that no equation reads.
+        contradictions: Where the recordings contradict the file, sentences.
+        runs: Runs checked.
+    """
+
+    equations: tuple[CheckedEquation, ...]
+    missing: tuple[Missing, ...]
+    unused: tuple[str, ...]
     contradictions: tuple[str, ...] = field(default=())
-    runs: int = 0  # Runs checked
+    runs: int = 0
 
     @property
     def is_sound(self) -> bool:

@@ -38,19 +38,30 @@ RATE = {"N m": "_rate_n_m_s"}
 
 @dataclass(frozen=True)
 class Missing:
-    """What cannot be identified, and the sensor that would change it."""
+    """What cannot be identified, and the sensor that would change it.
 
-    what: str  # What cannot be identified, a sentence
-    needed: str  # What to add, a sentence
+    Attributes:
+        what: What cannot be identified, a sentence.
+        needed: What to add, a sentence.
+    """
+
+    what: str
+    needed: str
 
 
 @dataclass(frozen=True)
 class Chain:
-    """The axes that an actuator drives, one after the other."""
+    """The axes that an actuator drives, one after the other.
 
-    actuator: Actuator  # What drives the first
-    axes: tuple[str, ...]  # Names of the axes
-    joints: tuple[Transmission, ...]  # The transmissions between them, one fewer
+    Attributes:
+        actuator: What drives the first.
+        axes: Names of the axes.
+        joints: The transmissions between them, one fewer.
+    """
+
+    actuator: Actuator
+    axes: tuple[str, ...]
+    joints: tuple[Transmission, ...]
 
 
 def equations(plant: Plant) -> tuple[Written, ...]:

@@ -51,29 +51,41 @@ class ResidualError(EstimationError):
 
 @dataclass(frozen=True)
 class RunResidual:
-    """The residual of a model in one run."""
+    """The residual of a model in one run.
 
-    run: Recording  # The run's filtered channels: the model's, its target and the variables'
-    estimate: FloatArray  # The model's estimate, shape (n,), in the target's unit
-    values: FloatArray  # Target less estimate, shape (n,)
+    Attributes:
+        run: The run's filtered channels: the model's, its target and the variables'.
+        estimate: The model's estimate, shape (n,), in the target's unit.
+        values: Target less estimate, shape (n,).
+    """
+
+    run: Recording
+    estimate: FloatArray
+    values: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Dependence of a residual on one variable."""
+    """Dependence of a residual on one variable.
 
-    variable: str  # Name of the variable, see `VARIABLES`
-    # Share of the residual's variance that a function of this variable, fitted on the other runs,
-    # explains; negative when the map makes it worse
+    Attributes:
+        variable: Name of the variable, see `VARIABLES`.
+        explained_fraction: Share of the residual's variance that a function of this variable,
+            fitted on the other runs, explains; negative when the map makes it worse.
+        chance_fraction: The largest such share that any variable reached on residuals shifted in
+            time and flipped run by run. A share that is not well above it is not significant.
+        amplitude: Size of the function: half its spread between the 5th and the 95th percentile of
+            the samples, or the amplitude of the ripple.
+        unit: Unit of the amplitude.
+        detail: Where it is largest, in words.
+    """
+
+    variable: str
     explained_fraction: float
-    # The largest such share that any variable reached on residuals shifted in time and flipped run
-    # by run. A share that is not well above it is not significant.
     chance_fraction: float
-    # Size of the function: half its spread between the 5th and the 95th percentile of the samples,
-    # or the amplitude of the ripple
     amplitude: float
-    unit: str  # Unit of the amplitude
-    detail: str  # Where it is largest, in words
+    unit: str
+    detail: str
 
     @property
     def stands_out(self) -> bool:
@@ -136,12 +148,19 @@ def centred(model: Model, values: Sequence[FloatArray]) -> list[FloatArray]:
 
 @dataclass(frozen=True)
 class Profile:
-    """A residual over one variable, for a figure."""
+    """A residual over one variable, for a figure.
 
-    label: str  # Name and unit of the variable
-    x: FloatArray  # The variable, all runs together, shape (n,); a motor angle within its turn
-    residual: FloatArray  # The residual as it was screened, its means removed, shape (n,)
-    unit: str  # Unit of the residual
+    Attributes:
+        label: Name and unit of the variable.
+        x: The variable, all runs together, shape (n,); a motor angle within its turn.
+        residual: The residual as it was screened, its means removed, shape (n,).
+        unit: Unit of the residual.
+    """
+
+    label: str
+    x: FloatArray
+    residual: FloatArray
+    unit: str
 
 
 def profile(model: Model, parts: Sequence[RunResidual], variable: str) -> Profile:

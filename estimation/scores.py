@@ -15,15 +15,23 @@ class ScoreError(EstimationError):
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Error of an estimate over n samples."""
+    """Error of an estimate over n samples.
 
-    samples: int  # Number of samples
-    mae: float  # Mean absolute error
-    p95: float  # 95th percentile of the absolute error
-    rmse: float  # Root mean square error
-    # Pearson's correlation of estimate and truth; NaN when one of them is constant
+    Attributes:
+        samples: Number of samples.
+        mae: Mean absolute error.
+        p95: 95th percentile of the absolute error.
+        rmse: Root mean square error.
+        pearson_r: Pearson's correlation of estimate and truth; NaN when one of them is constant.
+        spearman_rho: Spearman's rank correlation; NaN when one of them is constant.
+    """
+
+    samples: int
+    mae: float
+    p95: float
+    rmse: float
     pearson_r: float
-    spearman_rho: float  # Spearman's rank correlation; NaN when one of them is constant
+    spearman_rho: float
 
 
 def rmse(estimate: ArrayLike, truth: ArrayLike) -> float:

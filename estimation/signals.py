@@ -13,11 +13,17 @@ Samples = Literal["all", "motion", "closing"]
 
 @dataclass(frozen=True)
 class Share:
-    """What one channel adds to a combination: value x times / over."""
+    """What one channel adds to a combination: value x times / over.
 
-    channel: str  # A measured channel
-    times: float = 1.0  # Factor
-    over: float = 1.0  # Divisor, such as a gear ratio
+    Attributes:
+        channel: A measured channel.
+        times: Factor.
+        over: Divisor, such as a gear ratio.
+    """
+
+    channel: str
+    times: float = 1.0
+    over: float = 1.0
 
     @property
     def gain(self) -> float:
@@ -27,20 +33,32 @@ class Share:
 
 @dataclass(frozen=True)
 class Direction:
-    """A constant with the sign of a speed in a combination: size x tanh(speed / width)."""
+    """A constant with the sign of a speed in a combination: size x tanh(speed / width).
 
-    speed: str  # Channel of the speed
-    size: float  # The constant, in the unit of the combination
-    width: float  # Speed over which the sign changes
+    Attributes:
+        speed: Channel of the speed.
+        size: The constant, in the unit of the combination.
+        width: Speed over which the sign changes.
+    """
+
+    speed: str
+    size: float
+    width: float
 
 
 @dataclass(frozen=True)
 class Combination:
-    """A derived channel that is a weighted sum of measured ones."""
+    """A derived channel that is a weighted sum of measured ones.
 
-    name: str  # Channel name, ends in its unit
-    shares: tuple[Share, ...]  # What is summed
-    direction: Direction | None = None  # Nominal Coulomb friction, or None
+    Attributes:
+        name: Channel name, ends in its unit.
+        shares: What is summed.
+        direction: Nominal Coulomb friction, or None.
+    """
+
+    name: str
+    shares: tuple[Share, ...]
+    direction: Direction | None = None
 
     def gain(self, measured: str) -> float:
         """Return the change of the combination per change of a measured channel."""
@@ -49,12 +67,19 @@ class Combination:
 
 @dataclass(frozen=True)
 class Reading:
-    """What is stated of a sensor; None where nothing is."""
+    """What is stated of a sensor; None where nothing is.
 
-    noise: float | None = None  # Standard deviation of its white noise, in the unit of the channel
-    step: float | None = None  # One count, in the unit of the channel
-    rate_hz: float | None = None  # New values a second
-    delay_s: float | None = None  # Age of a value when it is recorded
+    Attributes:
+        noise: Standard deviation of its white noise, in the unit of the channel.
+        step: One count, in the unit of the channel.
+        rate_hz: New values a second.
+        delay_s: Age of a value when it is recorded.
+    """
+
+    noise: float | None = None
+    step: float | None = None
+    rate_hz: float | None = None
+    delay_s: float | None = None
 
     def age_s(self, sample_rate_hz: float) -> float:
         """Return the mean age of a recorded value, s; a slower sensor's is held until the next."""
@@ -64,16 +89,20 @@ class Reading:
 
 @dataclass(frozen=True)
 class Signals:
-    """The derived channels of a machine, when its parts are at rest, and its sensors."""
+    """The derived channels of a machine, when its parts are at rest, and its sensors.
 
-    combinations: tuple[Combination, ...] = ()  # Derived channels
-    # Channel of each speed that friction depends on, and the speed below which the part is at rest,
-    # in the unit of the channel. While a gearbox winds up the motor turns and the spindle stands
-    # still: an equation is static when the speed of its own friction is below the threshold. Slower
-    # than a share of the usual speed is at rest too, see `estimation.rest`, so 0 is a threshold
-    # that follows the data.
+    Attributes:
+        combinations: Derived channels.
+        rest: Channel of each speed that friction depends on, and the speed below which the part is
+            at rest, in the unit of the channel. While a gearbox winds up the motor turns and the
+            spindle stands still: an equation is static when the speed of its own friction is below
+            the threshold. Slower than a share of the usual speed is at rest too, see
+            `estimation.rest`, so 0 is a threshold that follows the data.
+        readings: What is stated of the sensors of some channels.
+    """
+
+    combinations: tuple[Combination, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
-    # What is stated of the sensors of some channels
     readings: Mapping[str, Reading] = field(default_factory=dict)
 
     def combination(self, name: str) -> Combination | None:

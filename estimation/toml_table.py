@@ -58,15 +58,23 @@ class Lines:
 
 @dataclass
 class Table:
-    """A TOML table that records which of its keys were read."""
+    """A TOML table that records which of its keys were read.
 
-    content: Mapping[str, Any]  # The table as `tomllib` reads it
-    where: str  # File and table, for messages
-    error: type[EstimationError] = TableError  # What is raised
-    # Lines of the file's tables and keys, for messages that name the line
+    Attributes:
+        content: The table as `tomllib` reads it.
+        where: File and table, for messages.
+        error: What is raised.
+        lines: Lines of the file's tables and keys, for messages that name the line.
+        place: The table's name in `lines`, and which one of that name.
+        file: The file, for messages that name a line.
+    """
+
+    content: Mapping[str, Any]
+    where: str
+    error: type[EstimationError] = TableError
     lines: Lines | None = None
-    place: tuple[str, int] = ("", 1)  # The table's name in `lines`, and which one of that name
-    file: str = ""  # The file, for messages that name a line
+    place: tuple[str, int] = ("", 1)
+    file: str = ""
     _read: list[str] = field(default_factory=list)
 
     def at(self, key: str = "") -> str:

@@ -34,14 +34,21 @@ FIRST = 5
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """The verdict of one run on the model."""
+    """The verdict of one run on the model.
 
-    name: str  # Name of the run
-    # Its error, in the unit of the target, its mean removed where offsets are a nuisance
+    Attributes:
+        name: Name of the run.
+        rmse: Its error, in the unit of the target, its mean removed where offsets are a nuisance.
+        usual: The error of the model's own fit; None while it is still being learnt.
+        statistic: The cumulative sum, in spreads.
+        since: First run that the model does not fit, or None while it fits.
+    """
+
+    name: str
     rmse: float
-    usual: float | None  # The error of the model's own fit; None while it is still being learnt
-    statistic: float  # The cumulative sum, in spreads
-    since: str | None  # First run that the model does not fit, or None while it fits
+    usual: float | None
+    statistic: float
+    since: str | None
 
     @property
     def fits(self) -> bool:

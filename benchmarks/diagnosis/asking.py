@@ -23,13 +23,21 @@ ONE_CORE = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of one call."""
+    """What came of one call.
 
-    report: dict[str, Any] | None  # The JSON answer, or None when there was none
-    message: str  # Why there was none
-    protocol: str | None  # Text of the proposed protocol, or None
-    cpu_s: float  # Processor time of the call, start of the interpreter included
-    wall_s: float  # Time on the clock
+    Attributes:
+        report: The JSON answer, or None when there was none.
+        message: Why there was none.
+        protocol: Text of the proposed protocol, or None.
+        cpu_s: Processor time of the call, start of the interpreter included.
+        wall_s: Time on the clock.
+    """
+
+    report: dict[str, Any] | None
+    message: str
+    protocol: str | None
+    cpu_s: float
+    wall_s: float
 
     def save(self, path: Path) -> None:
         """Write the answer; a reader never sees half of it."""
@@ -45,10 +53,15 @@ class Answer:
 
 @dataclass(frozen=True)
 class Rig:
-    """A `rig` executable."""
+    """A `rig` executable.
 
-    path: Path  # The executable; its own checkout is the version that is measured
-    name: str = ""  # What the version is called; its commit when empty
+    Attributes:
+        path: The executable; its own checkout is the version that is measured.
+        name: What the version is called; its commit when empty.
+    """
+
+    path: Path
+    name: str = ""
 
     @cached_property
     def version(self) -> str:

@@ -43,12 +43,19 @@ PAGE = Path("docs/results/diagnosis-numbers.md")
 
 @dataclass(frozen=True)
 class Searched:
-    """What a search came to."""
+    """What a search came to.
 
-    name: str  # The case
-    best: float  # Score of the best cause
-    scores: Mapping[str, float]  # Family to the score of its best cause, those above zero
-    families: Sequence[str]  # True families; none in a clean campaign
+    Attributes:
+        name: The case.
+        best: Score of the best cause.
+        scores: Family to the score of its best cause, those above zero.
+        families: True families; none in a clean campaign.
+    """
+
+    name: str
+    best: float
+    scores: Mapping[str, float]
+    families: Sequence[str]
 
 
 def main() -> int:

@@ -37,34 +37,46 @@ def write_recordings(folder: Path, recordings: Iterable[Recording]) -> None:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an answer is worth."""
+    """What an answer is worth.
 
-    # Whether the answer is what the case asks for; None where nobody knows the answer
+    Attributes:
+        right: Whether the answer is what the case asks for; None where nobody knows the answer.
+        sure_and_wrong: Whether a wrong statement was made with a confidence of `SURE` or more.
+        extra: Wrong names in addition to the hidden effects.
+        equations: Equations in which a hidden effect was named rightly.
+        note: What the answer came to, in words.
+    """
+
     right: bool | None
-    # Whether a wrong statement was made with a confidence of `SURE` or more
     sure_and_wrong: bool = False
-    extra: int = 0  # Wrong names in addition to the hidden effects
-    equations: tuple[str, ...] = ()  # Equations in which a hidden effect was named rightly
-    note: str = ""  # What the answer came to, in words
+    extra: int = 0
+    equations: tuple[str, ...] = ()
+    note: str = ""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Recordings with a known answer. A generator is anything that yields these."""
+    """Recordings with a known answer. A generator is anything that yields these.
 
-    name: str  # Unique in its generator; names the file of the answer
-    kind: str  # One of `KINDS`, or `MACHINE`
-    write: Callable[[Path], None]  # Writes the recordings into an empty folder
-    # Judges an answer; it may raise KeyError for an answer that breaks the contract
+    Attributes:
+        name: Unique in its generator; names the file of the answer.
+        kind: One of `KINDS`, or `MACHINE`.
+        write: Writes the recordings into an empty folder.
+        judge: Judges an answer; it may raise KeyError for an answer that breaks the contract.
+        write_without: Writes the same campaign without the hidden effects (same rig, same noise),
+            or None where nothing simulates it. The residual of the declared model there is the
+            denominator of the error ratio.
+        write_next: Plays a proposed protocol (first path, a file) on the same rig and writes the
+            new runs into the folder of the old ones (second path); None where nothing can.
+        judge_next: Judges the answer about old and new runs together.
+        options: Further words of the command line, such as a model; `{case}` is the folder.
+    """
+
+    name: str
+    kind: str
+    write: Callable[[Path], None]
     judge: Callable[[Report], Judgement]
-    # Writes the same campaign without the hidden effects (same rig, same noise), or None where
-    # nothing simulates it. The residual of the declared model there is the denominator of the error
-    # ratio.
     write_without: Callable[[Path], None] | None = None
-    # Plays a proposed protocol (first path, a file) on the same rig and writes the new runs into
-    # the folder of the old ones (second path); None where nothing can
     write_next: Callable[[Path, Path], None] | None = None
-    # Judges the answer about old and new runs together
     judge_next: Callable[[Report], Judgement] | None = None
-    # Further words of the command line, such as a model; `{case}` is the folder
     options: Sequence[str] = ()

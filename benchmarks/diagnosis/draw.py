@@ -54,15 +54,25 @@ WRIST_COUNTS = 8192
 
 @dataclass(frozen=True)
 class Answer:
-    """What is hidden in a case."""
+    """What is hidden in a case.
 
-    case: str  # Name of its folder
-    kind: str  # One of `KINDS`
-    effects: tuple[HiddenEffect, ...]  # The hidden effects; none in a clean case
-    runs: tuple[int, ...]  # Places of the runs that have them
-    excitation: str = "usual"  # One of `EXCITATIONS`
-    chain: str = "plain"  # One of `CHAINS`
-    either: tuple[str, ...] = ()  # For a confounded case: families that its runs cannot distinguish
+    Attributes:
+        case: Name of its folder.
+        kind: One of `KINDS`.
+        effects: The hidden effects; none in a clean case.
+        runs: Places of the runs that have them.
+        excitation: One of `EXCITATIONS`.
+        chain: One of `CHAINS`.
+        either: For a confounded case: families that its runs cannot distinguish.
+    """
+
+    case: str
+    kind: str
+    effects: tuple[HiddenEffect, ...]
+    runs: tuple[int, ...]
+    excitation: str = "usual"
+    chain: str = "plain"
+    either: tuple[str, ...] = ()
 
     def in_run(self, index: int) -> tuple[HiddenEffect, ...]:
         """Return the effects of one run, as strong as they are there."""

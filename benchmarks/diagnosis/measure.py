@@ -19,23 +19,36 @@ from estimation.files import write_text_atomic
 
 @dataclass(frozen=True)
 class Row:
-    """What one case came to."""
+    """What one case came to.
 
-    case: str  # Name of the case
-    kind: str  # Its class
-    right: bool | None  # Whether the answer was right; None where nobody knows
-    sure_and_wrong: bool  # Whether a wrong statement was made surely
-    extra: int  # Wrong names in addition to the right ones
-    named: list[str]  # What was stated, finding by finding
-    # Error on the test runs over the error of the declared model on the same campaign without the
-    # effects, the worst of the rightly named equations; None where not known
+    Attributes:
+        case: Name of the case.
+        kind: Its class.
+        right: Whether the answer was right; None where nobody knows.
+        sure_and_wrong: Whether a wrong statement was made surely.
+        extra: Wrong names in addition to the right ones.
+        named: What was stated, finding by finding.
+        ratio: Error on the test runs over the error of the declared model on the same campaign
+            without the effects, the worst of the rightly named equations; None where not known.
+        solved: Whether the answer was right after the proposed runs; None where none were played.
+        cpu_s: Processor time of the first call.
+        wall_s: Its time on the clock.
+        failed: Whether there was no answer.
+        note: What the answer came to, or why there was none.
+    """
+
+    case: str
+    kind: str
+    right: bool | None
+    sure_and_wrong: bool
+    extra: int
+    named: list[str]
     ratio: float | None
-    # Whether the answer was right after the proposed runs; None where none were played
     solved: bool | None
-    cpu_s: float  # Processor time of the first call
-    wall_s: float  # Its time on the clock
-    failed: bool  # Whether there was no answer
-    note: str  # What the answer came to, or why there was none
+    cpu_s: float
+    wall_s: float
+    failed: bool
+    note: str
 
 
 def measure(

@@ -71,11 +71,17 @@ stands where nobody knows the answer.""",
 
 @dataclass(frozen=True)
 class Measured:
-    """What was measured."""
+    """What was measured.
 
-    version: str  # Commit that was measured
-    generator: str  # Name of the generator
-    seed: int | None = None  # Seed of the draw, or None for a generator without one
+    Attributes:
+        version: Commit that was measured.
+        generator: Name of the generator.
+        seed: Seed of the draw, or None for a generator without one.
+    """
+
+    version: str
+    generator: str
+    seed: int | None = None
 
 
 def append(page: Path, measured: Measured, rows: Sequence[Row]) -> None:

@@ -26,24 +26,34 @@ one."""
 
 @dataclass(frozen=True)
 class Hidden:
-    """One hidden effect, as an answer is held against it."""
+    """One hidden effect, as an answer is held against it.
 
-    # Its family, and those that no sensor of the rig distinguishes from it
+    Attributes:
+        families: Its family, and those that no sensor of the rig distinguishes from it.
+        equations: Equations in which it shows.
+        variables: For what no catalogue holds: groups of variables that mean the same on one rig;
+            each must be named, and no other.
+    """
+
     families: Collection[str]
-    equations: Collection[str]  # Equations in which it shows
-    # For what no catalogue holds: groups of variables that mean the same on one rig; each must be
-    # named, and no other
+    equations: Collection[str]
     variables: Sequence[Collection[str]] = ()
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden in a case."""
+    """What is hidden in a case.
 
-    kind: str  # Kind of the case
-    hidden: Sequence[Hidden]  # The effects; none in a clean case
-    runs: Collection[str]  # Names of the runs that have them
-    # In a confounded case: families that its runs cannot distinguish; else empty
+    Attributes:
+        kind: Kind of the case.
+        hidden: The effects; none in a clean case.
+        runs: Names of the runs that have them.
+        either: In a confounded case: families that its runs cannot distinguish; else empty.
+    """
+
+    kind: str
+    hidden: Sequence[Hidden]
+    runs: Collection[str]
     either: Collection[str] = ()
 
 

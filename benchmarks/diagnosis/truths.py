@@ -23,18 +23,25 @@ def same_on_one_rig(variable: str) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Truth:
-    """The answer to one hidden effect."""
+    """The answer to one hidden effect.
 
-    family: str  # Catalogue id, or `unknown` for what no catalogue holds
-    equations: frozenset[str]  # Equations in which it shows
-    accepted: frozenset[str] = frozenset()  # Families that cannot be distinguished from it
-    # For `unknown`: one word of each group, and no other, is right
+    Attributes:
+        family: Catalogue id, or `unknown` for what no catalogue holds.
+        equations: Equations in which it shows.
+        accepted: Families that cannot be distinguished from it.
+        depends_on: For `unknown`: one word of each group, and no other, is right.
+        scale: Strength of a strong case; 1 unless the effect is faint or loud on this rig.
+        needs: Excitation that shows it, one of `EXCITATIONS`.
+        course: How it changes from run to run: empty for alike in all, `comes` with one run and
+            stays, or `fades`.
+    """
+
+    family: str
+    equations: frozenset[str]
+    accepted: frozenset[str] = frozenset()
     depends_on: tuple[frozenset[str], ...] = ()
-    # Strength of a strong case; 1 unless the effect is faint or loud on this rig
     scale: float = 1.0
-    needs: str = "usual"  # Excitation that shows it, one of `EXCITATIONS`
-    # How it changes from run to run: empty for alike in all, `comes` with one run and stays, or
-    # `fades`
+    needs: str = "usual"
     course: str = ""
 
 

@@ -80,18 +80,26 @@ SENSOR_FAULTS: dict[str, tuple[Trip, int, int | None, float]] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of one fault."""
+    """Result of one fault.
 
-    kind: str  # What was injected
-    detected: bool  # Whether the program noticed
-    # Whether it said what it was: the trip's own code, an error, or counters that rise with this
-    # fault of the link alone. Where a protocol does not distinguish two faults, neither is named.
+    Attributes:
+        kind: What was injected.
+        detected: Whether the program noticed.
+        named: Whether it said what it was: the trip's own code, an error, or counters that rise
+            with this fault of the link alone. Where a protocol does not distinguish two faults,
+            neither is named.
+        mis_stamped: Samples whose counts are of another tick than their time stamp says.
+        safe_after_s: Virtual time from the fault, less the time it is allowed to last, to the safe
+            state; None where the rig rightly goes on.
+        crash: An error that is none of the project's own; empty for none.
+    """
+
+    kind: str
+    detected: bool
     named: bool
-    mis_stamped: int  # Samples whose counts are of another tick than their time stamp says
-    # Virtual time from the fault, less the time it is allowed to last, to the safe state; None
-    # where the rig rightly goes on
+    mis_stamped: int
     safe_after_s: float | None = None
-    crash: str = ""  # An error that is none of the project's own; empty for none
+    crash: str = ""
 
 
 class ScriptedRig:

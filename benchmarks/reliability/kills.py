@@ -40,10 +40,15 @@ with LogWriter(Path(sys.argv[1]), RunInfo("killed"), [stream]) as writer:
 
 @dataclass(frozen=True)
 class Killed:
-    """What one killed recorder left."""
+    """What one killed recorder left.
 
-    handed_over: int  # Samples the writer had been given
-    kept: int  # Samples in the repaired file
+    Attributes:
+        handed_over: Samples the writer had been given.
+        kept: Samples in the repaired file.
+    """
+
+    handed_over: int
+    kept: int
 
     @property
     def lost_s(self) -> float:

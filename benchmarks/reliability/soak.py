@@ -19,19 +19,30 @@ WATCHDOG_S = 0.05
 
 @dataclass(frozen=True)
 class Soak:
-    """Result of a soak test."""
+    """Result of a soak test.
 
-    where: str  # What the session ran on
-    duration_s: float  # Time of the rig, s
-    samples: int  # Samples read
-    lost: int  # Samples lost
-    troubles: str  # Counters of the link that are not 0, in words
-    elapsed_s: float  # Real time, s
-    processor_ratio: float  # Processor time of this process over real time
-    # Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being read and
-    # converted; None where time is virtual
+    Attributes:
+        where: What the session ran on.
+        duration_s: Time of the rig, s.
+        samples: Samples read.
+        lost: Samples lost.
+        troubles: Counters of the link that are not 0, in words.
+        elapsed_s: Real time, s.
+        processor_ratio: Processor time of this process over real time.
+        latency_ms: Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being
+            read and converted; None where time is virtual.
+        trip: What ended it before its time; empty for nothing.
+    """
+
+    where: str
+    duration_s: float
+    samples: int
+    lost: int
+    troubles: str
+    elapsed_s: float
+    processor_ratio: float
     latency_ms: tuple[float, ...] | None
-    trip: str  # What ended it before its time; empty for nothing
+    trip: str
 
 
 def soak(config_name: str, duration_s: float, where: str) -> Soak:

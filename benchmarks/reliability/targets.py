@@ -42,14 +42,20 @@ REFUSALS = (DriverError, RigError, EstimationError, CalibrationError)
 
 @dataclass(frozen=True)
 class Target:
-    """One decoder."""
+    """One decoder.
 
-    name: str  # What it decodes
-    seeds: Callable[[], list[bytes]]  # Makes good inputs, which are mutated
-    # Decodes an input and holds what it accepts against the oracle; returns whether it accepted
-    # anything, or raises one of `REFUSALS`
+    Attributes:
+        name: What it decodes.
+        seeds: Makes good inputs, which are mutated.
+        run: Decodes an input and holds what it accepts against the oracle; returns whether it
+            accepted anything, or raises one of `REFUSALS`.
+        share: How much of the inputs beyond the least it gets.
+    """
+
+    name: str
+    seeds: Callable[[], list[bytes]]
     run: Callable[[bytes], bool]
-    share: int  # How much of the inputs beyond the least it gets
+    share: int
 
 
 def _commands() -> list[bytes]:

@@ -29,13 +29,21 @@ class NoCaseError(RigError):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One simulated campaign with its answer."""
+    """One simulated campaign with its answer.
 
-    seed: int  # Its seed
-    kind: str  # One of `KINDS`
-    stage: Stage  # The rig, its protocol and sensors
-    switched: tuple[Switched, ...]  # The effects, with their amplitudes
-    truth: Truth  # The answer
+    Attributes:
+        seed: Its seed.
+        kind: One of `KINDS`.
+        stage: The rig, its protocol and sensors.
+        switched: The effects, with their amplitudes.
+        truth: The answer.
+    """
+
+    seed: int
+    kind: str
+    stage: Stage
+    switched: tuple[Switched, ...]
+    truth: Truth
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

@@ -19,25 +19,42 @@ MARGIN = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """One drawn effect."""
+    """One drawn effect.
 
-    place: str  # Part of the machine, in words
-    family: str  # What a diagnosis should call it; `unknown` outside the catalogue
-    variables: tuple[str, ...]  # What it depends on, as a diagnosis calls it
-    part: Hidden | Fault  # The effect in the plant, or the fault of a sensor
-    guess: float  # Amplitude that a first trial takes, in the unit of its place
-    synonyms: tuple[str, ...] = ()  # Families that name the same physics by another model of it
+    Attributes:
+        place: Part of the machine, in words.
+        family: What a diagnosis should call it; `unknown` outside the catalogue.
+        variables: What it depends on, as a diagnosis calls it.
+        part: The effect in the plant, or the fault of a sensor.
+        guess: Amplitude that a first trial takes, in the unit of its place.
+        synonyms: Families that name the same physics by another model of it.
+    """
+
+    place: str
+    family: str
+    variables: tuple[str, ...]
+    part: Hidden | Fault
+    guess: float
+    synonyms: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """Where the plant goes without effects: what tables are laid out over."""
+    """Where the plant goes without effects: what tables are laid out over.
 
-    low: Mapping[str, float]  # Variable to its half percent quantile
-    high: Mapping[str, float]  # Variable to its 99.5 % quantile
-    usual: Mapping[str, float]  # Variable to the median of its size, without sign
-    duration_s: float  # Of a run
-    span_s: float  # Of the campaign
+    Attributes:
+        low: Variable to its half percent quantile.
+        high: Variable to its 99.5 % quantile.
+        usual: Variable to the median of its size, without sign.
+        duration_s: Of a run.
+        span_s: Of the campaign.
+    """
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    usual: Mapping[str, float]
+    duration_s: float
+    span_s: float
 
     def size(self, variable: str) -> float:
         """Return the largest usual size of a variable, without sign."""

@@ -17,17 +17,25 @@ KINDS = ("function", "delay", "lag", "creep")
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One fault of one sensor."""
+    """One fault of one sensor.
 
-    reading: str  # Channel of the sensor
-    # One of `KINDS`: amplitude x table(source); late by the amplitude, s; behind a lag of the
-    # amplitude, s; a share of the amplitude that comes slowly
+    Attributes:
+        reading: Channel of the sensor.
+        kind: One of `KINDS`: amplitude x table(source); late by the amplitude, s; behind a lag of
+            the amplitude, s; a share of the amplitude that comes slowly.
+        source: Channel that the table is over, its own or another one, or `run_time` or
+            `campaign_time`.
+        table: Of a function.
+        times_s: Of creep: its time constants.
+        weights: Of creep: the share of each.
+    """
+
+    reading: str
     kind: str
-    # Channel that the table is over, its own or another one, or `run_time` or `campaign_time`
     source: str = ""
-    table: Table | None = None  # Of a function
-    times_s: FloatArray = field(default_factory=lambda: np.empty(0))  # Of creep: its time constants
-    weights: FloatArray = field(default_factory=lambda: np.empty(0))  # Of creep: the share of each
+    table: Table | None = None
+    times_s: FloatArray = field(default_factory=lambda: np.empty(0))
+    weights: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 def error_of(

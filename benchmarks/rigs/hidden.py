@@ -54,22 +54,30 @@ TABLE_POINTS = 2048
 
 @dataclass(frozen=True, eq=False)
 class Hidden:
-    """One hidden effect of the plant."""
+    """One hidden effect of the plant.
 
-    place: str  # One of `PLACES`
-    operator: str  # One of `OPERATORS`
-    # Up to two factors; the first is the operator's variable where that has memory
+    Attributes:
+        place: One of `PLACES`.
+        operator: One of `OPERATORS`.
+        tables: Up to two factors; the first is the operator's variable where that has memory.
+        friction: Whether it is a level of friction, which takes the sign of its place's speed.
+        similar: Whether the table's width grows with the amplitude, as play's does.
+        reach: Of stops: how far each moves. Of relays: where each switches on, then off. Of lags:
+            time of each, s. Of Bouc-Wen: its reach, sharpness and share that loads.
+        weights: Of each element.
+        dwell_s: Time within which a rest counts, and slip, rad, that wears it off.
+        heat_s: Lag of the heat.
+    """
+
+    place: str
+    operator: str
     tables: tuple[Table, ...]
-    # Whether it is a level of friction, which takes the sign of its place's speed
     friction: bool = False
-    similar: bool = False  # Whether the table's width grows with the amplitude, as play's does
-    # Of stops: how far each moves. Of relays: where each switches on, then off. Of lags: time of
-    # each, s. Of Bouc-Wen: its reach, sharpness and share that loads.
+    similar: bool = False
     reach: FloatArray = field(default_factory=lambda: np.empty(0))
-    weights: FloatArray = field(default_factory=lambda: np.empty(0))  # Of each element
-    # Time within which a rest counts, and slip, rad, that wears it off
+    weights: FloatArray = field(default_factory=lambda: np.empty(0))
     dwell_s: tuple[float, float] = (1.0, 1.0)
-    heat_s: float = 5.0  # Lag of the heat
+    heat_s: float = 5.0
 
 
 class Rows(NamedTuple):

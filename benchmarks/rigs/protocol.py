@@ -34,27 +34,44 @@ class LoadUnit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """One run as it is asked for."""
+    """One run as it is asked for.
 
-    name: str  # Name of the run
-    # Angle, speed and acceleration of the spindle at 1 kHz from the lead on, (n, 3)
+    Attributes:
+        name: Name of the run.
+        setpoints: Angle, speed and acceleration of the spindle at 1 kHz from the lead on, (n, 3).
+        level_n_m: Load torque asked for, without the unit's spring, shape (n,).
+        load: The load unit in this run.
+        conditions: As a recording states them.
+        start_s: Campaign time of the run's first sample.
+        jumps: 0 or 1, switched at random times, shape (n,).
+    """
+
+    name: str
     setpoints: FloatArray
-    level_n_m: FloatArray  # Load torque asked for, without the unit's spring, shape (n,)
-    load: LoadUnit  # The load unit in this run
-    conditions: Mapping[str, float | str]  # As a recording states them
-    start_s: float  # Campaign time of the run's first sample
-    jumps: FloatArray  # 0 or 1, switched at random times, shape (n,)
+    level_n_m: FloatArray
+    load: LoadUnit
+    conditions: Mapping[str, float | str]
+    start_s: float
+    jumps: FloatArray
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """How a campaign was made up."""
+    """How a campaign was made up.
 
-    motions: tuple[str, ...]  # Kinds of motion, of `MOTIONS`
-    load: str  # One of `LOADS` or `SHAPED`
-    runs: int  # Number of runs
-    duration_s: float  # Of each
-    levels: int  # Number of load levels
+    Attributes:
+        motions: Kinds of motion, of `MOTIONS`.
+        load: One of `LOADS` or `SHAPED`.
+        runs: Number of runs.
+        duration_s: Of each.
+        levels: Number of load levels.
+    """
+
+    motions: tuple[str, ...]
+    load: str
+    runs: int
+    duration_s: float
+    levels: int
 
 
 def draw_protocol(

@@ -37,21 +37,32 @@ def declared(equation: str) -> Model:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """One run's filtered channels and the samples that each equation counts."""
+    """One run's filtered channels and the samples that each equation counts.
 
-    # Channel to values at the full rate, filtered without lag, shape (n,)
+    Attributes:
+        channels: Channel to values at the full rate, filtered without lag, shape (n,).
+        places: Equation to the samples that are regressed on.
+    """
+
     channels: Mapping[str, FloatArray]
-    places: Mapping[str, NDArray[np.intp]]  # Equation to the samples that are regressed on
+    places: Mapping[str, NDArray[np.intp]]
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A declared equation fitted on a campaign."""
+    """A declared equation fitted on a campaign.
 
-    equation: str  # One of `EQUATIONS`
-    widths: tuple[float, ...]  # Width of the friction's sign, where there is one
-    weights: FloatArray  # Of the declared columns, signed
-    residuals: tuple[FloatArray, ...]  # What is left of each run, its mean removed, shape (n,)
+    Attributes:
+        equation: One of `EQUATIONS`.
+        widths: Width of the friction's sign, where there is one.
+        weights: Of the declared columns, signed.
+        residuals: What is left of each run, its mean removed, shape (n,).
+    """
+
+    equation: str
+    widths: tuple[float, ...]
+    weights: FloatArray
+    residuals: tuple[FloatArray, ...]
 
     def rms(self, runs: Sequence[int] | None = None) -> float:
         """Return the root mean square over some runs, all when None."""

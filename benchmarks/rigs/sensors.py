@@ -33,26 +33,41 @@ FORERUN_S = 3.0
 
 @dataclass(frozen=True)
 class Reading:
-    """One sensor, SI units."""
+    """One sensor, SI units.
 
-    quantum: float  # Step of its converter
-    white: float = 0.0  # Standard deviation of its white noise
-    colour: float = 0.0  # Standard deviation of its coloured noise
-    colour_s: float = 0.05  # Time within which that forgets
-    walk: float = 0.0  # Random walk of its zero: standard deviation after 1 s
-    offset: float = 0.0  # Zero of the campaign
-    offset_width: float = 0.0  # Standard deviation of each run's own zero about that
-    lag_s: float = 0.0  # First-order lag
+    Attributes:
+        quantum: Step of its converter.
+        white: Standard deviation of its white noise.
+        colour: Standard deviation of its coloured noise.
+        colour_s: Time within which that forgets.
+        walk: Random walk of its zero: standard deviation after 1 s.
+        offset: Zero of the campaign.
+        offset_width: Standard deviation of each run's own zero about that.
+        lag_s: First-order lag.
+    """
+
+    quantum: float
+    white: float = 0.0
+    colour: float = 0.0
+    colour_s: float = 0.05
+    walk: float = 0.0
+    offset: float = 0.0
+    offset_width: float = 0.0
+    lag_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class Chain:
-    """All sensors of a rig."""
+    """All sensors of a rig.
 
-    readings: tuple[Reading, ...]  # One for each of `READINGS`
-    # How late each device's clock dates what it reads
+    Attributes:
+        readings: One for each of `READINGS`.
+        skew_s: How late each device's clock dates what it reads.
+        rate: How much faster each device's clock runs, as a share.
+    """
+
+    readings: tuple[Reading, ...]
     skew_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    # How much faster each device's clock runs, as a share
     rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property

@@ -36,10 +36,14 @@ class Switched:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """What the plant did in one run, from the lead on."""
+    """What the plant did in one run, from the lead on.
 
-    true: FloatArray  # Columns as the compiled loop's, shape (n, 8)
-    # What each effect adds at its place, and a pulley's torque, shape (n, 2 x most)
+    Attributes:
+        true: Columns as the compiled loop's, shape (n, 8).
+        added: What each effect adds at its place, and a pulley's torque, shape (n, 2 x most).
+    """
+
+    true: FloatArray
     added: FloatArray
 
 
@@ -53,17 +57,26 @@ class UnstableError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A rig, its protocol and its sensors."""
+    """A rig, its protocol and its sensors.
 
-    plant: Plant  # The rig
-    controller: tuple[str, Controller]  # Kind and gains
-    protocol: Protocol  # How its runs were made up
-    plans: tuple[Plan, ...]  # The runs
-    chain: Chain  # The sensors
-    seed: int  # Seed of the noise
-    # Runs without effects that were played
+    Attributes:
+        plant: The rig.
+        controller: Kind and gains.
+        protocol: How its runs were made up.
+        plans: The runs.
+        chain: The sensors.
+        seed: Seed of the noise.
+        clean: Runs without effects that were played.
+        noise: Noise of runs that was drawn.
+    """
+
+    plant: Plant
+    controller: tuple[str, Controller]
+    protocol: Protocol
+    plans: tuple[Plan, ...]
+    chain: Chain
+    seed: int
     clean: dict[int, Moved] = field(default_factory=dict, repr=False)
-    # Noise of runs that was drawn
     noise: dict[int, tuple[FloatArray, ...]] = field(default_factory=dict, repr=False)
 
     def moved(self, index: int, switched: Sequence[Switched] = ()) -> Moved:

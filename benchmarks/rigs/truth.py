@@ -10,37 +10,53 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class HiddenTruth:
-    """One hidden effect of a case."""
+    """One hidden effect of a case.
 
-    place: str  # Part of the machine: motor shaft, gear, spindle, cable, jaw, pulley, or a sensor
-    family: str  # What it should be called; `unknown` outside the catalogue
-    variables: tuple[str, ...]  # What it depends on
-    runs: tuple[int, ...]  # Places of the runs that have it
-    # Residual of the declared equation that shows it best, root mean square over those runs, with
-    # this effect over that without any
+    Attributes:
+        place: Part of the machine: motor shaft, gear, spindle, cable, jaw, pulley, or a sensor.
+        family: What it should be called; `unknown` outside the catalogue.
+        variables: What it depends on.
+        runs: Places of the runs that have it.
+        strength: Residual of the declared equation that shows it best, root mean square over those
+            runs, with this effect over that without any.
+        equation: That equation.
+        recipe: What it was drawn by, for people.
+        amplitude: Its amplitude, in the unit of its place.
+        synonyms: Families that name the same physics by another model of it.
+    """
+
+    place: str
+    family: str
+    variables: tuple[str, ...]
+    runs: tuple[int, ...]
     strength: float
-    equation: str  # That equation
-    recipe: str  # What it was drawn by, for people
-    amplitude: float  # Its amplitude, in the unit of its place
-    synonyms: tuple[str, ...] = ()  # Families that name the same physics by another model of it
+    equation: str
+    recipe: str
+    amplitude: float
+    synonyms: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is hidden in a case, and the residual of a perfect answer."""
+    """What is hidden in a case, and the residual of a perfect answer.
 
-    effects: tuple[HiddenTruth, ...]  # The hidden effects; none in a clean case
-    # Equation to the residual of its declared structure without any effect, root mean square over
-    # all runs, in the unit of its target
+    Attributes:
+        effects: The hidden effects; none in a clean case.
+        clean_rms: Equation to the residual of its declared structure without any effect, root mean
+            square over all runs, in the unit of its target.
+        with_rms: The same with the effects.
+        oracle_rms: The same with the effects, the true structure fitted with the declared one.
+        columns: Equation to the true structure's own columns, one array (n, effects) a run, in the
+            target's unit, filtered as the equation's channels are, at every sample.
+        together: In a confounded case: the families that reproduce the effect to within noise on
+            these runs, the true one among them; else empty.
+    """
+
+    effects: tuple[HiddenTruth, ...]
     clean_rms: Mapping[str, float]
-    with_rms: Mapping[str, float]  # The same with the effects
-    # The same with the effects, the true structure fitted with the declared one
+    with_rms: Mapping[str, float]
     oracle_rms: Mapping[str, float]
-    # Equation to the true structure's own columns, one array (n, effects) a run, in the target's
-    # unit, filtered as the equation's channels are, at every sample
     columns: Mapping[str, tuple[FloatArray, ...]]
-    # In a confounded case: the families that reproduce the effect to within noise on these runs,
-    # the true one among them; else empty
     together: tuple[str, ...] = ()
 
     @property

@@ -27,15 +27,23 @@ SPEEDS_RAD_S = (0.5, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class CurrentSession:
-    """Calibrate the motor's current as a torque sensor."""
+    """Calibrate the motor's current as a torque sensor.
 
-    loads_a: tuple[float, ...] = LOADS_A  # Loads to move against
-    speeds_rad_s: tuple[float, ...] = SPEEDS_RAD_S  # Speeds of the spindle
-    repeats: int = 1  # Number of moves of each
-    # Torque constant of the data sheet; with the ratio gives an efficiency
+    Attributes:
+        loads_a: Loads to move against.
+        speeds_rad_s: Speeds of the spindle.
+        repeats: Number of moves of each.
+        motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
+        gear_ratio: Ratio of the gear by its label.
+        residual_limit: Greatest residual that passes, share of the span of torque.
+    """
+
+    loads_a: tuple[float, ...] = LOADS_A
+    speeds_rad_s: tuple[float, ...] = SPEEDS_RAD_S
+    repeats: int = 1
     motor_constant_n_m_a: float | None = None
-    gear_ratio: float = 35.0  # Ratio of the gear by its label
-    residual_limit: float = 0.1  # Greatest residual that passes, share of the span of torque
+    gear_ratio: float = 35.0
+    residual_limit: float = 0.1
 
     kind = "current"
     devices = ("logger",)

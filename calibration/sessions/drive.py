@@ -28,11 +28,17 @@ MOST_LATE = 6
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCurrentSession:
-    """Calibrate the current of an unloaded drive."""
+    """Calibrate the current of an unloaded drive.
 
-    speeds_rad_s: tuple[float, ...]  # Speeds of the shaft; at least two
-    repeats: int = 1  # Number of moves of each
-    motor_constant_n_m_a: float | None = None  # Torque at the shaft an ampere, by the data sheet
+    Attributes:
+        speeds_rad_s: Speeds of the shaft; at least two.
+        repeats: Number of moves of each.
+        motor_constant_n_m_a: Torque at the shaft an ampere, by the data sheet.
+    """
+
+    speeds_rad_s: tuple[float, ...]
+    repeats: int = 1
+    motor_constant_n_m_a: float | None = None
 
     kind = "current"
     devices = ("logger",)

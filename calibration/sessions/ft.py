@@ -27,13 +27,18 @@ POSES = (
 
 @dataclass(frozen=True, kw_only=True)
 class FtSession:
-    """Calibrate a force sensor's bias and tool."""
+    """Calibrate a force sensor's bias and tool.
 
-    # Directions of gravity in the sensor's axes
+    Attributes:
+        poses: Directions of gravity in the sensor's axes.
+        repeats: Number of rounds; three separate sensor errors from inaccurate poses.
+        jaw_m: The jaw, from the sensor's origin.
+        jaw_turn_rad: Turns of the jaw's frame about the sensor's x, y and z, in that order.
+    """
+
     poses: tuple[tuple[float, float, float], ...] = POSES
-    repeats: int = 1  # Number of rounds; three separate sensor errors from inaccurate poses
-    jaw_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # The jaw, from the sensor's origin
-    # Turns of the jaw's frame about the sensor's x, y and z, in that order
+    repeats: int = 1
+    jaw_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     jaw_turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     kind = "ft"

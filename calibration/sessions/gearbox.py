@@ -35,13 +35,21 @@ Twist = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class GearboxSession:
-    """Calibrate the gear's twist."""
+    """Calibrate the gear's twist.
 
-    loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)  # Loads of both signs
-    speeds_rad_s: tuple[float, ...] = (0.5, 0.7)  # Speeds of the spindle
-    repeats: int = 1  # Number of moves of each
-    gear_ratio: float = 35.0  # Motor turns a turn of the spindle
-    stiffness_only: bool = False  # Model no backlash
+    Attributes:
+        loads_a: Loads of both signs.
+        speeds_rad_s: Speeds of the spindle.
+        repeats: Number of moves of each.
+        gear_ratio: Motor turns a turn of the spindle.
+        stiffness_only: Model no backlash.
+    """
+
+    loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)
+    speeds_rad_s: tuple[float, ...] = (0.5, 0.7)
+    repeats: int = 1
+    gear_ratio: float = 35.0
+    stiffness_only: bool = False
 
     kind = "gearbox"
     devices = ("logger",)

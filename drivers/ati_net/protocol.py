@@ -68,13 +68,20 @@ N_M_PER_UNIT = {1: 0.1129848290276167, 2: 1.3558179483314004, 3: 1.0, 4: 1e-3, 5
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Conversion of counts to forces and torques."""
+    """Conversion of counts to forces and torques.
 
-    force_unit: int  # Code of the force unit
-    torque_unit: int  # Code of the torque unit
-    counts_per_force: int  # Counts a unit of force
-    counts_per_torque: int  # Counts a unit of torque
-    # Divisors of the 16-bit readings of other interfaces
+    Attributes:
+        force_unit: Code of the force unit.
+        torque_unit: Code of the torque unit.
+        counts_per_force: Counts a unit of force.
+        counts_per_torque: Counts a unit of torque.
+        scale_factors: Divisors of the 16-bit readings of other interfaces.
+    """
+
+    force_unit: int
+    torque_unit: int
+    counts_per_force: int
+    counts_per_torque: int
     scale_factors: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
 
     def slopes(self) -> NDArray[np.float64]:

@@ -34,18 +34,29 @@ _CALIBRATION = struct.Struct(">8s32s4s20s144sBB24sII6H6H")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Conversion of gauges to forces and torques."""
+    """Conversion of gauges to forces and torques.
 
-    serial: str  # Serial number
-    part_number: str  # Part number
-    # Counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz
+    Attributes:
+        serial: Serial number.
+        part_number: Part number.
+        matrix: Counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz.
+        force_unit: Code of the force unit.
+        torque_unit: Code of the torque unit.
+        counts_per_force: Counts a unit of force.
+        counts_per_torque: Counts a unit of torque.
+        gains: To be copied to the active gains, shape (6,).
+        offsets: To be copied to the active offsets, shape (6,).
+    """
+
+    serial: str
+    part_number: str
     matrix: NDArray[np.float64]
-    force_unit: int  # Code of the force unit
-    torque_unit: int  # Code of the torque unit
-    counts_per_force: int  # Counts a unit of force
-    counts_per_torque: int  # Counts a unit of torque
-    gains: tuple[int, ...]  # To be copied to the active gains, shape (6,)
-    offsets: tuple[int, ...]  # To be copied to the active offsets, shape (6,)
+    force_unit: int
+    torque_unit: int
+    counts_per_force: int
+    counts_per_torque: int
+    gains: tuple[int, ...]
+    offsets: tuple[int, ...]
 
 
 def crc16(data: bytes) -> int:

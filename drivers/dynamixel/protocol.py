@@ -32,10 +32,15 @@ ERRORS = {
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """One entry of the control table."""
+    """One entry of the control table.
 
-    address: int  # Where it begins
-    size: int  # Bytes it has
+    Attributes:
+        address: Where it begins.
+        size: Bytes it has.
+    """
+
+    address: int
+    size: int
 
 
 OPERATING_MODE = Register(11, 1)
@@ -68,13 +73,21 @@ _PING_ANSWER = struct.Struct("<HB")
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """What the device measures."""
+    """What the device measures.
 
-    current: int  # Motor current, the model's units
-    velocity: int  # Speed of the horn, counts of 0.229 turns a minute
-    position: int  # Angle of the horn over all turns, 4096 counts a turn
-    voltage: int  # Supply, 0.1 V
-    temperature: int  # Degrees Celsius
+    Attributes:
+        current: Motor current, the model's units.
+        velocity: Speed of the horn, counts of 0.229 turns a minute.
+        position: Angle of the horn over all turns, 4096 counts a turn.
+        voltage: Supply, 0.1 V.
+        temperature: Degrees Celsius.
+    """
+
+    current: int
+    velocity: int
+    position: int
+    voltage: int
+    temperature: int
 
 
 def crc16(data: bytes) -> int:

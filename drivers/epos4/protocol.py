@@ -85,11 +85,17 @@ def state_of(statusword: int) -> State:
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What the drive sends at each SYNC."""
+    """What the drive sends at each SYNC.
 
-    statusword: int  # Its statusword
-    position_count: int  # Position, quadrature counts
-    torque_per_mille: int  # Averaged torque, per mille of the rated torque
+    Attributes:
+        statusword: Its statusword.
+        position_count: Position, quadrature counts.
+        torque_per_mille: Averaged torque, per mille of the rated torque.
+    """
+
+    statusword: int
+    position_count: int
+    torque_per_mille: int
 
 
 def encode_feedback(feedback: Feedback) -> bytes:
@@ -127,12 +133,19 @@ def decode_emergency(data: bytes) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Ratings:
-    """What the drive is set to, as read from it. Torques are the motor's, before any gearhead."""
+    """What the drive is set to, as read from it. Torques are the motor's, before any gearhead.
 
-    rated_torque_n_m: float  # Motor rated torque; torques are in thousandths of it
-    torque_constant_n_m_per_a: float  # Torque constant
-    nominal_current_a: float  # Nominal current
-    current_limit_a: float  # Output current limit, the one that takes effect
+    Attributes:
+        rated_torque_n_m: Motor rated torque; torques are in thousandths of it.
+        torque_constant_n_m_per_a: Torque constant.
+        nominal_current_a: Nominal current.
+        current_limit_a: Output current limit, the one that takes effect.
+    """
+
+    rated_torque_n_m: float
+    torque_constant_n_m_per_a: float
+    nominal_current_a: float
+    current_limit_a: float
 
     def __post_init__(self) -> None:
         for name in ("rated_torque_n_m", "torque_constant_n_m_per_a", "current_limit_a"):

@@ -52,16 +52,27 @@ FAULTS = {
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What a controller answers in every cycle."""
+    """What a controller answers in every cycle.
 
-    mode: int  # Its mode
-    position_rev: float  # Angle of the output, turns
-    velocity_rev_s: float  # Speed of the output, turns a second
-    torque_n_m: float  # Torque at the output
-    current_a: float  # Motor current in quadrature
-    voltage: int  # Supply, 0.5 V
-    temperature: int  # Board, degrees Celsius
-    fault: int  # Its fault code
+    Attributes:
+        mode: Its mode.
+        position_rev: Angle of the output, turns.
+        velocity_rev_s: Speed of the output, turns a second.
+        torque_n_m: Torque at the output.
+        current_a: Motor current in quadrature.
+        voltage: Supply, 0.5 V.
+        temperature: Board, degrees Celsius.
+        fault: Its fault code.
+    """
+
+    mode: int
+    position_rev: float
+    velocity_rev_s: float
+    torque_n_m: float
+    current_a: float
+    voltage: int
+    temperature: int
+    fault: int
 
 
 STATE_QUESTION = bytes([0x11, MODE, 0x1F, POSITION, 0x13, VOLTAGE, 0x1D, CURRENT])

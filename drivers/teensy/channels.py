@@ -14,10 +14,15 @@ ADC_BITS = 12
 
 @dataclass(frozen=True, slots=True)
 class TeensyChannel:
-    """The counts of one field of a sample."""
+    """The counts of one field of a sample.
 
-    field: str  # Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`
-    channel: Channel  # Name, rate and range
+    Attributes:
+        field: Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`.
+        channel: Name, rate and range.
+    """
+
+    field: str
+    channel: Channel
 
     def values(self, samples: NDArray[np.void]) -> NDArray[np.float64]:
         """Return the counts in samples of shape (n,), float64 of shape (n,)."""

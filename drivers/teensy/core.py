@@ -57,13 +57,19 @@ def firmware_library() -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class BoardStart:
-    """How a board was started."""
+    """How a board was started.
 
-    serial: str = "SIM-0001"  # Serial number the board gives
-    tick_us: int = 0  # Device clock at the first tick
-    boot: int = 1  # Number of this start of the board
-    # Whether the encoder counts have their zeros and the motors are cold, as on a simulated rig; a
-    # real board is started with neither
+    Attributes:
+        serial: Serial number the board gives.
+        tick_us: Device clock at the first tick.
+        boot: Number of this start of the board.
+        simulated: Whether the encoder counts have their zeros and the motors are cold, as on a
+            simulated rig; a real board is started with neither.
+    """
+
+    serial: str = "SIM-0001"
+    tick_us: int = 0
+    boot: int = 1
     simulated: bool = True
 
 

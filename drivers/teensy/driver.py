@@ -27,21 +27,32 @@ from drivers.transport.transport import Transport
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampleBatch:
-    """Samples in device order."""
+    """Samples in device order.
 
-    samples: NDArray[np.void]  # `SAMPLE_DTYPE`, shape (n,); raw counts
-    # Device clock without its wrap, microseconds since its last zero, shape (n,), int64
+    Attributes:
+        samples: `SAMPLE_DTYPE`, shape (n,); raw counts.
+        tick_us: Device clock without its wrap, microseconds since its last zero, shape (n,), int64.
+        lost: Samples lost since `start`, up to the end of this batch. None is made up for.
+    """
+
+    samples: NDArray[np.void]
     tick_us: NDArray[np.int64]
-    lost: int  # Samples lost since `start`, up to the end of this batch. None is made up for.
+    lost: int
 
 
 @dataclass(frozen=True, slots=True)
 class ClockExchange:
-    """One look at the board's clock."""
+    """One look at the board's clock.
 
-    sent_s: float  # Host clock when the ping left
-    received_s: float  # Host clock when the pong was read
-    tick_us: int  # Board clock in between, modulo 2^32
+    Attributes:
+        sent_s: Host clock when the ping left.
+        received_s: Host clock when the pong was read.
+        tick_us: Board clock in between, modulo 2^32.
+    """
+
+    sent_s: float
+    received_s: float
+    tick_us: int
 
 
 class TeensyLogger:

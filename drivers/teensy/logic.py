@@ -17,13 +17,16 @@ STATE, ENGAGED = range(2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """All that a tick of the plain board needs and changes, besides its inputs."""
+    """All that a tick of the plain board needs and changes, besides its inputs.
 
-    # See the places above; changed in place
+    Attributes:
+        state: See the places above; changed in place.
+        control_state: State of each controller, shape (motors, 4); changed in place.
+        gains: Gains of each controller, shape (motors, 5).
+    """
+
     state: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
-    # State of each controller, shape (motors, 4); changed in place
     control_state: NDArray[np.float64] = field(default_factory=lambda: new_state()[None])
-    # Gains of each controller, shape (motors, 5)
     gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros((1, 5)))
 
     @classmethod
@@ -53,12 +56,18 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class BoardLogic:
-    """One profile's logic."""
+    """One profile's logic.
 
-    profile: Profile  # The profile
-    columns: Mapping[str, int]  # Field of a sample to the column of a tick's row
-    status_column: int  # Column of the board's state
-    # Column of each converter to the counts from which down and up it is saturated
+    Attributes:
+        profile: The profile.
+        columns: Field of a sample to the column of a tick's row.
+        status_column: Column of the board's state.
+        converted: Column of each converter to the counts from which down and up it is saturated.
+    """
+
+    profile: Profile
+    columns: Mapping[str, int]
+    status_column: int
     converted: Mapping[int, tuple[int, int]]
 
     def samples(self, counts: NDArray[np.int32]) -> NDArray[Any]:

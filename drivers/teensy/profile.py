@@ -50,19 +50,31 @@ class ArmLimits(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A kind of board, as described by its frames."""
+    """A kind of board, as described by its frames.
 
-    name: str  # Its name: in the host library, in messages, in configurations
-    title: str  # First line of the contract
-    tick_us: int  # Period of a control tick and of a sample, microseconds
-    sample: np.dtype[np.void]  # Layout of a sample
-    arm: np.dtype[np.void]  # Layout of the arm command: header, gains, limits
-    setpoint: np.dtype[np.void]  # Layout of one setpoint, one field a motor
-    max_setpoints: int  # Most setpoints in one frame
-    motors: int  # Motors with a position loop
-    # Fields of a sample that the guards check, in the order of their channels
+    Attributes:
+        name: Its name: in the host library, in messages, in configurations.
+        title: First line of the contract.
+        tick_us: Period of a control tick and of a sample, microseconds.
+        sample: Layout of a sample.
+        arm: Layout of the arm command: header, gains, limits.
+        setpoint: Layout of one setpoint, one field a motor.
+        max_setpoints: Most setpoints in one frame.
+        motors: Motors with a position loop.
+        input_names: Fields of a sample that the guards check, in the order of their channels.
+        further_names: Fields a trip can name behind those.
+    """
+
+    name: str
+    title: str
+    tick_us: int
+    sample: np.dtype[np.void]
+    arm: np.dtype[np.void]
+    setpoint: np.dtype[np.void]
+    max_setpoints: int
+    motors: int
     input_names: tuple[str, ...]
-    further_names: tuple[str, ...] = ()  # Fields a trip can name behind those
+    further_names: tuple[str, ...] = ()
 
     @property
     def rate_hz(self) -> float:

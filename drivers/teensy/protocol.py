@@ -203,14 +203,23 @@ TOP = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class TripReport:
-    """What a board tripped over first since it was cleared."""
+    """What a board tripped over first since it was cleared.
 
-    code: Trip  # What it was
-    channel: str  # Name of the count that crossed; empty where it was none
-    value: int  # That count; for the host's silence its length, us; for heat, counts^2 s
-    limit: int  # The crossed limit
-    tick_us: int  # Board clock at the trip
-    late_us: int  # How long the crossing had lasted by then
+    Attributes:
+        code: What it was.
+        channel: Name of the count that crossed; empty where it was none.
+        value: That count; for the host's silence its length, us; for heat, counts^2 s.
+        limit: The crossed limit.
+        tick_us: Board clock at the trip.
+        late_us: How long the crossing had lasted by then.
+    """
+
+    code: Trip
+    channel: str
+    value: int
+    limit: int
+    tick_us: int
+    late_us: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,13 +251,21 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """The board's answer to a command."""
+    """The board's answer to a command.
 
-    sequence: int  # Number of the command
-    command: int  # Kind of the command
-    result: int  # What became of it
-    status: int  # State of the board after it
-    queue_free: int  # Setpoints that still fit into the board's queue
+    Attributes:
+        sequence: Number of the command.
+        command: Kind of the command.
+        result: What became of it.
+        status: State of the board after it.
+        queue_free: Setpoints that still fit into the board's queue.
+    """
+
+    sequence: int
+    command: int
+    result: int
+    status: int
+    queue_free: int
 
 
 def version_text(version: int) -> str:

@@ -96,67 +96,105 @@ class Limits:
     """Limits that the board checks on every sample while armed, in counts.
 
     One that is not given is not held.
+
+    Attributes:
+        max_current: Largest size of the measured current, counts of 1 mA.
+        max_load_ma: Largest size of a load setpoint, mA; a larger one is refused.
+        max_proximal: Largest size of the proximal torque, counts.
+        max_distal: Largest size of the distal torque, counts.
+        min_spindle: Lowest spindle count, for the sample and for a setpoint.
+        max_spindle: Highest spindle count.
+        min_jaw: Lowest jaw count.
+        max_jaw: Highest jaw count.
+        continuous_load_ma: Load setpoint that warms the load motor no further, mA.
+        load_i2t: Heat above it that the load motor can take, mA^2 s.
+        max_motor_step: Fastest motor, counts a tick, in three ticks on end.
+        continuous_current: Current that warms the motor no further, counts.
+        i2t: Heat above it that the motor can take, counts^2 s: the integral of the measured current
+            squared less the continuous one squared, never below 0.
+        stall_current: Current, counts, above which a motor that does not move is stalled.
+        stall_motion: Motor counts within which it does not move.
+        max_motor_jump: Farthest the motor's count may go in one tick.
+        max_target_step: Farthest a setpoint may be from the one before it, counts; the first after
+            arming may be `max_following` from where the shaft stands.
+        max_following: Farthest the spindle may be from its target, counts.
+        following_ticks: How long it may be farther.
+        full_scale_current: Measured current at a command of 10000, counts, signed; 0 where current
+            and command are not compared.
+        current_offset: Measured current at a command of 0, counts.
+        max_current_error: Largest difference between measured and commanded current, counts.
+        current_ticks: Ticks over which that difference is averaged.
+        frozen_current: Change of the current, counts, behind which a motor that did not move has a
+            dead encoder.
+        frozen_motion: Motor counts within which it did not move.
+        motor_per_turn: Counts of the motor, signed, for a turn of the spindle; motor and spindle
+            are not compared where this is 0, jaw and spindle where `jaw_per_turn` is.
+        spindle_per_turn: Counts of the spindle, signed, for the same turn.
+        jaw_per_turn: Counts of the jaw, signed, for the same turn.
+        twist_e6: Counts the motor is ahead for 1e6 counts of proximal torque, signed.
+        stretch_e6: Counts the jaw is ahead for 1e6 counts of distal torque, signed.
+        max_twist: Largest span of what motor and spindle differ by otherwise, motor counts.
+        max_stretch: The same of jaw and spindle, jaw counts.
+        max_spindle_jump: Farthest the spindle's count may go in one tick.
+        max_jaw_jump: Farthest the jaw's count may go in one tick.
+        torque_e3: Proximal counts, signed, that 1000 counts of current make at rest; 0 where they
+            are not compared.
+        max_still_torque: Largest difference of both while the motor stands still, proximal counts.
+        stall_ticks: How long it may be stalled.
+        saturated_ticks: How long a torque or current count may be at the end of its range.
+        stale_ticks: How long a torque or current count may stay the same.
+        dry_ticks: How long the last setpoint is held while none follows.
+        watchdog_us: How long the host may be silent, 5 ms to 1 s.
+        safe_state: `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor;
+            any other crossing releases whatever is asked for.
+        hold_command_e4: Largest command while holding, 1e-4 of full scale.
+        hold_ticks: How long it may hold; then it releases.
     """
 
-    max_current: int = TOP  # Largest size of the measured current, counts of 1 mA
-    max_load_ma: int = TOP  # Largest size of a load setpoint, mA; a larger one is refused
-    max_proximal: int = TOP  # Largest size of the proximal torque, counts
-    max_distal: int = TOP  # Largest size of the distal torque, counts
-    min_spindle: int = -TOP - 1  # Lowest spindle count, for the sample and for a setpoint
-    max_spindle: int = TOP  # Highest spindle count
-    min_jaw: int = -TOP - 1  # Lowest jaw count
-    max_jaw: int = TOP  # Highest jaw count
-    continuous_load_ma: int = TOP  # Load setpoint that warms the load motor no further, mA
-    load_i2t: int = TOP  # Heat above it that the load motor can take, mA^2 s
-    max_motor_step: int = TOP  # Fastest motor, counts a tick, in three ticks on end
-    continuous_current: int = TOP  # Current that warms the motor no further, counts
-    # Heat above it that the motor can take, counts^2 s: the integral of the measured current
-    # squared less the continuous one squared, never below 0
+    max_current: int = TOP
+    max_load_ma: int = TOP
+    max_proximal: int = TOP
+    max_distal: int = TOP
+    min_spindle: int = -TOP - 1
+    max_spindle: int = TOP
+    min_jaw: int = -TOP - 1
+    max_jaw: int = TOP
+    continuous_load_ma: int = TOP
+    load_i2t: int = TOP
+    max_motor_step: int = TOP
+    continuous_current: int = TOP
     i2t: int = TOP
-    stall_current: int = TOP  # Current, counts, above which a motor that does not move is stalled
-    stall_motion: int = 0  # Motor counts within which it does not move
-    max_motor_jump: int = TOP  # Farthest the motor's count may go in one tick
-    # Farthest a setpoint may be from the one before it, counts; the first after arming may be
-    # `max_following` from where the shaft stands
+    stall_current: int = TOP
+    stall_motion: int = 0
+    max_motor_jump: int = TOP
     max_target_step: int = TOP
-    max_following: int = TOP  # Farthest the spindle may be from its target, counts
-    following_ticks: int = TOP  # How long it may be farther
-    # Measured current at a command of 10000, counts, signed; 0 where current and command are not
-    # compared
+    max_following: int = TOP
+    following_ticks: int = TOP
     full_scale_current: int = 0
-    current_offset: int = 0  # Measured current at a command of 0, counts
-    # Largest difference between measured and commanded current, counts
+    current_offset: int = 0
     max_current_error: int = TOP
-    current_ticks: int = 1  # Ticks over which that difference is averaged
-    # Change of the current, counts, behind which a motor that did not move has a dead encoder
+    current_ticks: int = 1
     frozen_current: int = TOP
-    frozen_motion: int = 0  # Motor counts within which it did not move
-    # Counts of the motor, signed, for a turn of the spindle; motor and spindle are not compared
-    # where this is 0, jaw and spindle where `jaw_per_turn` is
+    frozen_motion: int = 0
     motor_per_turn: int = 0
-    spindle_per_turn: int = 0  # Counts of the spindle, signed, for the same turn
-    jaw_per_turn: int = 0  # Counts of the jaw, signed, for the same turn
-    twist_e6: int = 0  # Counts the motor is ahead for 1e6 counts of proximal torque, signed
-    stretch_e6: int = 0  # Counts the jaw is ahead for 1e6 counts of distal torque, signed
-    max_twist: int = TOP  # Largest span of what motor and spindle differ by otherwise, motor counts
-    max_stretch: int = TOP  # The same of jaw and spindle, jaw counts
-    max_spindle_jump: int = TOP  # Farthest the spindle's count may go in one tick
-    max_jaw_jump: int = TOP  # Farthest the jaw's count may go in one tick
-    # Proximal counts, signed, that 1000 counts of current make at rest; 0 where they are not
-    # compared
+    spindle_per_turn: int = 0
+    jaw_per_turn: int = 0
+    twist_e6: int = 0
+    stretch_e6: int = 0
+    max_twist: int = TOP
+    max_stretch: int = TOP
+    max_spindle_jump: int = TOP
+    max_jaw_jump: int = TOP
     torque_e3: int = 0
-    # Largest difference of both while the motor stands still, proximal counts
     max_still_torque: int = TOP
-    stall_ticks: int = TOP  # How long it may be stalled
-    saturated_ticks: int = TOP  # How long a torque or current count may be at the end of its range
-    stale_ticks: int = TOP  # How long a torque or current count may stay the same
-    dry_ticks: int = TOP  # How long the last setpoint is held while none follows
-    watchdog_us: int = WATCHDOG_US  # How long the host may be silent, 5 ms to 1 s
-    # `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor; any other
-    # crossing releases whatever is asked for.
+    stall_ticks: int = TOP
+    saturated_ticks: int = TOP
+    stale_ticks: int = TOP
+    dry_ticks: int = TOP
+    watchdog_us: int = WATCHDOG_US
     safe_state: int = SafeState.RELEASE
-    hold_command_e4: int = 0  # Largest command while holding, 1e-4 of full scale
-    hold_ticks: int = TOP  # How long it may hold; then it releases
+    hold_command_e4: int = 0
+    hold_ticks: int = TOP
 
     def as_array(self) -> NDArray[np.int64]:
         """Return the limits in the order of the wire, shape (44,)."""

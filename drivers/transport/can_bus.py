@@ -12,11 +12,17 @@ _HEAD = struct.Struct(">I?")
 
 @dataclass(frozen=True, slots=True)
 class CanFrame:
-    """One classic CAN data frame."""
+    """One classic CAN data frame.
 
-    can_id: int  # Identifier, 11 bits, or 29 where `extended`
-    data: bytes = b""  # 0 to 8 bytes
-    extended: bool = False  # Whether the identifier has 29 bits
+    Attributes:
+        can_id: Identifier, 11 bits, or 29 where `extended`.
+        data: 0 to 8 bytes.
+        extended: Whether the identifier has 29 bits.
+    """
+
+    can_id: int
+    data: bytes = b""
+    extended: bool = False
 
     def __post_init__(self) -> None:
         top = MAX_EXTENDED_ID if self.extended else MAX_STANDARD_ID
@@ -38,15 +44,25 @@ class CanFrame:
 
 @dataclass(slots=True)
 class CanCounters:
-    """Counters of a bus since it was opened."""
+    """Counters of a bus since it was opened.
 
-    received: int = 0  # Data frames received
-    sent: int = 0  # Data frames sent
-    error_frames: int = 0  # Error frames the controller reported
-    bus_off: int = 0  # Times the controller took itself off the bus
-    overruns: int = 0  # Times the controller reported that it had to drop received frames
-    echoes: int = 0  # Own frames that the interface returned; they are not passed on
-    ignored: int = 0  # Remote frames and frames of more than 8 bytes; they are not passed on
+    Attributes:
+        received: Data frames received.
+        sent: Data frames sent.
+        error_frames: Error frames the controller reported.
+        bus_off: Times the controller took itself off the bus.
+        overruns: Times the controller reported that it had to drop received frames.
+        echoes: Own frames that the interface returned; they are not passed on.
+        ignored: Remote frames and frames of more than 8 bytes; they are not passed on.
+    """
+
+    received: int = 0
+    sent: int = 0
+    error_frames: int = 0
+    bus_off: int = 0
+    overruns: int = 0
+    echoes: int = 0
+    ignored: int = 0
 
     def as_dict(self) -> dict[str, int]:
         """Return the counters by name."""

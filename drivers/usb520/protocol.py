@@ -17,11 +17,17 @@ _LINE = re.compile(rb"([+-]\d{1,9}\.\d{5}) ([A-Za-z-]{1,8})\r\n")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a unit on a line stands for."""
+    """What a unit on a line stands for.
 
-    name: str  # Column
-    unit: str  # SI unit
-    factor: float  # SI units a line's unit
+    Attributes:
+        name: Column.
+        unit: SI unit.
+        factor: SI units a line's unit.
+    """
+
+    name: str
+    unit: str
+    factor: float
 
 
 QUANTITIES = {

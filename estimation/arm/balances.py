@@ -39,19 +39,27 @@ Columns = Callable[[Motion], FloatArray]
 
 @dataclass(frozen=True)
 class ArmBalances:
-    """The torque equations of an arm's joints."""
+    """The torque equations of an arm's joints.
 
-    name: str  # The arm
-    models: tuple[Model, ...]  # Declared model of each joint, without values
-    joints: tuple[JointNames, ...]  # Channels of each joint
-    # Motion to the columns of the declared parameters, shape (n, joints, parameters)
+    Attributes:
+        name: The arm.
+        models: Declared model of each joint, without values.
+        joints: Channels of each joint.
+        columns: Motion to the columns of the declared parameters, shape (n, joints, parameters).
+        shared: Of each parameter, whether it is the links' and not a joint's own.
+        sign_width: Speed over which each joint's Coulomb friction changes sign, shape (joints,).
+        motors: Positions of a wrist's joints to those of its motors, or None; see `wrist`.
+        wrist: First joint, from 0, that motors behind a coupling drive.
+    """
+
+    name: str
+    models: tuple[Model, ...]
+    joints: tuple[JointNames, ...]
     columns: Columns
-    shared: NDArray[np.bool_]  # Of each parameter, whether it is the links' and not a joint's own
-    # Speed over which each joint's Coulomb friction changes sign, shape (joints,)
+    shared: NDArray[np.bool_]
     sign_width: FloatArray
-    # Positions of a wrist's joints to those of its motors, or None; see `wrist`
     motors: FloatArray | None = None
-    wrist: int = 0  # First joint, from 0, that motors behind a coupling drive
+    wrist: int = 0
 
 
 def balances_of(recording: Recording) -> ArmBalances | None:

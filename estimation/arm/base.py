@@ -24,11 +24,17 @@ DEPENDENT = 1e-9
 
 @dataclass(frozen=True)
 class Base:
-    """A base of an arm's parameters."""
+    """A base of an arm's parameters.
 
-    columns: NDArray[np.intp]  # The regressor's columns of the base
-    mapping: FloatArray  # Base parameters of all parameters, shape (base, parameters)
-    names: tuple[str, ...]  # The combinations in words, such as `ly1 + lz2`
+    Attributes:
+        columns: The regressor's columns of the base.
+        mapping: Base parameters of all parameters, shape (base, parameters).
+        names: The combinations in words, such as `ly1 + lz2`.
+    """
+
+    columns: NDArray[np.intp]
+    mapping: FloatArray
+    names: tuple[str, ...]
 
 
 @lru_cache(maxsize=8)

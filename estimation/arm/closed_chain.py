@@ -22,15 +22,25 @@ FRICTION = ("fc", "fv")
 
 @dataclass(frozen=True, slots=True)
 class ClosedChain:
-    """An arm with closed loops."""
+    """An arm with closed loops.
 
-    name: str  # Name
-    bodies: tuple[Body, ...]  # The spanning tree, parents first
-    tip: DhRow  # The fixed row from the tip's body to the tip
-    tip_body: int  # Number of the tip's body, from 1
-    reach: tuple[float, ...]  # Half the range of each actuated joint around zero, rad
-    gravity_m_s2: tuple[float, float, float]  # Gravity in the base frame
-    source: str  # Source of the numbers, and what is assumed
+    Attributes:
+        name: Name.
+        bodies: The spanning tree, parents first.
+        tip: The fixed row from the tip's body to the tip.
+        tip_body: Number of the tip's body, from 1.
+        reach: Half the range of each actuated joint around zero, rad.
+        gravity_m_s2: Gravity in the base frame.
+        source: Source of the numbers, and what is assumed.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    tip: DhRow
+    tip_body: int
+    reach: tuple[float, ...]
+    gravity_m_s2: tuple[float, float, float]
+    source: str
 
     @property
     def closure(self) -> FloatArray:

@@ -30,12 +30,16 @@ ROOT = float(np.sqrt(2.0))
 
 @dataclass(frozen=True)
 class Consistent:
-    """A physically consistent fit."""
+    """A physically consistent fit.
 
-    # All parameters, in the order of `estimation.arm.regressor.names`; those that are not
-    # identifiable from the torques get the smallest consistent values
+    Attributes:
+        values: All parameters, in the order of `estimation.arm.regressor.names`; those that are
+            not identifiable from the torques get the smallest consistent values.
+        base: Their base parameters, in the order of `estimation.arm.base.base_of`.
+    """
+
     values: FloatArray
-    base: FloatArray  # Their base parameters, in the order of `estimation.arm.base.base_of`
+    base: FloatArray
 
 
 def solver() -> Any:

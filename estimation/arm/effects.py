@@ -41,13 +41,21 @@ TRACK_DAMPING = 100.0
 
 @dataclass(frozen=True)
 class ArmEffect:
-    """One effect, as further columns of the torque regressor."""
+    """One effect, as further columns of the torque regressor.
 
-    name: str  # Name, with its joint
-    what: str  # Description in one line
-    columns: Callable[[Motion], FloatArray]  # Columns along a motion, shape (n, rows, parameters)
-    dissipative: bool = False  # Whether physics forbids negative parameters
-    damping: float = 1.0  # How many times the common damping its fit gets
+    Attributes:
+        name: Name, with its joint.
+        what: Description in one line.
+        columns: Columns along a motion, shape (n, rows, parameters).
+        dissipative: Whether physics forbids negative parameters.
+        damping: How many times the common damping its fit gets.
+    """
+
+    name: str
+    what: str
+    columns: Callable[[Motion], FloatArray]
+    dissipative: bool = False
+    damping: float = 1.0
 
 
 def row_count(arm: Arm) -> int:

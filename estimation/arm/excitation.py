@@ -29,11 +29,17 @@ ACCELERATION_PER_SPEED = 4.0
 
 @dataclass(frozen=True)
 class Excitation:
-    """A periodic motion of every joint."""
+    """A periodic motion of every joint.
 
-    middle: FloatArray  # Shape (joints,), rad or m
-    sine: FloatArray  # Amplitudes of position's sines, shape (harmonics, joints)
-    cosine: FloatArray  # Of its cosines
+    Attributes:
+        middle: Shape (joints,), rad or m.
+        sine: Amplitudes of position's sines, shape (harmonics, joints).
+        cosine: Of its cosines.
+    """
+
+    middle: FloatArray
+    sine: FloatArray
+    cosine: FloatArray
 
     def motion(self, time_s: FloatArray) -> Motion:
         """Return the motion at instants that are evenly spaced."""

@@ -16,11 +16,17 @@ UNTOLD = 1e-10
 
 @dataclass(frozen=True)
 class Fit:
-    """Identified parameters."""
+    """Identified parameters.
 
-    values: FloatArray  # Shape (parameters,), in the units of torque over column
-    covariance: FloatArray  # Of the values, shape (parameters, parameters)
-    condition: float  # Condition number of the weighted columns, each scaled to unit length
+    Attributes:
+        values: Shape (parameters,), in the units of torque over column.
+        covariance: Of the values, shape (parameters, parameters).
+        condition: Condition number of the weighted columns, each scaled to unit length.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    condition: float
 
     @property
     def errors(self) -> FloatArray:

@@ -17,10 +17,15 @@ FINE = LowPass(cutoff_hz=20.0, order=3)
 
 @dataclass(frozen=True, slots=True)
 class JointNames:
-    """The channels of one joint."""
+    """The channels of one joint.
 
-    number: int  # Its number, from 1
-    prismatic: bool  # Whether it slides
+    Attributes:
+        number: Its number, from 1.
+        prismatic: Whether it slides.
+    """
+
+    number: int
+    prismatic: bool
 
     def _named(self, angular: str, linear: str) -> str:
         return f"joint_{self.number}_{linear if self.prismatic else angular}"
@@ -66,12 +71,19 @@ class JointNames:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joint motion, shape (n, joints) each; rad and N m, or m and N where prismatic."""
+    """Joint motion, shape (n, joints) each; rad and N m, or m and N where prismatic.
 
-    position: FloatArray  # Positions
-    velocity: FloatArray  # Velocities
-    acceleration: FloatArray  # Accelerations
-    period_s: float  # Sample period, s
+    Attributes:
+        position: Positions.
+        velocity: Velocities.
+        acceleration: Accelerations.
+        period_s: Sample period, s.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    period_s: float
 
     def __len__(self) -> int:
         return len(self.position)

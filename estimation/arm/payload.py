@@ -23,13 +23,21 @@ LEAST_PERIODS = 3
 
 @dataclass(frozen=True)
 class AddedMass:
-    """An added mass with what is known of its error."""
+    """An added mass with what is known of its error.
 
-    mass_kg: float  # The mass
-    by_joint_kg: tuple[float, ...]  # From each joint's torque alone
-    from_periods_kg: float  # Standard error from the scatter over periods of the motion
-    from_joints_kg: float  # Half the difference between the joints: what the model lacks
-    from_lever_kg: float  # What one standard error of the height does
+    Attributes:
+        mass_kg: The mass.
+        by_joint_kg: From each joint's torque alone.
+        from_periods_kg: Standard error from the scatter over periods of the motion.
+        from_joints_kg: Half the difference between the joints: what the model lacks.
+        from_lever_kg: What one standard error of the height does.
+    """
+
+    mass_kg: float
+    by_joint_kg: tuple[float, ...]
+    from_periods_kg: float
+    from_joints_kg: float
+    from_lever_kg: float
 
     @property
     def interval_kg(self) -> tuple[float, float]:

@@ -17,25 +17,39 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True)
 class Block:
-    """Columns that belong together: the base, or one effect."""
+    """Columns that belong together: the base, or one effect.
 
-    name: str  # Name
-    at: NDArray[np.intp]  # Their places among all columns
-    dissipative: NDArray[np.bool_]  # Of each, whether it cannot be negative
-    # Damping relative to the squared length of the block's columns: of each column where
-    # `own_length`, else of the longest, so that rarely visited columns stay small
+    Attributes:
+        name: Name.
+        at: Their places among all columns.
+        dissipative: Of each, whether it cannot be negative.
+        damping: Damping relative to the squared length of the block's columns: of each column
+            where `own_length`, else of the longest, so that rarely visited columns stay small.
+        own_length: See `damping`.
+    """
+
+    name: str
+    at: NDArray[np.intp]
+    dissipative: NDArray[np.bool_]
     damping: float
-    own_length: bool = False  # See `damping`
+    own_length: bool = False
 
 
 @dataclass(frozen=True)
 class Products:
-    """Cross-products of weighted columns with one another and with the torque, by row."""
+    """Cross-products of weighted columns with one another and with the torque, by row.
 
-    gram: FloatArray  # Shape (rows, columns, columns)
-    right: FloatArray  # Shape (rows, columns)
-    square: FloatArray  # Sum of squares of the torque, shape (rows,)
-    samples: int  # Number of samples
+    Attributes:
+        gram: Shape (rows, columns, columns).
+        right: Shape (rows, columns).
+        square: Sum of squares of the torque, shape (rows,).
+        samples: Number of samples.
+    """
+
+    gram: FloatArray
+    right: FloatArray
+    square: FloatArray
+    samples: int
 
     @classmethod
     def of(cls, columns: FloatArray, torque: FloatArray) -> "Products":
@@ -55,10 +69,15 @@ class Products:
 
 @dataclass(frozen=True)
 class Normal:
-    """Cross-products summed over the rows, each with its weight squared."""
+    """Cross-products summed over the rows, each with its weight squared.
 
-    gram: FloatArray  # Shape (columns, columns)
-    right: FloatArray  # Shape (columns,)
+    Attributes:
+        gram: Shape (columns, columns).
+        right: Shape (columns,).
+    """
+
+    gram: FloatArray
+    right: FloatArray
 
     @classmethod
     def of(cls, products: Products, weights: FloatArray) -> "Normal":

@@ -15,26 +15,44 @@ moment along the own x axis only, of a thin bar."""
 
 @dataclass(frozen=True, slots=True)
 class DhRow:
-    """One row of a modified Denavit-Hartenberg table: m and rad."""
+    """One row of a modified Denavit-Hartenberg table: m and rad.
 
-    a_m: float  # Distance along the previous x axis
-    alpha_rad: float  # Angle about the previous x axis
-    d_m: float  # Distance along the own z axis at q = 0
-    theta_rad: float  # Angle about the own z axis at q = 0
+    Attributes:
+        a_m: Distance along the previous x axis.
+        alpha_rad: Angle about the previous x axis.
+        d_m: Distance along the own z axis at q = 0.
+        theta_rad: Angle about the own z axis at q = 0.
+    """
+
+    a_m: float
+    alpha_rad: float
+    d_m: float
+    theta_rad: float
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic."""
+    """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
 
-    name: str  # Name
-    kind: Literal["revolute", "prismatic"]  # How it moves
-    row: DhRow  # Where it sits
-    lower: float  # Lower end of its range
-    upper: float  # Upper end of its range
-    speed: float  # Largest speed
-    link: Link = "full"  # Which of its link's ten parameters count, see `Link`
-    spring: bool = False  # Whether an elastic torque proportional to its position acts on it
+    Attributes:
+        name: Name.
+        kind: How it moves.
+        row: Where it sits.
+        lower: Lower end of its range.
+        upper: Upper end of its range.
+        speed: Largest speed.
+        link: Which of its link's ten parameters count, see `Link`.
+        spring: Whether an elastic torque proportional to its position acts on it.
+    """
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    row: DhRow
+    lower: float
+    upper: float
+    speed: float
+    link: Link = "full"
+    spring: bool = False
 
     @property
     def torque_unit(self) -> str:
@@ -44,56 +62,88 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One body of an arm's spanning tree, on a joint along or about its z axis."""
+    """One body of an arm's spanning tree, on a joint along or about its z axis.
 
-    name: str  # Name
-    parent: int  # Number of the parent body, from 1; 0 is the base
-    row: DhRow  # Position of its joint on that body
-    closure: tuple[float, ...]  # How far its joint moves with each actuated joint: its row of G
-    prismatic: bool = False  # Whether its joint slides
-    link: Link = "full"  # As `Joint.link`
-    label: str = ""  # What the names of its parameters end in; its number if empty
+    Attributes:
+        name: Name.
+        parent: Number of the parent body, from 1; 0 is the base.
+        row: Position of its joint on that body.
+        closure: How far its joint moves with each actuated joint: its row of G.
+        prismatic: Whether its joint slides.
+        link: As `Joint.link`.
+        label: What the names of its parameters end in; its number if empty.
+    """
+
+    name: str
+    parent: int
+    row: DhRow
+    closure: tuple[float, ...]
+    prismatic: bool = False
+    link: Link = "full"
+    label: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class PointMass:
-    """A mass fixed to a link, in addition to the link's own parameters."""
+    """A mass fixed to a link, in addition to the link's own parameters.
 
-    name: str  # Name
-    link: int  # The link it is fixed to, from 1
-    point_m: tuple[float, float, float]  # Where, in the link's frame, m
-    mass_kg: float  # How much
+    Attributes:
+        name: Name.
+        link: The link it is fixed to, from 1.
+        point_m: Where, in the link's frame, m.
+        mass_kg: How much.
+    """
+
+    name: str
+    link: int
+    point_m: tuple[float, float, float]
+    mass_kg: float
 
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool mounted on the last link: its tip and its masses."""
+    """A tool mounted on the last link: its tip and its masses.
 
-    name: str  # Name
-    tip: DhRow  # The fixed row from the last joint's frame to the tool's tip
-    masses: tuple[PointMass, ...] = ()  # Its masses
+    Attributes:
+        name: Name.
+        tip: The fixed row from the last joint's frame to the tool's tip.
+        masses: Its masses.
+    """
+
+    name: str
+    tip: DhRow
+    masses: tuple[PointMass, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """An arm: its joints in a row, and the bodies of its loops where it has any."""
+    """An arm: its joints in a row, and the bodies of its loops where it has any.
 
-    name: str  # Name
-    joints: tuple[Joint, ...]  # From the base to the tip
-    tip: DhRow  # The fixed row from the last joint's frame to the tip's
-    # Pairs of joints (from 0) whose viscous friction is coupled: the torque of the first by the
-    # speed of the second
+    Attributes:
+        name: Name.
+        joints: From the base to the tip.
+        tip: The fixed row from the last joint's frame to the tip's.
+        viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of
+            the first by the speed of the second.
+        gravity_m_s2: Gravity in the base frame.
+        source: Source of the numbers.
+        wrist: First joint (from 0) that cables drive from coupled motors, or None.
+        wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
+        loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
+            see `bodies`.
+        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns
+            their joint torque.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    tip: DhRow
     viscous_pairs: tuple[tuple[int, int], ...]
-    gravity_m_s2: tuple[float, float, float]  # Gravity in the base frame
-    source: str  # Source of the numbers
-    wrist: int | None = None  # First joint (from 0) that cables drive from coupled motors, or None
-    # M of q = M q_motor for the joints from `wrist` on, the gripper's last
+    gravity_m_s2: tuple[float, float, float]
+    source: str
+    wrist: int | None = None
     wrist_coupling: tuple[tuple[float, ...], ...] = ()
-    # Spanning tree of all bodies, parents first, where loops make more bodies than joints; see
-    # `bodies`
     loops: tuple[Body, ...] = ()
-    # Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns their joint
-    # torque
     carried: tuple[PointMass, ...] = ()
 
     def with_payload(self, *masses: PointMass) -> "Arm":

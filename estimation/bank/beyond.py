@@ -52,11 +52,17 @@ def coordinates(bank: Bank, rows: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Beyond:
-    """A table over the conditions."""
+    """A table over the conditions.
 
-    lowest: FloatArray  # Conditions of the first node, shape (d,)
-    step: FloatArray  # Distance of the nodes, shape (d,)
-    values: FloatArray  # What is looked up, at each node, d axes
+    Attributes:
+        lowest: Conditions of the first node, shape (d,).
+        step: Distance of the nodes, shape (d,).
+        values: What is looked up, at each node, d axes.
+    """
+
+    lowest: FloatArray
+    step: FloatArray
+    values: FloatArray
 
     def at(self, places: FloatArray) -> FloatArray:
         """Return the value between the nodes, shape (n,); NaN beyond them.

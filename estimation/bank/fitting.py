@@ -23,10 +23,15 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the fit of the weights."""
+    """Settings of the fit of the weights.
 
-    ridge: float = 1e-4  # Penalty on a squared weight in units of its column's variance, a sample
-    offset_share: float = 0.5  # Share of each run's means that the fit removes, 0 to below 1
+    Attributes:
+        ridge: Penalty on a squared weight in units of its column's variance, a sample.
+        offset_share: Share of each run's means that the fit removes, 0 to below 1.
+    """
+
+    ridge: float = 1e-4
+    offset_share: float = 0.5
 
 
 CHOICES = tuple(Settings(ridge, share) for share in (0.8, 0.5, 0.0) for ridge in (1e-4, 1e-5))
@@ -45,11 +50,15 @@ AS_GOOD = 1.02
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Properties of the columns that a fit needs."""
+    """Properties of the columns that a fit needs.
 
-    # How stiffly each weight is held, relative to the ridge penalty, shape (p,)
+    Attributes:
+        stiffness: How stiffly each weight is held, relative to the ridge penalty, shape (p,).
+        between: Columns that the runs' means are fitted with, the constant first.
+    """
+
     stiffness: FloatArray
-    between: NDArray[np.int64]  # Columns that the runs' means are fitted with, the constant first
+    between: NDArray[np.int64]
 
     @classmethod
     def plain(cls, size: int) -> "Shape":
@@ -59,14 +68,23 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """A run's share in the normal equations."""
+    """A run's share in the normal equations.
 
-    count: int  # Samples n
-    gram: FloatArray  # X'X, shape (p, p)
-    cross: FloatArray  # X'Y, shape (p, targets)
-    square: FloatArray  # Sum of squares of each target, shape (targets,)
-    mean: FloatArray  # Mean row of X, shape (p,)
-    target: FloatArray  # Mean row of Y, shape (targets,)
+    Attributes:
+        count: Samples n.
+        gram: X'X, shape (p, p).
+        cross: X'Y, shape (p, targets).
+        square: Sum of squares of each target, shape (targets,).
+        mean: Mean row of X, shape (p,).
+        target: Mean row of Y, shape (targets,).
+    """
+
+    count: int
+    gram: FloatArray
+    cross: FloatArray
+    square: FloatArray
+    mean: FloatArray
+    target: FloatArray
 
     @classmethod
     def of(cls, design: FloatArray, targets: FloatArray) -> "Normal":
@@ -89,15 +107,25 @@ class Normal:
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Sums over runs: all that a fit needs of them, so that fits without some runs are cheap."""
+    """Sums over runs: all that a fit needs of them, so that fits without some runs are cheap.
 
-    count: int  # Samples
-    total: FloatArray  # Sum of the rows of X, shape (p,)
-    gram: FloatArray  # X'X, shape (p, p)
-    cross: FloatArray  # X'Y, shape (p, targets)
-    square: FloatArray  # Sum of squares of each target, shape (targets,)
-    between: FloatArray  # The share of `gram` that is the runs' means', shape (p, p)
-    between_cross: FloatArray  # The share of `cross` that is the runs' means', shape (p, targets)
+    Attributes:
+        count: Samples.
+        total: Sum of the rows of X, shape (p,).
+        gram: X'X, shape (p, p).
+        cross: X'Y, shape (p, targets).
+        square: Sum of squares of each target, shape (targets,).
+        between: The share of `gram` that is the runs' means', shape (p, p).
+        between_cross: The share of `cross` that is the runs' means', shape (p, targets).
+    """
+
+    count: int
+    total: FloatArray
+    gram: FloatArray
+    cross: FloatArray
+    square: FloatArray
+    between: FloatArray
+    between_cross: FloatArray
 
     @classmethod
     def of(cls, runs: Sequence[Normal]) -> "Pool":

@@ -142,12 +142,17 @@ EFFECTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Bank:
-    """Which channels are read and which products are made of them."""
+    """Which channels are read and which products are made of them.
 
-    # Channel that represents the load; a key of `LOAD_SCALES`
+    Attributes:
+        surrogate: Channel that represents the load; a key of `LOAD_SCALES`.
+        pose: Channel of the wrist's pose in rad, or empty.
+        without: Effects left out, keys of `EFFECTS`.
+    """
+
     surrogate: str = "motor_command_ratio"
-    pose: str = ""  # Channel of the wrist's pose in rad, or empty
-    without: tuple[str, ...] = ()  # Effects left out, keys of `EFFECTS`
+    pose: str = ""
+    without: tuple[str, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -30,48 +30,75 @@ class ChangesError(EstimationError):
 
 @dataclass(frozen=True)
 class Change:
-    """One change."""
+    """One change.
 
-    # `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do not
-    # distinguish some of them
+    Attributes:
+        verdict: `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do
+            not distinguish some of them.
+        name: What changed.
+        equation: Equation it is reported under.
+        family: The effect.
+        alternatives: Other names that explain it about as well.
+        confidence: Weight of this name among all that explain about as much, over resampled sets of
+            runs.
+        p: Probability of a change this large where nothing changed, over all candidates.
+        parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
+        ci95: Parameter to the 95 % interval of that, over runs.
+        unit: Parameter to its unit.
+        before: Parameter to its value in A; None of an effect.
+    """
+
     verdict: str
-    name: str  # What changed
-    equation: str  # Equation it is reported under
-    family: str  # The effect
-    alternatives: tuple[str, ...]  # Other names that explain it about as well
-    # Weight of this name among all that explain about as much, over resampled sets of runs
+    name: str
+    equation: str
+    family: str
+    alternatives: tuple[str, ...]
     confidence: float
-    p: float  # Probability of a change this large where nothing changed, over all candidates
-    # Parameter to its change from A to B (of an effect: its amplitude), SI
+    p: float
     parameters: Mapping[str, float]
-    ci95: Mapping[str, tuple[float, float]]  # Parameter to the 95 % interval of that, over runs
-    unit: Mapping[str, str]  # Parameter to its unit
-    before: Mapping[str, float | None]  # Parameter to its value in A; None of an effect
+    ci95: Mapping[str, tuple[float, float]]
+    unit: Mapping[str, str]
+    before: Mapping[str, float | None]
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """Root mean square errors on a third campaign of an equation, within runs."""
+    """Root mean square errors on a third campaign of an equation, within runs.
 
-    with_a: float  # Fitted on A alone
-    with_b: float  # Fitted on B alone
-    as_a: float  # Fitted on both with the changes, taken as unchanged
-    as_b: float  # The same, taken as changed
-    unit: str  # Unit of the target
+    Attributes:
+        with_a: Fitted on A alone.
+        with_b: Fitted on B alone.
+        as_a: Fitted on both with the changes, taken as unchanged.
+        as_b: The same, taken as changed.
+        unit: Unit of the target.
+    """
+
+    with_a: float
+    with_b: float
+    as_a: float
+    as_b: float
+    unit: str
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The answer."""
+    """The answer.
 
-    # The changes, largest first; empty where nothing changed beyond chance
+    Attributes:
+        changes: The changes, largest first; empty where nothing changed beyond chance.
+        runs: Campaign to the names of its runs.
+        predicted: Equation to its errors on a third campaign; empty without one.
+        notes: Limits of the answer, in words.
+        seed: Seed of the random choices.
+        schema: Name of this layout.
+    """
+
     changes: tuple[Change, ...]
-    runs: Mapping[str, tuple[str, ...]]  # Campaign to the names of its runs
-    # Equation to its errors on a third campaign; empty without one
+    runs: Mapping[str, tuple[str, ...]]
     predicted: Mapping[str, Predicted] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()  # Limits of the answer, in words
-    seed: int = 0  # Seed of the random choices
-    schema: str = SCHEMA  # Name of this layout
+    notes: tuple[str, ...] = ()
+    seed: int = 0
+    schema: str = SCHEMA
 
 
 def compare(

@@ -35,10 +35,15 @@ Columns = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Products:
-    """Cross-products of a candidate's k columns with the base and the target, run by run."""
+    """Cross-products of a candidate's k columns with the base and the target, run by run.
 
-    cross: FloatArray  # Shape (runs, base + 1, k); the last row is with the target
-    own: FloatArray  # Shape (runs, k, k)
+    Attributes:
+        cross: Shape (runs, base + 1, k); the last row is with the target.
+        own: Shape (runs, k, k).
+    """
+
+    cross: FloatArray
+    own: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,13 +52,21 @@ beyond a parameter that moved."""
 
 @dataclass(frozen=True)
 class Gained:
-    """A candidate that acts in the runs of one campaign."""
+    """A candidate that acts in the runs of one campaign.
 
-    candidate: Candidate  # What changed
-    in_b: bool  # Whether it acts in the runs of B; else in those of A
-    gain: float  # Log of the squared error before over after, above the mean over random choices
-    usual: float  # That mean
-    amplitudes: FloatArray  # Its amplitudes, SI, shape (k,)
+    Attributes:
+        candidate: What changed.
+        in_b: Whether it acts in the runs of B; else in those of A.
+        gain: Log of the squared error before over after, above the mean over random choices.
+        usual: That mean.
+        amplitudes: Its amplitudes, SI, shape (k,).
+    """
+
+    candidate: Candidate
+    in_b: bool
+    gain: float
+    usual: float
+    amplitudes: FloatArray
 
     @property
     def family(self) -> str:
@@ -68,16 +76,23 @@ class Gained:
 
 @dataclass(frozen=True)
 class Step:
-    """One change that was found."""
+    """One change that was found.
 
-    best: Gained  # The change
-    p: float  # Share of random choices of runs with as large a gain of any candidate
-    # Name to its weight over resampled sets of runs, largest first. A name that explains less than
-    # the best by `FORM` of it has 1/e of its weight: forms are not exact. Where a parameter that
-    # moved explains most, effects have none.
+    Attributes:
+        best: The change.
+        p: Share of random choices of runs with as large a gain of any candidate.
+        shares: Name to its weight over resampled sets of runs, largest first. A name that explains
+            less than the best by `FORM` of it has 1/e of its weight: forms are not exact. Where a
+            parameter that moved explains most, effects have none.
+        spread: Amplitudes in the resampled sets, shape (replicates, k).
+        alternatives: Name to its best candidate.
+    """
+
+    best: Gained
+    p: float
     shares: Mapping[str, float]
-    spread: FloatArray  # Amplitudes in the resampled sets, shape (replicates, k)
-    alternatives: Mapping[str, Gained]  # Name to its best candidate
+    spread: FloatArray
+    alternatives: Mapping[str, Gained]
 
 
 @dataclass(frozen=True, eq=False)

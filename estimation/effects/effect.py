@@ -18,18 +18,26 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of an effect."""
+    """One parameter of an effect.
 
-    name: str  # Name, unique in the effect
-    unit: str  # Unit expression over `target` and the effect's roles, such as `target / speed`
-    description: str  # Meaning in words
-    lower: float = -np.inf  # Smallest physically meaningful value, in SI units
-    upper: float = np.inf  # Largest physically meaningful value
-    # For a shape parameter: True if it is searched on a linear scale and may be zero or negative,
-    # such as a position; otherwise the scale is logarithmic
+    Attributes:
+        name: Name, unique in the effect.
+        unit: Unit expression over `target` and the effect's roles, such as `target / speed`.
+        description: Meaning in words.
+        lower: Smallest physically meaningful value, in SI units.
+        upper: Largest physically meaningful value.
+        linear: For a shape parameter: True if it is searched on a linear scale and may be zero or
+            negative, such as a position; otherwise the scale is logarithmic.
+        points: For a shape parameter: number of values between its bounds that a search tries
+            before it refines the best one. An order needs many values, as its peaks are narrow.
+    """
+
+    name: str
+    unit: str
+    description: str
+    lower: float = -np.inf
+    upper: float = np.inf
     linear: bool = False
-    # For a shape parameter: number of values between its bounds that a search tries before it
-    # refines the best one. An order needs many values, as its peaks are narrow.
     points: int = 13
 
     def grid(self) -> FloatArray:
@@ -44,23 +52,30 @@ class Effect(ABC):
 
     The docstring of a subclass contains the physics, the equation with units, a check for a
     technician and the source. Class attributes:
+
+    Attributes:
+        id: Name of the effect, unique in the catalogue, such as `friction.coulomb`.
+        family: Name that a diagnosis reports; the id by default. Several functional forms of one
+            physical effect share a family, and the id of a form is its family with one more word
+            (`hysteresis.presliding.lugre`).
+        balances: Equations that a search may add it to, and its side there: 1 adds to the target,
+            -1 subtracts from it, so that a bound on an amplitude has the same meaning in all of
+            them. `joint` stands for every `joint.N`. Empty for an effect that is only declared,
+            such as the torque constant.
+        roles: Role of each input, and its default channel.
+        amplitudes: Linear parameters, one per column.
+        shape: Non-linear parameters, searched between their bounds; positive unless `linear`.
+        told_apart_by: The experiment that distinguishes them.
+        at_rest: Whether it describes standstill. A search tries it where static samples count.
     """
 
-    id: ClassVar[str]  # Name of the effect, unique in the catalogue, such as `friction.coulomb`
-    # Name that a diagnosis reports; the id by default. Several functional forms of one physical
-    # effect share a family, and the id of a form is its family with one more word
-    # (`hysteresis.presliding.lugre`).
+    id: ClassVar[str]
     family: ClassVar[str]
-    # Equations that a search may add it to, and its side there: 1 adds to the target, -1 subtracts
-    # from it, so that a bound on an amplitude has the same meaning in all of them. `joint` stands
-    # for every `joint.N`. Empty for an effect that is only declared, such as the torque constant.
     balances: ClassVar[Mapping[str, int]] = {}
-    roles: ClassVar[Mapping[str, str]]  # Role of each input, and its default channel
-    amplitudes: ClassVar[tuple[Parameter, ...]]  # Linear parameters, one per column
-    # Non-linear parameters, searched between their bounds; positive unless `linear`
+    roles: ClassVar[Mapping[str, str]]
+    amplitudes: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
-    told_apart_by: ClassVar[str] = ""  # The experiment that distinguishes them
-    # Whether it describes standstill. A search tries it where static samples count.
+    told_apart_by: ClassVar[str] = ""
     at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
@@ -129,11 +144,13 @@ class Remembering(Effect):
     that changes with time uses the role `clock`, so that it does not depend on the sample rate; its
     decay starts at the first sample. A sample with an input that is not finite gives NaN and does
     not change the state.
+
+    Attributes:
+        walk: The compiled function; the columns of its first argument are the roles in order.
+        rest: State before the first sample. The first value of most is 0 until the first sample.
     """
 
-    # The compiled function; the columns of its first argument are the roles in order
     walk: ClassVar[Walk]
-    # State before the first sample. The first value of most is 0 until the first sample.
     rest: ClassVar[tuple[float, ...]]
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:

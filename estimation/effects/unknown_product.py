@@ -18,12 +18,17 @@ _SCALES = (1e-6, 1e6)
 
 
 class Form(NamedTuple):
-    """One function of one variable."""
+    """One function of one variable.
 
-    of: Callable[..., Any]  # Function of the variable's values and the shape
-    # Name, unit over the role `{role}`, and meaning of each shape parameter
+    Attributes:
+        of: Function of the variable's values and the shape.
+        shape: Name, unit over the role `{role}`, and meaning of each shape parameter.
+        text: The formula as text; `{x}` is the variable, `{0}`, `{1}` are the shape.
+    """
+
+    of: Callable[..., Any]
     shape: tuple[tuple[str, str, str], ...]
-    text: str  # The formula as text; `{x}` is the variable, `{0}`, `{1}` are the shape
+    text: str
 
 
 _WIDTH = ("width", "{role}", "width of the change")

@@ -47,11 +47,17 @@ logistic node at work. A node that barely varies in the given runs must keep its
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Closing samples of one run of another instrument."""
+    """Closing samples of one run of another instrument.
 
-    rows: FloatArray  # Filtered channels the estimator reads, shape (n, channels)
-    truth: FloatArray  # The target, shape (n,)
-    valid: np.ndarray  # Samples without a flag, shape (n,); only they are fitted
+    Attributes:
+        rows: Filtered channels the estimator reads, shape (n, channels).
+        truth: The target, shape (n,).
+        valid: Samples without a flag, shape (n,); only they are fitted.
+    """
+
+    rows: FloatArray
+    truth: FloatArray
+    valid: np.ndarray
 
     @property
     def flagged(self) -> int:

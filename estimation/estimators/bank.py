@@ -29,33 +29,47 @@ EVERY = 4
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Estimates with what is known about their error, each of shape (n,)."""
+    """Estimates with what is known about their error, each of shape (n,).
 
-    value: FloatArray  # The estimate, in the target's unit
-    # Half the width of the interval that covers 95 %; NaN where unknown: far from the fitted
-    # conditions, opening, at rest, or on another instrument
+    Attributes:
+        value: The estimate, in the target's unit.
+        half_width: Half the width of the interval that covers 95 %; NaN where unknown: far from the
+            fitted conditions, opening, at rest, or on another instrument.
+        inside: Whether position, load, speed and acceleration lie in the range fitted on.
+    """
+
+    value: FloatArray
     half_width: FloatArray
-    # Whether position, load, speed and acceleration lie in the range fitted on
     inside: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class BankEstimator:
-    """A fitted sum of products of physical states."""
+    """A fitted sum of products of physical states.
+
+    Attributes:
+        bank: The states and products.
+        target: Channel that is estimated.
+        weights: Weight of each product, shape (size,).
+        interval: The error's interval; None where too few runs were fitted.
+        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
+        scale: Spread of each product over the samples fitted on, shape (size,).
+        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
+        low_pass: Filter of every channel.
+        origin: Where it comes from; None where nobody stated it.
+    """
 
     SCHEMA: ClassVar[str] = "rig.bank/4"
 
-    bank: Bank  # The states and products
-    target: str  # Channel that is estimated
-    weights: FloatArray  # Weight of each product, shape (size,)
-    interval: Interval | None  # The error's interval; None where too few runs were fitted
-    # Lowest and highest value of each judged channel fitted on, shape (2, judged)
+    bank: Bank
+    target: str
+    weights: FloatArray
+    interval: Interval | None
     ranges: FloatArray
-    scale: FloatArray  # Spread of each product over the samples fitted on, shape (size,)
-    # Instrument it was fitted on; empty where it is not known, or does not matter
+    scale: FloatArray
     instrument: str = ""
-    low_pass: LowPass = PAPER  # Filter of every channel
-    origin: Origin | None = None  # Where it comes from; None where nobody stated it
+    low_pass: LowPass = PAPER
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         for name, shape in {
@@ -246,16 +260,23 @@ def fit_runs(
 
 @dataclass(frozen=True)
 class BankRecipe:
-    """Fits a state estimator on the closing samples of a campaign."""
+    """Fits a state estimator on the closing samples of a campaign.
 
-    target: str  # Channel to estimate
-    bank: Bank = field(default_factory=Bank)  # The states and products
-    # How weights are found; chosen on runs left out in turn if None
+    Attributes:
+        target: Channel to estimate.
+        bank: The states and products.
+        settings: How weights are found; chosen on runs left out in turn if None.
+        causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
+        low_pass: Filter of every channel.
+        coverage: Share of the samples of unseen runs that the interval covers.
+    """
+
+    target: str
+    bank: Bank = field(default_factory=Bank)
     settings: Settings | None = None
-    # Fit on channels filtered as live, for use as live; the target has no lag anyway
     causal: bool = False
-    low_pass: LowPass = PAPER  # Filter of every channel
-    coverage: float = COVERAGE  # Share of the samples of unseen runs that the interval covers
+    low_pass: LowPass = PAPER
+    coverage: float = COVERAGE
 
     def fit(self, campaign: Campaign) -> BankEstimator:
         """Fit on the valid closing samples of the runs that are not excluded.

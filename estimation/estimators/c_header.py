@@ -50,13 +50,21 @@ Exported = BankEstimator | NetworkEstimator | ModelEstimator
 
 @dataclass(frozen=True)
 class _Row:
-    """The channels of a row and what they are computed from."""
+    """The channels of a row and what they are computed from.
 
-    measured: Sequence[str]  # Measured channels, in order
-    windows: Sequence[str]  # Channels that need the lowest value of a window
-    pasts: Sequence[str]  # Channels whose last values are kept
-    sample_rate_hz: float  # Rate of the calls
-    signals: Signals  # The machine's derived channels
+    Attributes:
+        measured: Measured channels, in order.
+        windows: Channels that need the lowest value of a window.
+        pasts: Channels whose last values are kept.
+        sample_rate_hz: Rate of the calls.
+        signals: The machine's derived channels.
+    """
+
+    measured: Sequence[str]
+    windows: Sequence[str]
+    pasts: Sequence[str]
+    sample_rate_hz: float
+    signals: Signals
 
 
 def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:

@@ -13,9 +13,13 @@ from estimation.stream import Stream
 
 @dataclass(frozen=True)
 class ModelEstimator:
-    """A fitted model as an estimator."""
+    """A fitted model as an estimator.
 
-    model: Model  # The fitted model
+    Attributes:
+        model: The fitted model.
+    """
+
+    model: Model
 
     @property
     def target(self) -> str:
@@ -37,9 +41,13 @@ class ModelEstimator:
 
 @dataclass(frozen=True)
 class ModelRecipe:
-    """Fits a declared model; the paper's straight line is the shipped model `linear`."""
+    """Fits a declared model; the paper's straight line is the shipped model `linear`.
 
-    declared: Model  # The model without values
+    Attributes:
+        declared: The model without values.
+    """
+
+    declared: Model
 
     def fit(self, campaign: Campaign) -> ModelEstimator:
         """Fit on the runs that are not excluded; see `estimation.fitting.fit` for the errors."""

@@ -33,15 +33,21 @@ EVERY = 4
 
 @dataclass(frozen=True)
 class NetworkEstimator:
-    """A trained network as an estimator."""
+    """A trained network as an estimator.
+
+    Attributes:
+        network: The network; its inputs are channel names, its one output the target.
+        low_pass: Filter of every channel.
+        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
+        origin: Where it comes from; None where nobody stated it.
+    """
 
     SCHEMA: ClassVar[str] = "rig.estimator/1"
 
-    network: Network  # The network; its inputs are channel names, its one output the target
-    low_pass: LowPass = PAPER  # Filter of every channel
-    # Instrument it was fitted on; empty where it is not known, or does not matter
+    network: Network
+    low_pass: LowPass = PAPER
     instrument: str = ""
-    origin: Origin | None = None  # Where it comes from; None where nobody stated it
+    origin: Origin | None = None
 
     @property
     def target(self) -> str:
@@ -135,13 +141,21 @@ class NetworkStepper:
 
 @dataclass(frozen=True)
 class NetworkRecipe:
-    """Trains a network on the closing samples of a campaign, as the paper does."""
+    """Trains a network on the closing samples of a campaign, as the paper does.
 
-    inputs: tuple[str, ...]  # Channels, measured or derived
-    target: str  # Channel to estimate
-    settings: Settings = field(default_factory=Settings)  # How to train
-    low_pass: LowPass = PAPER  # Filter of every channel
-    every: int = EVERY  # Train on every n-th closing sample
+    Attributes:
+        inputs: Channels, measured or derived.
+        target: Channel to estimate.
+        settings: How to train.
+        low_pass: Filter of every channel.
+        every: Train on every n-th closing sample.
+    """
+
+    inputs: tuple[str, ...]
+    target: str
+    settings: Settings = field(default_factory=Settings)
+    low_pass: LowPass = PAPER
+    every: int = EVERY
 
     def fit(self, campaign: Campaign) -> NetworkEstimator:
         """Train on the valid closing samples of the runs that are not excluded.

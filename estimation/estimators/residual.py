@@ -19,10 +19,15 @@ from estimation.stream import Stream
 
 @dataclass(frozen=True)
 class ResidualEstimator:
-    """The sum of a fitted model and of a network trained on its residual."""
+    """The sum of a fitted model and of a network trained on its residual.
 
-    model: Model  # The fitted model
-    rest: NetworkEstimator  # The network
+    Attributes:
+        model: The fitted model.
+        rest: The network.
+    """
+
+    model: Model
+    rest: NetworkEstimator
 
     def __post_init__(self) -> None:
         if self.model.target != self.rest.target:
@@ -86,10 +91,15 @@ class ResidualStepper:
 
 @dataclass(frozen=True)
 class ResidualRecipe:
-    """Fits a model, then a network on its residual."""
+    """Fits a model, then a network on its residual.
 
-    model: ModelRecipe  # The declared model
-    network: NetworkRecipe  # The network; its target is the model's
+    Attributes:
+        model: The declared model.
+        network: The network; its target is the model's.
+    """
+
+    model: ModelRecipe
+    network: NetworkRecipe
 
     def fit(self, campaign: Campaign) -> ResidualEstimator:
         """Fit both on the runs that are not excluded; see the two recipes for the errors."""

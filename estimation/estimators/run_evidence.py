@@ -13,7 +13,7 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class RunEvidence:
-    """Samples of one run to fit: every fourth valid closing one."""
+    """Samples of one run to fit: every fourth valid closing one.
 
     design: FloatArray  # The bank's products, shape (n, size)
     truth: FloatArray  # The target without lag, shape (n,)

@@ -31,26 +31,44 @@ BLOCK = 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the training."""
+    """Settings of the training.
 
-    nodes: int = 30  # Hidden nodes
-    iterations: int = 1000  # Accepted steps at the most
-    patience: int = 50  # Converged when the error fell by less than `tolerance` over so many steps
-    tolerance: float = 5e-3  # Relative fall of the root mean square error
-    seed: int = 0  # Seed of the first weights
+    Attributes:
+        nodes: Hidden nodes.
+        iterations: Accepted steps at the most.
+        patience: Converged when the error fell by less than `tolerance` over so many steps.
+        tolerance: Relative fall of the root mean square error.
+        seed: Seed of the first weights.
+    """
+
+    nodes: int = 30
+    iterations: int = 1000
+    patience: int = 50
+    tolerance: float = 5e-3
+    seed: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """Result of a training."""
+    """Result of a training.
 
-    network: Network  # The trained network
-    iterations: int  # Accepted steps
-    converged: bool  # Whether it stopped because nothing changed any more
-    reason: str  # Why it stopped
-    effective_parameters: float  # gamma, the number of weights the data determines
-    parameters: int  # Number of weights
-    rmse: float  # Error on the training rows in units of half the range of the outputs
+    Attributes:
+        network: The trained network.
+        iterations: Accepted steps.
+        converged: Whether it stopped because nothing changed any more.
+        reason: Why it stopped.
+        effective_parameters: gamma, the number of weights the data determines.
+        parameters: Number of weights.
+        rmse: Error on the training rows in units of half the range of the outputs.
+    """
+
+    network: Network
+    iterations: int
+    converged: bool
+    reason: str
+    effective_parameters: float
+    parameters: int
+    rmse: float
 
 
 def has_torch() -> bool:

@@ -27,33 +27,55 @@ RATE_HZ = 200.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one search made of one start."""
+    """What one search made of one start.
 
-    condition: float  # Condition number of the base regressor, columns of unit length
-    limits_share: float  # Largest share of any limit that is used, by a bound for every instant
-    seconds: float  # Time of a core it took
+    Attributes:
+        condition: Condition number of the base regressor, columns of unit length.
+        limits_share: Largest share of any limit that is used, by a bound for every instant.
+        seconds: Time of a core it took.
+    """
+
+    condition: float
+    limits_share: float
+    seconds: float
 
 
 @dataclass(frozen=True)
 class Start:
-    """One start and what the searches made of it."""
+    """One start and what the searches made of it.
 
-    seed: int  # Its seed
-    condition: float  # Condition number there
-    thesis: Outcome  # By the thesis' search
-    shrunk: float  # Condition number of the thesis' result once it is scaled into the limits
-    ours: Outcome  # By our search, which goes on from the thesis' result; the time of both
+    Attributes:
+        seed: Its seed.
+        condition: Condition number there.
+        thesis: By the thesis' search.
+        shrunk: Condition number of the thesis' result once it is scaled into the limits.
+        ours: By our search, which goes on from the thesis' result; the time of both.
+    """
+
+    seed: int
+    condition: float
+    thesis: Outcome
+    shrunk: float
+    ours: Outcome
 
 
 @dataclass(frozen=True)
 class ExcitationStudy:
-    """Results of the comparison."""
+    """Results of the comparison.
 
-    schema: str  # Name of this layout
-    arm: str  # The arm
-    evaluations: int  # Condition numbers each search may take of each start
-    starts: tuple[Start, ...]  # Each start
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        arm: The arm.
+        evaluations: Condition numbers each search may take of each start.
+        starts: Each start.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    arm: str
+    evaluations: int
+    starts: tuple[Start, ...]
+    provenance: Provenance
 
 
 def run_excitation(

@@ -37,13 +37,21 @@ LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """What a joint's hidden torque may depend on, along a motion; each of shape (n,)."""
+    """What a joint's hidden torque may depend on, along a motion; each of shape (n,).
 
-    angle: FloatArray  # Its angle or position
-    speed: FloatArray  # Its velocity
-    acceleration: FloatArray  # Its acceleration
-    other: FloatArray  # Angle of the next joint
-    time_s: FloatArray  # Time since the start of the run
+    Attributes:
+        angle: Its angle or position.
+        speed: Its velocity.
+        acceleration: Its acceleration.
+        other: Angle of the next joint.
+        time_s: Time since the start of the run.
+    """
+
+    angle: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    other: FloatArray
+    time_s: FloatArray
 
 
 Torque = Callable[[Joint], FloatArray]
@@ -169,10 +177,15 @@ def names_of(family: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class HiddenTorque:
-    """A drawn hidden torque of every joint."""
+    """A drawn hidden torque of every joint.
 
-    parts: tuple[Torque, ...]  # Of each joint, the drawn torque
-    # Of each joint, N m or N: what makes it as large as asked on the motion it was drawn on
+    Attributes:
+        parts: Of each joint, the drawn torque.
+        amplitude: Of each joint, N m or N: what makes it as large as asked on the motion it was
+            drawn on.
+    """
+
+    parts: tuple[Torque, ...]
     amplitude: FloatArray
 
     def __call__(self, motion: Motion) -> FloatArray:

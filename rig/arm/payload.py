@@ -46,15 +46,25 @@ which at another speed looks like a mass: 13 g of 80 g on a simulated arm."""
 
 @dataclass(frozen=True)
 class Payload:
-    """Added masses of some runs."""
+    """Added masses of some runs.
 
-    schema: str  # Name of this layout
-    model: str  # Run that the model was fitted on
-    height_m: float  # Height of the mass above the remote centre, m
-    height_error_m: float  # Its standard error, m
-    runs: tuple[str, ...]  # Names of the runs
-    masses: tuple[AddedMass, ...]  # Estimated mass on each
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        model: Run that the model was fitted on.
+        height_m: Height of the mass above the remote centre, m.
+        height_error_m: Its standard error, m.
+        runs: Names of the runs.
+        masses: Estimated mass on each.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    model: str
+    height_m: float
+    height_error_m: float
+    runs: tuple[str, ...]
+    masses: tuple[AddedMass, ...]
+    provenance: Provenance
 
 
 def find_payload(

@@ -62,30 +62,47 @@ def open_paths(data: Path, names: Sequence[str]) -> list[Recording]:
 
 @dataclass(frozen=True)
 class Trial:
-    """One effect that the search tried."""
+    """One effect that the search tried.
 
-    effect: str  # Its name
-    what: str  # Description
-    kept_in_round: int | None  # Round of the search that kept it, from 1; None if dropped
-    # Mean relative gain over the joints, on the test path of the search: in the round that kept it,
-    # else in the last round
+    Attributes:
+        effect: Its name.
+        what: Description.
+        kept_in_round: Round of the search that kept it, from 1; None if dropped.
+        gain_percent: Mean relative gain over the joints, on the test path of the search: in the
+            round that kept it, else in the last round.
+        other_way_percent: The same in the direction that was not chosen on.
+    """
+
+    effect: str
+    what: str
+    kept_in_round: int | None
     gain_percent: float
-    other_way_percent: float  # The same in the direction that was not chosen on
+    other_way_percent: float
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """One path, ready to be fitted or tested on: filtered, cut, thinned."""
+    """One path, ready to be fitted or tested on: filtered, cut, thinned.
 
-    name: str  # The run
-    position: FloatArray  # Filtered positions, shape (n, joints)
-    torque: FloatArray  # Filtered torque, shape (n, rows): joints, then the gripper
-    # Base columns of filtered motion, as the thesis makes them, shape (n, joints, base)
+    Attributes:
+        name: The run.
+        position: Filtered positions, shape (n, joints).
+        torque: Filtered torque, shape (n, rows): joints, then the gripper.
+        thesis: Base columns of filtered motion, as the thesis makes them, shape (n, joints, base).
+        closed: The same of the arm with its loops.
+        table: Filtered columns of barely filtered motion: the base, then every candidate.
+        blocks: Which columns of the table belong to what; the base first.
+        independent_share: Share of its samples that are independent after the filter.
+    """
+
+    name: str
+    position: FloatArray
+    torque: FloatArray
     thesis: FloatArray
-    closed: FloatArray  # The same of the arm with its loops
-    table: FloatArray  # Filtered columns of barely filtered motion: the base, then every candidate
-    blocks: tuple[Block, ...]  # Which columns of the table belong to what; the base first
-    independent_share: float  # Share of its samples that are independent after the filter
+    closed: FloatArray
+    table: FloatArray
+    blocks: tuple[Block, ...]
+    independent_share: float
 
     @property
     def joints(self) -> int:

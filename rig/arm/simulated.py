@@ -44,13 +44,18 @@ SEED_SPREAD = 0.25
 
 @dataclass(frozen=True)
 class SimulatedArm:
-    """One arm drawn at random around the plausible one."""
+    """One arm drawn at random around the plausible one.
 
-    values: FloatArray  # Its declared parameters, in the order of `estimation.arm.regressor.names`
-    # Strengths of its hidden friction, drift and cross friction, shape (3, joints)
+    Attributes:
+        values: Its declared parameters, in the order of `estimation.arm.regressor.names`.
+        hidden: Strengths of its hidden friction, drift and cross friction, shape (3, joints).
+        slip: Displacement over which its Dahl friction turns, rad or m, shape (joints,).
+        form: Hidden torque of a drawn family, in place of those frictions and drift.
+    """
+
+    values: FloatArray
     hidden: FloatArray
-    slip: FloatArray  # Displacement over which its Dahl friction turns, rad or m, shape (joints,)
-    # Hidden torque of a drawn family, in place of those frictions and drift
+    slip: FloatArray
     form: HiddenTorque | None = None
 
 
@@ -75,11 +80,17 @@ def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float
 
 @dataclass(frozen=True)
 class ArmRun:
-    """The readings of the arm's own sensors in a run, and the true values."""
+    """The readings of the arm's own sensors in a run, and the true values.
 
-    position: FloatArray  # Measured positions, shape (n, joints)
-    torque: FloatArray  # Measured torque, shape (n, joints)
-    wrench: FloatArray  # True spatial wrench of the tip on its surroundings, shape (n, 6)
+    Attributes:
+        position: Measured positions, shape (n, joints).
+        torque: Measured torque, shape (n, joints).
+        wrench: True spatial wrench of the tip on its surroundings, shape (n, 6).
+    """
+
+    position: FloatArray
+    torque: FloatArray
+    wrench: FloatArray
 
 
 def draw_arm(rng: np.random.Generator, family: str = OWN) -> SimulatedArm:

@@ -21,11 +21,17 @@ from rig.machines.choose import machine_of
 
 @dataclass(frozen=True, slots=True)
 class Latch:
-    """What was latched, and what is left to do."""
+    """What was latched, and what is left to do.
 
-    what: str  # The fault or trip in words; empty when nothing was latched
-    code: int  # Its code, 0 for none
-    then: str  # What is left to do; may be empty
+    Attributes:
+        what: The fault or trip in words; empty when nothing was latched.
+        code: Its code, 0 for none.
+        then: What is left to do; may be empty.
+    """
+
+    what: str
+    code: int
+    then: str
 
 
 def clear_latch(config: Config) -> Latch:

@@ -30,13 +30,21 @@ class FirmwareToolError(RigError):
 
 @dataclass(frozen=True, slots=True)
 class Versions:
-    """Which firmware is where."""
+    """Which firmware is where.
 
-    program: str  # Protocol of this program
-    sources: str  # The build of the source tree, or a note that there is none
-    board: str  # The board's identity, or the reason why it is unknown
-    fits: bool  # Whether program and board have the same protocol
-    remarks: tuple[str, ...]  # Remarks, with the next command
+    Attributes:
+        program: Protocol of this program.
+        sources: The build of the source tree, or a note that there is none.
+        board: The board's identity, or the reason why it is unknown.
+        fits: Whether program and board have the same protocol.
+        remarks: Remarks, with the next command.
+    """
+
+    program: str
+    sources: str
+    board: str
+    fits: bool
+    remarks: tuple[str, ...]
 
 
 def source_hash() -> int | None:

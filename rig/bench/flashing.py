@@ -22,11 +22,17 @@ LOOK_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A board that may be flashed."""
+    """A board that may be flashed.
 
-    serial: str  # Its USB serial number, the chip's own
-    port: str  # Its device path
-    state: str  # What is known of its state, in words
+    Attributes:
+        serial: Its USB serial number, the chip's own.
+        port: Its device path.
+        state: What is known of its state, in words.
+    """
+
+    serial: str
+    port: str
+    state: str
 
 
 def board_to_flash(serial: str, profile: Profile) -> Board:

@@ -33,10 +33,15 @@ SIMULATED = "sim:"
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How the program that held a rig let go."""
+    """How the program that held a rig let go.
 
-    pid: int  # Its process number
-    was_killed: bool  # Whether it did not end when it was asked to
+    Attributes:
+        pid: Its process number.
+        was_killed: Whether it did not end when it was asked to.
+    """
+
+    pid: int
+    was_killed: bool
 
 
 @contextmanager

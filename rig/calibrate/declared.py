@@ -34,10 +34,15 @@ STEADY = LowPass(cutoff_hz=20.0, order=3)
 
 @dataclass(frozen=True)
 class Declared:
-    """What one calibration declares."""
+    """What one calibration declares.
 
-    model: Model  # Its equation, a model named `calibration.KIND`
-    recordings: list[Recording]  # The runs it was made from
+    Attributes:
+        model: Its equation, a model named `calibration.KIND`.
+        recordings: The runs it was made from.
+    """
+
+    model: Model
+    recordings: list[Recording]
 
 
 def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) -> Declared:

@@ -16,22 +16,36 @@ from rig.output.figures import scattered
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """The text fields of a record."""
+    """The text fields of a record.
 
-    operator: str  # Who made it
-    days: float | None = None  # Days after which it is stale; None if never
-    instrument: str = ""  # Serial number of the instrument it holds for; empty for any
-    serials: Mapping[str, str]  # Device to serial number
-    notes: str = ""  # Operator's notes
+    Attributes:
+        operator: Who made it.
+        days: Days after which it is stale; None if never.
+        instrument: Serial number of the instrument it holds for; empty for any.
+        serials: Device to serial number.
+        notes: Operator's notes.
+    """
+
+    operator: str
+    days: float | None = None
+    instrument: str = ""
+    serials: Mapping[str, str]
+    notes: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """A calibration that was kept."""
+    """A calibration that was kept.
 
-    records: dict[str, CalibrationRecord]  # The records, by hash
-    folder: Path  # Folder of their raw logs
-    conclusion: Conclusion  # Conclusion of the session
+    Attributes:
+        records: The records, by hash.
+        folder: Folder of their raw logs.
+        conclusion: Conclusion of the session.
+    """
+
+    records: dict[str, CalibrationRecord]
+    folder: Path
+    conclusion: Conclusion
 
 
 def keep(

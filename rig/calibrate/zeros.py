@@ -16,14 +16,22 @@ CONFIG = "config.json"
 
 @dataclass(frozen=True, slots=True)
 class ZeroMotion:
-    """The zero of one sensor over some runs."""
+    """The zero of one sensor over some runs.
 
-    channel: str  # Its channel
-    unit: str  # The unit of all values, SI
-    runs: int  # Number of runs with a zero before and after
-    within_run: float  # Largest change from before a run to after it, as a magnitude
-    over_all: float  # Range of the zeros before all runs; it was tared off each run
-    # Largest change within a run that the configuration allows; None for no limit
+    Attributes:
+        channel: Its channel.
+        unit: The unit of all values, SI.
+        runs: Number of runs with a zero before and after.
+        within_run: Largest change from before a run to after it, as a magnitude.
+        over_all: Range of the zeros before all runs; it was tared off each run.
+        limit: Largest change within a run that the configuration allows; None for no limit.
+    """
+
+    channel: str
+    unit: str
+    runs: int
+    within_run: float
+    over_all: float
     limit: float | None
 
     @property

@@ -31,30 +31,51 @@ CREATE INDEX of_folder ON runs (folder);
 
 @dataclass(frozen=True)
 class IndexedRun:
-    """What the index holds of one run."""
+    """What the index holds of one run.
 
-    file: str  # Name of the log
-    name: str  # Name of the run
-    rig: str  # Name of the rig
-    instrument: str  # Identity of the instrument in words
-    date: str  # When it was started, ISO 8601, UTC; empty if not recorded
-    protocol: str  # Name of the protocol
-    conditions: Mapping[str, float | str]  # Name with unit to value
-    notes: str  # Operator's notes
-    state: str  # `complete`, or what is wrong with the log
-    samples: int  # Samples in the log
-    lost: int  # Samples expected and not in the log
-    duration_s: float | None  # Planned duration, s, or None
-    excluded: str  # Why the run does not count as evidence; empty if it does
+    Attributes:
+        file: Name of the log.
+        name: Name of the run.
+        rig: Name of the rig.
+        instrument: Identity of the instrument in words.
+        date: When it was started, ISO 8601, UTC; empty if not recorded.
+        protocol: Name of the protocol.
+        conditions: Name with unit to value.
+        notes: Operator's notes.
+        state: `complete`, or what is wrong with the log.
+        samples: Samples in the log.
+        lost: Samples expected and not in the log.
+        duration_s: Planned duration, s, or None.
+        excluded: Why the run does not count as evidence; empty if it does.
+    """
+
+    file: str
+    name: str
+    rig: str
+    instrument: str
+    date: str
+    protocol: str
+    conditions: Mapping[str, float | str]
+    notes: str
+    state: str
+    samples: int
+    lost: int
+    duration_s: float | None
+    excluded: str
 
 
 @dataclass(frozen=True)
 class IndexedCampaign:
-    """A folder of logs."""
+    """A folder of logs.
 
-    folder: Path  # The folder
-    runs: tuple[IndexedRun, ...]  # Its runs; of several attempts at a run the one that counts
-    # Its latest diagnosis, an object of `rig.diagnosis/1`, or None
+    Attributes:
+        folder: The folder.
+        runs: Its runs; of several attempts at a run the one that counts.
+        diagnosis: Its latest diagnosis, an object of `rig.diagnosis/1`, or None.
+    """
+
+    folder: Path
+    runs: tuple[IndexedRun, ...]
     diagnosis: Mapping[str, Any] | None
 
 

@@ -28,11 +28,17 @@ VERDICT = "verdict"
 
 @dataclass(frozen=True)
 class Comparison:
-    """One condition of a search."""
+    """One condition of a search.
 
-    name: str  # Field or condition
-    sign: str  # Key of `COMPARISONS`
-    text: str  # The value, as typed
+    Attributes:
+        name: Field or condition.
+        sign: Key of `COMPARISONS`.
+        text: The value, as typed.
+    """
+
+    name: str
+    sign: str
+    text: str
 
 
 def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[IndexedCampaign]:

@@ -59,18 +59,31 @@ Stage = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Demo:
-    """The results of a demonstration."""
+    """The results of a demonstration.
 
-    folder: Path  # Folder of all files, the logs in `logs`
-    report: Path  # The diagnosis, one HTML page
-    first_look: Path  # The page of the screening
-    model: Path  # File of the model with the added effect
-    ledger: Path  # The demonstration's own log of uses of held-out data
-    runs: tuple[RunResult, ...]  # The recorded runs
-    held_out: HeldOutError  # Error of the declared model on runs it was not fitted on
-    structures: tuple[Structure, ...]  # Variables that its residual depends on, largest first
-    diagnosis: Diagnosis  # What the model lacks
-    firmware: bool  # Whether the compiled firmware core was in the loop
+    Attributes:
+        folder: Folder of all files, the logs in `logs`.
+        report: The diagnosis, one HTML page.
+        first_look: The page of the screening.
+        model: File of the model with the added effect.
+        ledger: The demonstration's own log of uses of held-out data.
+        runs: The recorded runs.
+        held_out: Error of the declared model on runs it was not fitted on.
+        structures: Variables that its residual depends on, largest first.
+        diagnosis: What the model lacks.
+        firmware: Whether the compiled firmware core was in the loop.
+    """
+
+    folder: Path
+    report: Path
+    first_look: Path
+    model: Path
+    ledger: Path
+    runs: tuple[RunResult, ...]
+    held_out: HeldOutError
+    structures: tuple[Structure, ...]
+    diagnosis: Diagnosis
+    firmware: bool
 
     def to_json(self) -> dict[str, Any]:
         """Return everything, the diagnosis as its contract has it."""

@@ -15,12 +15,19 @@ from rig.errors import UsageError
 
 @dataclass(frozen=True)
 class Answers:
-    """A machine in words, parts separated by colons."""
+    """A machine in words, parts separated by colons.
 
-    axes: Sequence[str]  # NAME:UNIT
-    transmissions: Sequence[str]  # INPUT:OUTPUT or INPUT:OUTPUT:RATIO
-    actuators: Sequence[str]  # AXIS:CHANNEL
-    sensors: Sequence[str]  # AXIS:CHANNEL
+    Attributes:
+        axes: NAME:UNIT.
+        transmissions: INPUT:OUTPUT or INPUT:OUTPUT:RATIO.
+        actuators: AXIS:CHANNEL.
+        sensors: AXIS:CHANNEL.
+    """
+
+    axes: Sequence[str]
+    transmissions: Sequence[str]
+    actuators: Sequence[str]
+    sensors: Sequence[str]
 
     @property
     def is_empty(self) -> bool:

@@ -15,10 +15,15 @@ RECORDINGS = Path("logs")
 
 @dataclass(frozen=True)
 class Step:
-    """One line of advice."""
+    """One line of advice.
 
-    state: str  # What is here, or missing
-    command: str = ""  # What to type next; empty if nothing is needed
+    Attributes:
+        state: What is here, or missing.
+        command: What to type next; empty if nothing is needed.
+    """
+
+    state: str
+    command: str = ""
 
 
 def show_next_steps() -> None:

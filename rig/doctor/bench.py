@@ -20,12 +20,19 @@ stops. `rig selftest --bench` prints this list after its own checks; keep it wit
 
 @dataclass(frozen=True, slots=True)
 class BenchTest:
-    """One test for a person with a bench."""
+    """One test for a person with a bench.
 
-    name: str  # Its name
-    why: str  # Why nothing else shows it
-    do: str  # What to do
-    shows: str  # What it must show
+    Attributes:
+        name: Its name.
+        why: Why nothing else shows it.
+        do: What to do.
+        shows: What it must show.
+    """
+
+    name: str
+    why: str
+    do: str
+    shows: str
 
 
 def bench_tests() -> list[BenchTest]:

@@ -43,13 +43,19 @@ ENCODERS = ("motor_angle_rad", "spindle_angle_rad", "jaw_angle_rad")
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """What a pulse did."""
+    """What a pulse did.
 
-    ratio: float  # Its size, of a full command in SI signs, closing positive
-    change: dict[str, float]  # Change of each encoder, rad at the spindle, by channel
-    # Mean measured current at its end less that before, A; None without a read-back
+    Attributes:
+        ratio: Its size, of a full command in SI signs, closing positive.
+        change: Change of each encoder, rad at the spindle, by channel.
+        current_a: Mean measured current at its end less that before, A; None without a read-back.
+        trip: What the board tripped over; `Trip.NONE` for nothing.
+    """
+
+    ratio: float
+    change: dict[str, float]
     current_a: float | None
-    trip: Trip  # What the board tripped over; `Trip.NONE` for nothing
+    trip: Trip
 
 
 def commission(config: Config) -> Iterator[Check]:

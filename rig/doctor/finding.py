@@ -15,13 +15,21 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding."""
+    """One finding.
 
-    subject: str  # Subject of the check: a device, a port, the computer
-    check: str  # The check
-    level: Level  # Whether it is in order
-    what: str  # Finding, with numbers
-    fix: str = ""  # Action or next command; empty if none is needed
+    Attributes:
+        subject: Subject of the check: a device, a port, the computer.
+        check: The check.
+        level: Whether it is in order.
+        what: Finding, with numbers.
+        fix: Action or next command; empty if none is needed.
+    """
+
+    subject: str
+    check: str
+    level: Level
+    what: str
+    fix: str = ""
 
 
 def worst(findings: Iterable[Finding]) -> Level:

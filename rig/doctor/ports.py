@@ -16,11 +16,17 @@ CAN_LINK_TYPE = "280"
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One serial port."""
+    """One serial port.
 
-    path: str  # Device path
-    usb: str  # `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB
-    name: str  # Name reported by the device
+    Attributes:
+        path: Device path.
+        usb: `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB.
+        name: Name reported by the device.
+    """
+
+    path: str
+    usb: str
+    name: str
 
 
 def serial_ports() -> list[Port]:

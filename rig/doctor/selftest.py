@@ -30,11 +30,17 @@ LATEST_TRIP_S = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Result of one check."""
+    """Result of one check.
 
-    name: str  # Name of the check
-    passed: bool  # Whether it holds
-    detail: str  # Numbers, or what went wrong
+    Attributes:
+        name: Name of the check.
+        passed: Whether it holds.
+        detail: Numbers, or what went wrong.
+    """
+
+    name: str
+    passed: bool
+    detail: str
 
 
 def selftest(config: Config) -> Iterator[Check]:

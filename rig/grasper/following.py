@@ -27,13 +27,21 @@ ZEROS_S = 0.5
 
 @dataclass(slots=True)
 class Followed:
-    """Motion of one motor."""
+    """Motion of one motor.
 
-    axis: str  # `yaw`, `jaw_1` or `jaw_2`
-    lowest_rad: float = np.inf  # Least angle it was at
-    highest_rad: float = -np.inf  # Greatest
-    largest_error_rad: float = 0.0  # Greatest size of its angle less its setpoint
-    largest_force_n: float = 0.0  # Greatest force at its tip
+    Attributes:
+        axis: `yaw`, `jaw_1` or `jaw_2`.
+        lowest_rad: Least angle it was at.
+        highest_rad: Greatest.
+        largest_error_rad: Greatest size of its angle less its setpoint.
+        largest_force_n: Greatest force at its tip.
+    """
+
+    axis: str
+    lowest_rad: float = np.inf
+    highest_rad: float = -np.inf
+    largest_error_rad: float = 0.0
+    largest_force_n: float = 0.0
 
     def add(self, reading: Reading) -> None:
         """Take in samples that played a setpoint."""

@@ -37,11 +37,17 @@ RELAX_RAD = 0.03
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """Angles of the three axes over a whole motion, at 2 kHz."""
+    """Angles of the three axes over a whole motion, at 2 kHz.
 
-    setpoints: tuple[FloatArray, ...]  # Yaw, jaw 1, jaw 2, each of shape (n,), rad
-    first: int  # Index of the run's first setpoint
-    last: int  # Index behind its last
+    Attributes:
+        setpoints: Yaw, jaw 1, jaw 2, each of shape (n,), rad.
+        first: Index of the run's first setpoint.
+        last: Index behind its last.
+    """
+
+    setpoints: tuple[FloatArray, ...]
+    first: int
+    last: int
 
 
 def axes_of_joints(joint_rad: FloatArray) -> FloatArray:

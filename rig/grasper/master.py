@@ -15,10 +15,14 @@ TOP_COUNT = 4095
 
 @dataclass(frozen=True, slots=True)
 class Master:
-    """Joint angles from counts: `angle = (count - zero_count) * rad_per_count`."""
+    """Joint angles from counts: `angle = (count - zero_count) * rad_per_count`.
 
-    zero_counts: tuple[float, float, float]  # Counts at the zeros of yaw, pitch and grasp
-    # Turn of each joint for a count; its sign is that of the mounting
+    Attributes:
+        zero_counts: Counts at the zeros of yaw, pitch and grasp.
+        rad_per_count: Turn of each joint for a count; its sign is that of the mounting.
+    """
+
+    zero_counts: tuple[float, float, float]
     rad_per_count: tuple[float, float, float]
 
     def joint_rad(self, counts: ArrayLike) -> FloatArray:

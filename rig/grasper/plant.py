@@ -34,11 +34,17 @@ FORM_VARIABLES = ("load", "speed", "angle", "time", "acceleration")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Form:
-    """A factor on the level of friction: a table over the size of one variable."""
+    """A factor on the level of friction: a table over the size of one variable.
 
-    variable: int  # Place in `FORM_VARIABLES`: N m, rad/s, rad, s, rad/s^2
-    high: float  # End of the table, which begins at 0; beyond it the last value stays
-    values: FloatArray  # Shape (points,)
+    Attributes:
+        variable: Place in `FORM_VARIABLES`: N m, rad/s, rad, s, rad/s^2.
+        high: End of the table, which begins at 0; beyond it the last value stays.
+        values: Shape (points,).
+    """
+
+    variable: int
+    high: float
+    values: FloatArray
 
 
 NO_FORM = Form(0, 1.0, np.ones(2))
@@ -46,24 +52,43 @@ NO_FORM = Form(0, 1.0, np.ones(2))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisParameters:
-    """One axis of the simulated grasper, SI units, at the joint."""
+    """One axis of the simulated grasper, SI units, at the joint.
 
-    gearhead_ratio: float = 66.0  # 66 in the paper
-    torque_constant_n_m_a: float = 14.6e-3  # Of the motor; data sheet of the Faulhaber 2224U012SR
-    rotor_inertia_kg_m2: float = 2.7e-7  # 2.7 g cm2 in the paper
-    coulomb_n_m: float = 4e-3  # Friction without load
-    load_friction_ratio: float = 0.4  # Friction a unit of contact torque
-    viscous_n_m_s_rad: float = 5e-3  # Viscous friction
-    presliding_rad: float = 4e-3  # Travel over which friction builds up
-    relaxed_ratio: float = 0.6  # Share of its friction that a held bearing keeps
-    relaxation_s: float = 3.0  # Time constant of letting go
-    contact_n_m_rad: float = 0.3  # Stiffness of what is grasped, with cable and jaw
-    contact_rad: float = 0.1  # Angle of first contact
-    arm_m: float = 0.010  # From the joint to where the force acts. Assumed.
-    current_offset_a: float = 0.0  # Of the current sensor
-    current_noise_a: float = 2e-3  # Standard deviation of one sample
-    force_noise_n: float = 5e-3  # Standard deviation of one sample of the force sensor
-    form: Form = NO_FORM  # Factor on the level of friction
+    Attributes:
+        gearhead_ratio: 66 in the paper.
+        torque_constant_n_m_a: Of the motor; data sheet of the Faulhaber 2224U012SR.
+        rotor_inertia_kg_m2: 2.7 g cm2 in the paper.
+        coulomb_n_m: Friction without load.
+        load_friction_ratio: Friction a unit of contact torque.
+        viscous_n_m_s_rad: Viscous friction.
+        presliding_rad: Travel over which friction builds up.
+        relaxed_ratio: Share of its friction that a held bearing keeps.
+        relaxation_s: Time constant of letting go.
+        contact_n_m_rad: Stiffness of what is grasped, with cable and jaw.
+        contact_rad: Angle of first contact.
+        arm_m: From the joint to where the force acts. Assumed.
+        current_offset_a: Of the current sensor.
+        current_noise_a: Standard deviation of one sample.
+        force_noise_n: Standard deviation of one sample of the force sensor.
+        form: Factor on the level of friction.
+    """
+
+    gearhead_ratio: float = 66.0
+    torque_constant_n_m_a: float = 14.6e-3
+    rotor_inertia_kg_m2: float = 2.7e-7
+    coulomb_n_m: float = 4e-3
+    load_friction_ratio: float = 0.4
+    viscous_n_m_s_rad: float = 5e-3
+    presliding_rad: float = 4e-3
+    relaxed_ratio: float = 0.6
+    relaxation_s: float = 3.0
+    contact_n_m_rad: float = 0.3
+    contact_rad: float = 0.1
+    arm_m: float = 0.010
+    current_offset_a: float = 0.0
+    current_noise_a: float = 2e-3
+    force_noise_n: float = 5e-3
+    form: Form = NO_FORM
 
     @property
     def values(self) -> FloatArray:
@@ -201,10 +226,14 @@ def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[s
 
 @dataclass(frozen=True, slots=True)
 class Prototype:
-    """A simulated grasper: the axes whose mean current gives each degree of freedom's force."""
+    """A simulated grasper: the axes whose mean current gives each degree of freedom's force.
 
-    name: str  # Name
-    # Degree of freedom to its axes: both jaws for grasp, the touching jaw for pitch
+    Attributes:
+        name: Name.
+        axes: Degree of freedom to its axes: both jaws for grasp, the touching jaw for pitch.
+    """
+
+    name: str
     axes: Mapping[str, tuple[AxisParameters, ...]]
 
 

@@ -42,9 +42,13 @@ DESIGN = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
 
 @dataclass(frozen=True)
 class Wrist:
-    """A grasper as it was designed and as it was built."""
+    """A grasper as it was designed and as it was built.
 
-    pulley_ratio: float = 1.0  # d2 / d1 of the pulleys it was built with; 1 decouples it
+    Attributes:
+        pulley_ratio: d2 / d1 of the pulleys it was built with; 1 decouples it.
+    """
+
+    pulley_ratio: float = 1.0
 
     @property
     def designed(self) -> Coupling:

@@ -41,12 +41,19 @@ SHIFT_GAIN = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """How a channel's slope compares with its stated derivative."""
+    """How a channel's slope compares with its stated derivative.
 
-    ratio: float  # Slope over derivative, negative where the signs differ; 1 is right
-    lag_s: float  # Time by which the derivative is late, s; negative where it is early
-    lag_is_shift: bool  # Whether the lag is too large for a filter
-    correlation: float  # Correlation of the two after the lag, 0 to 1
+    Attributes:
+        ratio: Slope over derivative, negative where the signs differ; 1 is right.
+        lag_s: Time by which the derivative is late, s; negative where it is early.
+        lag_is_shift: Whether the lag is too large for a filter.
+        correlation: Correlation of the two after the lag, 0 to 1.
+    """
+
+    ratio: float
+    lag_s: float
+    lag_is_shift: bool
+    correlation: float
 
     @property
     def ratio_is_wrong(self) -> bool:

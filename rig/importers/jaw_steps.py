@@ -39,18 +39,27 @@ ALIKE = {
 
 @dataclass(frozen=True, slots=True)
 class JawStep:
-    """A step of the jaw's zero."""
+    """A step of the jaw's zero.
 
-    run: str  # The first run after it
-    step_rad: float  # Change of the zero, rad, closing positive
+    Attributes:
+        run: The first run after it.
+        step_rad: Change of the zero, rad, closing positive.
+    """
+
+    run: str
+    step_rad: float
 
 
 @dataclass(frozen=True)
 class JawZeros:
-    """The jaw's zero in every run of a campaign."""
+    """The jaw's zero in every run of a campaign.
 
-    runs: tuple[str, ...]  # Names of the runs
-    # Zero of each run's segment, counted from that of the last run, shape (runs,)
+    Attributes:
+        runs: Names of the runs.
+        zero_rad: Zero of each run's segment, counted from that of the last run, shape (runs,).
+    """
+
+    runs: tuple[str, ...]
     zero_rad: FloatArray
 
     @property

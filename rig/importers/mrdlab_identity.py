@@ -29,12 +29,17 @@ SIDES = {"L": "left", "R": "right"}
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What is known of a run before its samples are read."""
+    """What is known of a run before its samples are read.
 
-    instrument: Instrument  # Identity of the instrument
-    # `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where available
+    Attributes:
+        instrument: Identity of the instrument.
+        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where available.
+        remarks: How the identity was found, one sentence each.
+    """
+
+    instrument: Instrument
     conditions: dict[str, float | str]
-    remarks: tuple[str, ...]  # How the identity was found, one sentence each
+    remarks: tuple[str, ...]
 
 
 def identify(folder: str, stem: str, header: str) -> Identity:

@@ -41,10 +41,15 @@ DRIVEN = {
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """The side of a log."""
+    """The side of a log.
 
-    name: str  # "left" or "right"
-    remarks: tuple[str, ...] = ()  # How it was found where that is not plain, one sentence each
+    Attributes:
+        name: "left" or "right".
+        remarks: How it was found where that is not plain, one sentence each.
+    """
+
+    name: str
+    remarks: tuple[str, ...] = ()
 
     @property
     def sign(self) -> float:

@@ -34,11 +34,17 @@ STEP_TOLERANCE_RATIO = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """One log as it was written."""
+    """One log as it was written.
 
-    header: str  # The `%` lines, without the signs
-    columns: FloatArray  # Raw values in the file's column order, shape (10, n); time in seconds
-    header_lines: int  # Number of header lines
+    Attributes:
+        header: The `%` lines, without the signs.
+        columns: Raw values in the file's column order, shape (10, n); time in seconds.
+        header_lines: Number of header lines.
+    """
+
+    header: str
+    columns: FloatArray
+    header_lines: int
 
 
 def looks_like_log(first_bytes: bytes) -> bool:

@@ -14,13 +14,21 @@ CONVERGED_HZ = 1e-7
 
 @dataclass(frozen=True, slots=True)
 class Sine:
-    """A fitted trajectory centre + amplitude sin(2 pi f t + phase)."""
+    """A fitted trajectory centre + amplitude sin(2 pi f t + phase).
 
-    frequency_hz: float  # Frequency f, Hz
-    centre_rad: float  # Mean of the sine, rad
-    amplitude_rad: float  # Amplitude, rad, not negative
-    phase_rad: float  # Phase at time zero, rad
-    explained_ratio: float  # Share of the variance the sine explains, at most 1
+    Attributes:
+        frequency_hz: Frequency f, Hz.
+        centre_rad: Mean of the sine, rad.
+        amplitude_rad: Amplitude, rad, not negative.
+        phase_rad: Phase at time zero, rad.
+        explained_ratio: Share of the variance the sine explains, at most 1.
+    """
+
+    frequency_hz: float
+    centre_rad: float
+    amplitude_rad: float
+    phase_rad: float
+    explained_ratio: float
 
     def angle_rad(self, time_s: FloatArray) -> FloatArray:
         """Return the sine at these times, shape of `time_s`."""

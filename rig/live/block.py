@@ -18,21 +18,34 @@ class BlockError(DataError):
 
 @dataclass(frozen=True, slots=True)
 class DeviceStatus:
-    """State of one device."""
+    """State of one device.
 
-    name: str  # Name of the device
-    state: str  # One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ..
-    detail: str = ""  # Further information for the user; may be empty
+    Attributes:
+        name: Name of the device.
+        state: One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ...
+        detail: Further information for the user; may be empty.
+    """
+
+    name: str
+    state: str
+    detail: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class LimitStatus:
-    """One watched quantity and how far it may go."""
+    """One watched quantity and how far it may go.
 
-    name: str  # Limited quantity
-    value: float  # Its value now; the limit holds in both directions
-    limit: float  # The magnitude that trips the rig, positive
-    unit: str  # Unit of both
+    Attributes:
+        name: Limited quantity.
+        value: Its value now; the limit holds in both directions.
+        limit: The magnitude that trips the rig, positive.
+        unit: Unit of both.
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +53,26 @@ class SampleBlock:
     """Consecutive samples, usually 50 ms of them.
 
     A block without samples means that nothing arrived during its time.
+
+    Attributes:
+        time_s: Device clock, shape (n,), increasing.
+        columns: Channel name to values, shape (n,) each, SI units, closing positive.
+        flags: `estimation.recording.Flag` bits, shape (n,), uint8.
+        estimates: Channel name to its estimate, shape (n,) each; may be empty.
+        lost: Samples lost since the start.
+        devices: State of each device.
+        limits: Watched limits; may be empty.
+        inside: Channel name to whether its estimate is within the fitted range of its
+            estimator, shape (n,) each; channels of estimators without a range are missing.
     """
 
-    time_s: FloatArray  # Device clock, shape (n,), increasing
-    # Channel name to values, shape (n,) each, SI units, closing positive
+    time_s: FloatArray
     columns: Mapping[str, FloatArray]
-    flags: NDArray[np.uint8]  # `estimation.recording.Flag` bits, shape (n,), uint8
-    # Channel name to its estimate, shape (n,) each; may be empty
+    flags: NDArray[np.uint8]
     estimates: Mapping[str, FloatArray]
-    lost: int  # Samples lost since the start
-    devices: tuple[DeviceStatus, ...]  # State of each device
-    limits: tuple[LimitStatus, ...] = ()  # Watched limits; may be empty
-    # Channel name to whether its estimate is within the fitted range of its estimator, shape (n,)
-    # each; channels of estimators without a range are missing
+    lost: int
+    devices: tuple[DeviceStatus, ...]
+    limits: tuple[LimitStatus, ...] = ()
     inside: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

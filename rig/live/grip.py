@@ -31,12 +31,19 @@ SHARE = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """One period."""
+    """One period.
 
-    time_s: float  # Its end, s of the session
-    estimate_n_m: float  # Mean estimate in motion
-    sensor_n_m: float  # Mean of the sensor over the same samples
-    load_a: float  # Load that was asked for
+    Attributes:
+        time_s: Its end, s of the session.
+        estimate_n_m: Mean estimate in motion.
+        sensor_n_m: Mean of the sensor over the same samples.
+        load_a: Load that was asked for.
+    """
+
+    time_s: float
+    estimate_n_m: float
+    sensor_n_m: float
+    load_a: float
 
 
 class Grip:

@@ -9,17 +9,25 @@ from rig.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class ShowOptions:
-    """Options of a display."""
+    """Options of a display.
 
-    title: str  # Title of the display
-    channels: tuple[str, ...] = ("distal_torque_n_m",)  # Quantities to watch, the main one first
-    # Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
+    Attributes:
+        title: Title of the display.
+        channels: Quantities to watch, the main one first.
+        lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
+        plain: Lines for people, also in a terminal that could draw.
+        json: One JSON object a line on stdout, nothing for people.
+        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
+        footer: Available keys.
+    """
+
+    title: str
+    channels: tuple[str, ...] = ("distal_torque_n_m",)
     lever_m: float = 0.012
-    plain: bool = False  # Lines for people, also in a terminal that could draw
-    json: bool = False  # One JSON object a line on stdout, nothing for people
-    # Half of the 95 % interval of each channel's estimate, SI, where it is known
+    plain: bool = False
+    json: bool = False
     half_widths: Mapping[str, float] = field(default_factory=dict)
-    footer: str = "Ctrl-C quits"  # Available keys
+    footer: str = "Ctrl-C quits"
 
     def __post_init__(self) -> None:
         """Check the lever arm.

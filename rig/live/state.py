@@ -32,7 +32,7 @@ ESTIMATE, SENSOR, SQUARED_ERROR = range(3)
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A number, or the reason why there is none."""
+    """A number, or the reason why there is none.
 
     number: float | None  # The value, or None
     missing: str = ""  # Why the value is missing; empty when it is not
@@ -40,48 +40,82 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One quantity: estimate and sensor reading."""
+    """One quantity: estimate and sensor reading.
 
-    channel: str  # Name of the channel
-    unit: str  # Its SI unit
-    has_estimator: bool  # Whether the stream carries estimates of it
-    estimate: Value  # Mean estimate of the last 0.1 s
-    sensor: Value  # Mean sensor value of the last 0.1 s
-    error_rms: float | None  # Root mean square of estimate minus sensor over the last 5 s, or None
-    # Least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500), oldest first, NaN
-    # where there is none
+    Attributes:
+        channel: Name of the channel.
+        unit: Its SI unit.
+        has_estimator: Whether the stream carries estimates of it.
+        estimate: Mean estimate of the last 0.1 s.
+        sensor: Mean sensor value of the last 0.1 s.
+        error_rms: Root mean square of estimate minus sensor over the last 5 s, or None.
+        estimate_trace: Least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500),
+            oldest first, NaN where there is none.
+        sensor_trace: The same of the sensor.
+    """
+
+    channel: str
+    unit: str
+    has_estimator: bool
+    estimate: Value
+    sensor: Value
+    error_rms: float | None
     estimate_trace: FloatArray
-    sensor_trace: FloatArray  # The same of the sensor
+    sensor_trace: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One picture of the stream."""
+    """One picture of the stream.
 
-    time_s: float | None  # Device time of the newest sample, or None before the first
-    samples: int  # Samples received since the start
-    lost: int  # Samples lost since the start
-    sample_rate_hz: float | None  # Samples received over device time in the last 2 s, or None
-    flagged: Mapping[str, int]  # Name of each flag seen in the last 10 s and on how many samples
-    readings: tuple[Reading, ...]  # The watched quantities, the main one first
-    devices: tuple[DeviceStatus, ...]  # State of each device
-    limits: tuple[LimitStatus, ...]  # Watched limits
+    Attributes:
+        time_s: Device time of the newest sample, or None before the first.
+        samples: Samples received since the start.
+        lost: Samples lost since the start.
+        sample_rate_hz: Samples received over device time in the last 2 s, or None.
+        flagged: Name of each flag seen in the last 10 s and on how many samples.
+        readings: The watched quantities, the main one first.
+        devices: State of each device.
+        limits: Watched limits.
+    """
+
+    time_s: float | None
+    samples: int
+    lost: int
+    sample_rate_hz: float | None
+    flagged: Mapping[str, int]
+    readings: tuple[Reading, ...]
+    devices: tuple[DeviceStatus, ...]
+    limits: tuple[LimitStatus, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Summary of a whole stream."""
+    """Summary of a whole stream.
 
-    ended: str  # `finished` when the stream ended, `interrupted` when a person left
-    duration_s: float  # Device time covered, s
-    samples: int  # Samples received
-    lost: int  # Samples lost
-    flagged: Mapping[str, int]  # Name of each flag seen and on how many samples
-    channel: str  # The main quantity
-    error_rms: float | None  # Root mean square of its estimate minus its sensor value, SI, or None
-    error_samples: int  # Samples in that number: those not flagged and with both values
-    inside_rms: float | None = None  # The same within the fitted range of the estimator, or None
-    inside_samples: int = 0  # Samples in that number
+    Attributes:
+        ended: `finished` when the stream ended, `interrupted` when a person left.
+        duration_s: Device time covered, s.
+        samples: Samples received.
+        lost: Samples lost.
+        flagged: Name of each flag seen and on how many samples.
+        channel: The main quantity.
+        error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
+        error_samples: Samples in that number: those not flagged and with both values.
+        inside_rms: The same within the fitted range of the estimator, or None.
+        inside_samples: Samples in that number.
+    """
+
+    ended: str
+    duration_s: float
+    samples: int
+    lost: int
+    flagged: Mapping[str, int]
+    channel: str
+    error_rms: float | None
+    error_samples: int
+    inside_rms: float | None = None
+    inside_samples: int = 0
 
 
 class LiveState:

@@ -37,13 +37,20 @@ MARGIN = 18
 
 @dataclass(frozen=True)
 class View:
-    """A snapshot as rich renders it. Fits the width; the traces take what height is left."""
+    """A snapshot as rich renders it. Fits the width; the traces take what height is left.
 
-    snapshot: Snapshot  # Content of the display
-    title: str  # Title: a session's or a recording's name
-    lever_m: float  # Lever arm from the jaw's axis to its tip, m
-    footer: str = "Ctrl-C quits"  # Available keys
-    # Half of the 95 % interval of each channel's estimate, SI, where it is known
+    Attributes:
+        snapshot: Content of the display.
+        title: Title: a session's or a recording's name.
+        lever_m: Lever arm from the jaw's axis to its tip, m.
+        footer: Available keys.
+        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
+    """
+
+    snapshot: Snapshot
+    title: str
+    lever_m: float
+    footer: str = "Ctrl-C quits"
     half_widths: Mapping[str, float] = field(default_factory=dict)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:

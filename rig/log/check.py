@@ -38,33 +38,54 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that are missing between two that are there."""
+    """Samples that are missing between two that are there.
 
-    first_sequence: int  # Sequence number of the first missing sample
-    last_sequence: int  # Sequence number of the last missing sample
-    samples: int  # Number of missing samples
-    start_s: float  # Time of the last sample before the gap, s, in the stream's own time
-    length_s: float  # Time from that sample to the first one after the gap, s
+    Attributes:
+        first_sequence: Sequence number of the first missing sample.
+        last_sequence: Sequence number of the last missing sample.
+        samples: Number of missing samples.
+        start_s: Time of the last sample before the gap, s, in the stream's own time.
+        length_s: Time from that sample to the first one after the gap, s.
+    """
+
+    first_sequence: int
+    last_sequence: int
+    samples: int
+    start_s: float
+    length_s: float
 
 
 @dataclass(frozen=True)
 class TopicReport:
-    """Result of a check of one stream."""
+    """Result of a check of one stream.
 
-    topic: str  # Its topic
-    received: int  # Samples in the file
-    expected: int  # Samples that should be there: the largest of the three below and of `received`
-    # From the first sequence number to the last; None without them
+    Attributes:
+        topic: Its topic.
+        received: Samples in the file.
+        expected: Samples that should be there: the largest of the three below and of `received`.
+        expected_by_sequence: From the first sequence number to the last; None without them.
+        expected_by_plan: From the planned duration and rate; None without a plan.
+        expected_by_recorder: What the recorder had counted at the end; None if not recorded.
+        gaps: Missing stretches.
+        repeats: Samples whose sequence number does not come after the one before.
+        time_steps_back: Samples whose time does not come after the one before.
+        not_finite: Samples with a value that is not finite, all of them.
+        not_finite_unflagged: Those of them that no flag explains.
+        salvaged: Samples from the torn end of the file, which no checksum vouches for.
+    """
+
+    topic: str
+    received: int
+    expected: int
     expected_by_sequence: int | None
-    expected_by_plan: int | None  # From the planned duration and rate; None without a plan
-    # What the recorder had counted at the end; None if not recorded
+    expected_by_plan: int | None
     expected_by_recorder: int | None
-    gaps: tuple[Gap, ...]  # Missing stretches
-    repeats: int  # Samples whose sequence number does not come after the one before
-    time_steps_back: int  # Samples whose time does not come after the one before
-    not_finite: int  # Samples with a value that is not finite, all of them
-    not_finite_unflagged: int  # Those of them that no flag explains
-    salvaged: int  # Samples from the torn end of the file, which no checksum vouches for
+    gaps: tuple[Gap, ...]
+    repeats: int
+    time_steps_back: int
+    not_finite: int
+    not_finite_unflagged: int
+    salvaged: int
 
     @property
     def sound(self) -> bool:
@@ -77,16 +98,27 @@ class TopicReport:
 
 @dataclass(frozen=True)
 class LogReport:
-    """Result of a check."""
+    """Result of a check.
 
-    path: Path  # The log
-    run: str | None  # Name of the run; None when that is lost
-    verdict: Verdict  # Whether the log is complete, incomplete or damaged
-    closed: bool  # Whether the recorder closed the log
-    problems: tuple[str, ...]  # Faults in words; empty when the log is complete
-    topics: tuple[TopicReport, ...]  # Findings by stream
-    damage: tuple[Damage, ...]  # Damaged places of the file
-    unchecked_chunks: int  # Chunks that carry no checksum
+    Attributes:
+        path: The log.
+        run: Name of the run; None when that is lost.
+        verdict: Whether the log is complete, incomplete or damaged.
+        closed: Whether the recorder closed the log.
+        problems: Faults in words; empty when the log is complete.
+        topics: Findings by stream.
+        damage: Damaged places of the file.
+        unchecked_chunks: Chunks that carry no checksum.
+    """
+
+    path: Path
+    run: str | None
+    verdict: Verdict
+    closed: bool
+    problems: tuple[str, ...]
+    topics: tuple[TopicReport, ...]
+    damage: tuple[Damage, ...]
+    unchecked_chunks: int
 
 
 def check_log(path: Path) -> LogReport:

@@ -56,14 +56,18 @@ class Layout:
 
 @dataclass
 class Found:
-    """Messages of the wanted channels, and what is damaged."""
+    """Messages of the wanted channels, and what is damaged.
 
-    # Channel to fields, structured array of the stream's dtype, shape (n,), in file order
+    Attributes:
+        rows: Channel to fields, structured array of the stream's dtype, shape (n,), in file order.
+        log_time_ns: Channel to log times, ns, shape (n,).
+        damage: Chunks that could not be read.
+        salvaged: Channel to the number of its messages that come from a torn chunk.
+    """
+
     rows: dict[int, NDArray[np.void]] = field(default_factory=dict)
-    # Channel to log times, ns, shape (n,)
     log_time_ns: dict[int, NDArray[np.uint64]] = field(default_factory=dict)
-    damage: list[Damage] = field(default_factory=list)  # Chunks that could not be read
-    # Channel to the number of its messages that come from a torn chunk
+    damage: list[Damage] = field(default_factory=list)
     salvaged: dict[int, int] = field(default_factory=dict)
 
 

@@ -60,11 +60,17 @@ _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 @dataclass(frozen=True)
 class Attached:
-    """A file carried in the log."""
+    """A file carried in the log.
 
-    name: str  # File name
-    media_type: str  # Media type, such as `application/toml`
-    data: bytes  # Its bytes
+    Attributes:
+        name: File name.
+        media_type: Media type, such as `application/toml`.
+        data: Its bytes.
+    """
+
+    name: str
+    media_type: str
+    data: bytes
 
 
 def encode(*records: McapRecord) -> bytes:

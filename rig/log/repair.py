@@ -21,16 +21,24 @@ class RepairError(DataError):
 
 @dataclass(frozen=True)
 class RepairReport:
-    """Result of a repair."""
+    """Result of a repair.
 
-    original: Path  # The damaged log, unchanged
-    # The new log, read back and equal to what was recovered; None when there was nothing to repair
+    Attributes:
+        original: The damaged log, unchanged.
+        repaired: The new log, read back and equal to what was recovered; None when there was
+            nothing to repair.
+        recovered: Topic to the samples recovered.
+        lost: Topic to the samples known to be lost, from sequence numbers, plan and recorder.
+        salvaged: Topic to those of the recovered samples that no checksum vouches for.
+        problems: Faults of the original, in words.
+    """
+
+    original: Path
     repaired: Path | None
-    recovered: dict[str, int]  # Topic to the samples recovered
-    # Topic to the samples known to be lost, from sequence numbers, plan and recorder
+    recovered: dict[str, int]
     lost: dict[str, int]
-    salvaged: dict[str, int]  # Topic to those of the recovered samples that no checksum vouches for
-    problems: tuple[str, ...]  # Faults of the original, in words
+    salvaged: dict[str, int]
+    problems: tuple[str, ...]
 
 
 def repaired_path(path: Path) -> Path:

@@ -25,45 +25,62 @@ STRETCH_RECORD = "rig.stretch"
 
 @dataclass(frozen=True)
 class RunInfo:
-    """Metadata at the start of a recording."""
+    """Metadata at the start of a recording.
 
-    name: str  # Name of the run, unique in its campaign
-    rig: str = ""  # Name of the rig
-    instrument: Instrument = field(default_factory=Instrument)  # Identity of the instrument
-    # Constant conditions, SI numbers with the unit in the name, or words
+    Attributes:
+        name: Name of the run, unique in its campaign.
+        rig: Name of the rig.
+        instrument: Identity of the instrument.
+        conditions: Constant conditions, SI numbers with the unit in the name, or words.
+        notes: Operator's notes.
+        started_at_ns: Start of the run, ns since the Unix epoch, or None when not known.
+        duration_s: Planned duration, s, or None when open-ended.
+        calibrations: Calibration name to content hash.
+        zeros_before: Sensor zeros taken before the run, name with unit to value.
+        source: Source of the data, when it was not recorded here.
+        excluded: Why the run is left out of evidence, or None.
+        details: Anything else that JSON can hold, such as the protocol and software versions.
+    """
+
+    name: str
+    rig: str = ""
+    instrument: Instrument = field(default_factory=Instrument)
     conditions: Mapping[str, float | str] = field(default_factory=dict)
-    notes: str = ""  # Operator's notes
-    # Start of the run, ns since the Unix epoch, or None when not known
+    notes: str = ""
     started_at_ns: int | None = None
-    duration_s: float | None = None  # Planned duration, s, or None when open-ended
-    # Calibration name to content hash
+    duration_s: float | None = None
     calibrations: Mapping[str, str] = field(default_factory=dict)
-    # Sensor zeros taken before the run, name with unit to value
     zeros_before: Mapping[str, float] = field(default_factory=dict)
-    source: str = ""  # Source of the data, when it was not recorded here
-    excluded: str | None = None  # Why the run is left out of evidence, or None
-    # Anything else that JSON can hold, such as the protocol and software versions
+    source: str = ""
+    excluded: str | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class RunEnd:
-    """Metadata at the end of a recording."""
+    """Metadata at the end of a recording.
 
-    clean: bool = True  # Whether the run went as planned to its end
-    reason: str = ""  # Why it did not, in words; empty when it did
-    # Topic to the number of samples the recorder should have received
+    Attributes:
+        clean: Whether the run went as planned to its end.
+        reason: Why it did not, in words; empty when it did.
+        expected_samples: Topic to the number of samples the recorder should have received.
+        counters: Counters of the link, such as `crc_errors` and `lost_frames`.
+        zeros_after: Sensor zeros taken after the run, name with unit to value.
+        drift: Zero after minus zero before, name with unit to value.
+        drift_verdict: Verdict on the drift, in words; empty when not judged.
+        excluded: Why the run is left out of evidence, when that was found at its end.
+        details: Anything else that JSON can hold.
+    """
+
+    clean: bool = True
+    reason: str = ""
     expected_samples: Mapping[str, int] = field(default_factory=dict)
-    # Counters of the link, such as `crc_errors` and `lost_frames`
     counters: Mapping[str, int] = field(default_factory=dict)
-    # Sensor zeros taken after the run, name with unit to value
     zeros_after: Mapping[str, float] = field(default_factory=dict)
-    # Zero after minus zero before, name with unit to value
     drift: Mapping[str, float] = field(default_factory=dict)
-    drift_verdict: str = ""  # Verdict on the drift, in words; empty when not judged
-    # Why the run is left out of evidence, when that was found at its end
+    drift_verdict: str = ""
     excluded: str | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)  # Anything else that JSON can hold
+    details: Mapping[str, Any] = field(default_factory=dict)
 
 
 Record = RunInfo | RunEnd | Mark | Stretch

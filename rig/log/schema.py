@@ -54,27 +54,40 @@ class LayoutError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message."""
+    """One field of a message.
 
-    name: str  # Name, ending in its unit where it has one: lower case letters, digits, single `_`
-    dtype: str  # ROS 2 type, a key of `NUMPY_TYPES`
-    unit: str = ""  # SI unit symbol; "1" for a ratio, "" for counts and identifiers
-    description: str = ""  # Description in one line
+    Attributes:
+        name: Name, ending in its unit where it has one: lower case letters, digits, single `_`.
+        dtype: ROS 2 type, a key of `NUMPY_TYPES`.
+        unit: SI unit symbol; "1" for a ratio, "" for counts and identifiers.
+        description: Description in one line.
+    """
+
+    name: str
+    dtype: str
+    unit: str = ""
+    description: str = ""
 
 
 @dataclass(frozen=True)
 class Stream:
     """One stream of messages of a log.
 
+    Attributes:
+        topic: Topic, such as `/rig/sample`.
+        message_type: ROS 2 type, such as `rig_msgs/msg/Sample`.
+        fields: Fields in the order they are stored, large to small.
+        rate_hz: Expected rate, Hz, or None when it has none.
+
     Raises:
         LayoutError: A type is not of fixed size, the order would need padding, or a name or unit
             cannot be written in a ROS 2 definition.
     """
 
-    topic: str  # Topic, such as `/rig/sample`
-    message_type: str  # ROS 2 type, such as `rig_msgs/msg/Sample`
-    fields: tuple[Field, ...]  # Fields in the order they are stored, large to small
-    rate_hz: float | None = None  # Expected rate, Hz, or None when it has none
+    topic: str
+    message_type: str
+    fields: tuple[Field, ...]
+    rate_hz: float | None = None
 
     def __post_init__(self) -> None:
         if not _TYPE.fullmatch(self.message_type):

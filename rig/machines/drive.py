@@ -22,9 +22,13 @@ from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 @dataclass(frozen=True, eq=False)
 class SampledProfile(Profile):
-    """The reference rig's profile with a tick of its core, and samples at another rate."""
+    """The reference rig's profile with a tick of its core, and samples at another rate.
 
-    sampled_hz: float = 1000.0  # Samples a second
+    Attributes:
+        sampled_hz: Samples a second.
+    """
+
+    sampled_hz: float = 1000.0
 
     @property
     def rate_hz(self) -> float:

@@ -20,9 +20,13 @@ TICK_S = 1e-3
 
 @dataclass(frozen=True)
 class InCounts:
-    """Limits in counts of a channel, as on the board; a channel the rig lacks is not limited."""
+    """Limits as the board holds them: in counts of a channel; one the rig has not is not limited.
 
-    calibrations: CalibrationSet  # Counts to SI
+    Attributes:
+        calibrations: Counts to SI.
+    """
+
+    calibrations: CalibrationSet
 
     def size(self, channel: str, value: float) -> int:
         """Return a size in counts."""

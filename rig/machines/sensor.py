@@ -19,10 +19,15 @@ from rig.machines.machine import FloatArray, MachinePlan
 
 @dataclass(frozen=True)
 class Observation:
-    """A run in which nothing moves."""
+    """A run in which nothing moves.
 
-    last: int  # Samples of the run
-    first: int = 0  # Index of its first
+    Attributes:
+        last: Samples of the run.
+        first: Index of its first.
+    """
+
+    last: int
+    first: int = 0
 
     @property
     def setpoints(self) -> tuple[FloatArray, ...]:

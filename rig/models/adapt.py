@@ -28,23 +28,37 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Adaptation:
-    """Errors on the closing samples of the runs not used, in the target's SI unit."""
+    """Errors on the closing samples of the runs not used, in the target's SI unit.
 
-    schema: str  # Name of this layout
-    source: str  # File of the source's estimator
-    kind: str  # `states` or `network`
-    target: str  # Channel that is estimated
-    used: tuple[str, ...]  # Runs adapted with
-    unused: tuple[str, ...]  # Runs reported on
-    left_out: tuple[str, ...]  # Runs with flagged closing samples or without any, not reported on
-    as_it_is: Score  # The source's estimator as it is
-    adapted: Score  # The source's estimator adapted with the runs used
-    # The same kind fitted on the target's other runs, in folds; None where not done
+    Attributes:
+        schema: Name of this layout.
+        source: File of the source's estimator.
+        kind: `states` or `network`.
+        target: Channel that is estimated.
+        used: Runs adapted with.
+        unused: Runs reported on.
+        left_out: Runs with flagged closing samples or without any, not reported on.
+        as_it_is: The source's estimator as it is.
+        adapted: The source's estimator adapted with the runs used.
+        scratch: The same kind fitted on the target's other runs, in folds; None where not done.
+        covered: Share of the samples inside the adapted estimator's interval; None without one.
+        rmse_by_run: Error of the adapted estimator by run.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    source: str
+    kind: str
+    target: str
+    used: tuple[str, ...]
+    unused: tuple[str, ...]
+    left_out: tuple[str, ...]
+    as_it_is: Score
+    adapted: Score
     scratch: Score | None
-    # Share of the samples inside the adapted estimator's interval; None without one
     covered: float | None
-    rmse_by_run: dict[str, float]  # Error of the adapted estimator by run
-    provenance: Provenance  # When and from what this was made
+    rmse_by_run: dict[str, float]
+    provenance: Provenance
 
 
 def open_source(estimator: Estimator) -> Adaptable:

@@ -28,42 +28,66 @@ CERTAIN = 0.05
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two estimators."""
+    """One of the two estimators.
 
-    file: str  # Its file's name
-    hash: str  # Hash of the file
-    # What the file states of where it comes from; None where it states nothing
+    Attributes:
+        file: Its file's name.
+        hash: Hash of the file.
+        origin: What the file states of where it comes from; None where it states nothing.
+        seen: Runs compared on that it was fitted on, by the hash of their samples.
+    """
+
+    file: str
+    hash: str
     origin: Origin | None
-    seen: tuple[str, ...]  # Runs compared on that it was fitted on, by the hash of their samples
+    seen: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class RunErrors:
-    """Errors on the valid closing samples of one run, SI units, of the first and the second."""
+    """Errors on the valid closing samples of one run, SI units, of the first and the second.
 
-    run: str  # The run
-    samples: int  # Samples compared on
-    rmse: tuple[float, float]  # Root mean square errors
-    mean: tuple[float, float]  # Mean errors, estimate less truth
-    # Share of the samples inside the interval of 95 %, of those with one; None without
+    Attributes:
+        run: The run.
+        samples: Samples compared on.
+        rmse: Root mean square errors.
+        mean: Mean errors, estimate less truth.
+        covered: Share of the samples inside the interval of 95 %, of those with one; None without.
+        conditions: The run's conditions that are numbers.
+    """
+
+    run: str
+    samples: int
+    rmse: tuple[float, float]
+    mean: tuple[float, float]
     covered: tuple[float | None, float | None]
-    conditions: dict[str, float]  # The run's conditions that are numbers
+    conditions: dict[str, float]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result."""
+    """Result.
 
-    schema: str  # Name of this layout
-    target: str  # Channel that both estimate
-    sides: tuple[Side, Side]  # The two estimators
-    runs: tuple[RunErrors, ...]  # Errors by run
-    left_out: tuple[str, ...]  # Runs without a valid closing sample
-    rmse: tuple[float, float]  # Root mean square errors over all samples
-    # Chance of runs' errors at least this different if neither were better (Wilcoxon's signed-rank
-    # test); 1 for fewer than two runs
+    Attributes:
+        schema: Name of this layout.
+        target: Channel that both estimate.
+        sides: The two estimators.
+        runs: Errors by run.
+        left_out: Runs without a valid closing sample.
+        rmse: Root mean square errors over all samples.
+        p: Chance of runs' errors at least this different if neither were better (Wilcoxon's
+            signed-rank test); 1 for fewer than two runs.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    target: str
+    sides: tuple[Side, Side]
+    runs: tuple[RunErrors, ...]
+    left_out: tuple[str, ...]
+    rmse: tuple[float, float]
     p: float
-    provenance: Provenance  # When and from what this was made
+    provenance: Provenance
 
     @property
     def better(self) -> int | None:

@@ -25,17 +25,27 @@ its colour, and the `run` it belongs to, if one."""
 
 @dataclass(frozen=True)
 class Chart:
-    """One chart."""
+    """One chart.
 
-    name: str  # Id in the page and name of exported files
-    title: str  # Title, also of an exported file
-    judgement: str  # Conclusion that the chart supports, in a sentence
-    caption: str  # What is drawn
-    layout: Mapping[str, Any]  # Axes, as Plotly has them
-    lines: Sequence[Line] = ()  # What is drawn
-    # Name to what is drawn once it is chosen, in place of `lines`; empty without choice
+    Attributes:
+        name: Id in the page and name of exported files.
+        title: Title, also of an exported file.
+        judgement: Conclusion that the chart supports, in a sentence.
+        caption: What is drawn.
+        layout: Axes, as Plotly has them.
+        lines: What is drawn.
+        choices: Name to what is drawn once it is chosen, in place of `lines`; empty without choice.
+        table: Its numbers.
+    """
+
+    name: str
+    title: str
+    judgement: str
+    caption: str
+    layout: Mapping[str, Any]
+    lines: Sequence[Line] = ()
     choices: Mapping[str, Sequence[Line]] = field(default_factory=dict)
-    table: TextTable | None = None  # Its numbers
+    table: TextTable | None = None
 
 
 def numbers(values: FloatArray, digits: int = 4) -> list[float | None]:

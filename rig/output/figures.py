@@ -120,12 +120,19 @@ def over_time(
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel of a figure: values against a variable."""
+    """One panel of a figure: values against a variable.
 
-    label: str  # Name and unit of the variable
-    x: FloatArray  # The variable, shape (n,)
-    y: FloatArray  # The values, shape (n,)
-    before: FloatArray | None = None  # Values to compare with, shape (n,), or None
+    Attributes:
+        label: Name and unit of the variable.
+        x: The variable, shape (n,).
+        y: The values, shape (n,).
+        before: Values to compare with, shape (n,), or None.
+    """
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+    before: FloatArray | None = None
 
 
 def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24) -> Markup:

@@ -12,15 +12,14 @@ import rig
 
 @dataclass(frozen=True)
 class Provenance:
-    """Data needed to reproduce a result."""
+    """Data needed to reproduce a result.
 
     date: str  # Day and time, UTC, ISO 8601 to the minute
     # Commit of the source tree, with `+changes` when files outside `docs` differ from it; `unknown`
     # outside a git tree
     commit: str
-    version: str  # Version of rig
-    seed: int  # Seed of everything random
-    # Command line; of a path only the last part, since the others are the machine's own
+    version: str
+    seed: int
     command: str
 
     @classmethod

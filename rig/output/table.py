@@ -12,12 +12,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of text."""
+    """A table of text.
 
-    title: str  # Heading
-    columns: Sequence[str]  # Column headings; the first column is text, the others are numbers
-    rows: Sequence[Sequence[str]]  # Cells, one sequence a row
-    note: str = ""  # Remark below the table; may be empty
+    Attributes:
+        title: Heading.
+        columns: Column headings; the first column is text, the others are numbers.
+        rows: Cells, one sequence a row.
+        note: Remark below the table; may be empty.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
 
 
 def to_markdown(table: TextTable) -> str:

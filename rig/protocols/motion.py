@@ -18,12 +18,19 @@ RELAX_CYCLES = 12
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Setpoints of a whole motion at 1 kHz."""
+    """Setpoints of a whole motion at 1 kHz.
 
-    target_angle_rad: NDArray[np.float64]  # Spindle, closing-positive, shape (n,)
-    load_command_a: NDArray[np.float64]  # Load motor, shape (n,)
-    first: int  # Index of the run's first setpoint
-    last: int  # Index behind its last
+    Attributes:
+        target_angle_rad: Spindle, closing-positive, shape (n,).
+        load_command_a: Load motor, shape (n,).
+        first: Index of the run's first setpoint.
+        last: Index behind its last.
+    """
+
+    target_angle_rad: NDArray[np.float64]
+    load_command_a: NDArray[np.float64]
+    first: int
+    last: int
 
     @property
     def setpoints(self) -> tuple[NDArray[np.float64], ...]:

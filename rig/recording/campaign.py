@@ -50,14 +50,23 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class RunResult:
-    """Outcome of one run."""
+    """Outcome of one run.
 
-    name: str  # Name of the run
-    path: Path  # Its log
-    samples: int  # Samples recorded
-    expected: int  # Samples the plan asked for
-    lost: int  # Samples lost on the way from the logger
-    drift: tuple[Drift, ...]  # Zero before against zero after, for each judged sensor
+    Attributes:
+        name: Name of the run.
+        path: Its log.
+        samples: Samples recorded.
+        expected: Samples the plan asked for.
+        lost: Samples lost on the way from the logger.
+        drift: Zero before against zero after, for each judged sensor.
+    """
+
+    name: str
+    path: Path
+    samples: int
+    expected: int
+    lost: int
+    drift: tuple[Drift, ...]
 
     @property
     def complete(self) -> bool:

@@ -14,9 +14,12 @@ from rig.importers.registry import open_campaign
 
 @dataclass
 class RunWatch:
-    """Watches the runs of a campaign as they are finished."""
+    """Watches the runs of a campaign as they are finished.
 
-    # Each model's monitor, and the result of each run, in order
+    Attributes:
+        watches: Each model's monitor, and the result of each run, in order.
+    """
+
     watches: list[tuple[ResidualWatch, list[Sight]]]
 
     def after(self, path: Path) -> str:

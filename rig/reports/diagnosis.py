@@ -40,14 +40,21 @@ CONFIDENCE = (
 
 @dataclass(frozen=True)
 class Card:
-    """One finding for the person at the bench."""
+    """One finding for the person at the bench.
 
-    title: str  # What it is, in plain words
-    verdict: str  # What is claimed of it
-    # Name and text of each fact: size, error, confidence, alternatives
+    Attributes:
+        title: What it is, in plain words.
+        verdict: What is claimed of it.
+        facts: Name and text of each fact: size, error, confidence, alternatives.
+        check: What to check at the rig.
+        command: Command that describes the effect; empty without a name.
+    """
+
+    title: str
+    verdict: str
     facts: Sequence[tuple[str, str]]
-    check: str  # What to check at the rig
-    command: str  # Command that describes the effect; empty without a name
+    check: str
+    command: str
 
 
 def page(diagnosis: Diagnosis, traces: Traces, provenance: Provenance) -> str:

@@ -86,11 +86,16 @@ class UnknownHiddenEffectError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
-    """One hidden effect switched on."""
+    """One hidden effect switched on.
 
-    name: str  # One of `NAMES`
-    strength: float = 1.0  # 0 is off, 1 is clear
-    # The numbers of `Kind.shapes` in order; those left out take the middle of their range
+    Attributes:
+        name: One of `NAMES`.
+        strength: 0 is off, 1 is clear.
+        shape: The numbers of `Kind.shapes` in order; those left out take the middle of their range.
+    """
+
+    name: str
+    strength: float = 1.0
     shape: tuple[float, ...] = ()
 
 

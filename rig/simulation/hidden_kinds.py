@@ -6,12 +6,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One number that shapes an effect: its name with the unit, and the range it is drawn from."""
+    """One number that shapes an effect: what it is, with its unit, and the range it is drawn from.
 
-    name: str  # Name with the unit
-    low: float  # Smallest value drawn
-    high: float  # Largest value drawn
-    whole: bool = False  # Whole numbers only
+    Attributes:
+        name: Name with the unit.
+        low: Smallest value drawn.
+        high: Largest value drawn.
+        whole: Whole numbers only.
+    """
+
+    name: str
+    low: float
+    high: float
+    whole: bool = False
 
     @property
     def middle(self) -> float:
@@ -22,15 +29,23 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of hidden effect."""
+    """One kind of hidden effect.
 
-    name: str  # Name in the configuration
-    description: str  # Description and shape parameters
-    shapes: tuple[Shape, ...]  # Up to two numbers of its row
-    weakest: float = 0.7  # Smallest strength `draw` gives
-    strongest: float = 1.4  # Largest strength `draw` gives
-    # Whether it shows in a campaign of usual runs, so that `draw` may pick it: alike in all runs,
-    # with the wrist held
+    Attributes:
+        name: Name in the configuration.
+        description: Description and shape parameters.
+        shapes: Up to two numbers of its row.
+        weakest: Smallest strength `draw` gives.
+        strongest: Largest strength `draw` gives.
+        alone: Whether it shows in a campaign of usual runs, so that `draw` may pick it: alike in
+            all runs, with the wrist held.
+    """
+
+    name: str
+    description: str
+    shapes: tuple[Shape, ...]
+    weakest: float = 0.7
+    strongest: float = 1.4
     alone: bool = True
 
 

@@ -40,26 +40,43 @@ NEEDED = (
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The properties of a recorded run that its simulated nulls share."""
+    """The properties of a recorded run that its simulated nulls share.
 
-    plan: RunPlan  # Trajectory and load at 1 kHz, from the run's first sample to its last
-    time_s: FloatArray  # Device time of the recorded samples, shape (n,)
-    tick: NDArray[np.int64]  # Tick of each recorded sample in the plan, shape (n,)
-    flags: NDArray[np.uint8]  # Of the recorded samples, shape (n,)
-    start_rad: float  # Where the spindle stood at the first sample
-    started_at_ns: int | None  # Start of the run, or None
-    instrument: Instrument  # Identity of the instrument
-    # Recorded channels that no plant simulates, such as a temperature; the nulls share them
+    Attributes:
+        plan: Trajectory and load at 1 kHz, from the run's first sample to its last.
+        time_s: Device time of the recorded samples, shape (n,).
+        tick: Tick of each recorded sample in the plan, shape (n,).
+        flags: Of the recorded samples, shape (n,).
+        start_rad: Where the spindle stood at the first sample.
+        started_at_ns: Start of the run, or None.
+        instrument: Identity of the instrument.
+        others: Recorded channels that no plant simulates, such as a temperature; the nulls share
+            them.
+    """
+
+    plan: RunPlan
+    time_s: FloatArray
+    tick: NDArray[np.int64]
+    flags: NDArray[np.uint8]
+    start_rad: float
+    started_at_ns: int | None
+    instrument: Instrument
     others: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """Makes campaigns of the declared model. It can be sent to another process."""
+    """Makes campaigns of the declared model. It can be sent to another process.
 
-    plant: PlantParameters  # Parameters from the fitted models
-    sensors: SensorParameters  # Quanta and noise of the recordings
-    references: tuple[Reference, ...]  # One a run
+    Attributes:
+        plant: Parameters from the fitted models.
+        sensors: Quanta and noise of the recordings.
+        references: One a run.
+    """
+
+    plant: PlantParameters
+    sensors: SensorParameters
+    references: tuple[Reference, ...]
 
     def play(self, plan: RunPlan, seed: int) -> Recording:
         """Return one simulated run of another plan: the same rig, another motion and load."""

@@ -45,18 +45,29 @@ WRONG = 0.5
 
 @dataclass(frozen=True)
 class HandOver:
-    """One way to hand a machine's recordings over."""
+    """One way to hand a machine's recordings over.
 
-    name: str  # Name of the case
-    machine: str  # Name of the shipped mapping
-    model: str  # Name of the declared model
-    target: str  # Channel that the model explains
-    # Entries of the mapping that differ, by their path below `[data]`
+    Attributes:
+        name: Name of the case.
+        machine: Name of the shipped mapping.
+        model: Name of the declared model.
+        target: Channel that the model explains.
+        changes: Entries of the mapping that differ, by their path below `[data]`.
+        renamed: Channel to another name.
+        only: Conditions of the runs that are taken.
+        known: Family of the effect that is known to be undeclared, or none.
+        note: What others reached.
+    """
+
+    name: str
+    machine: str
+    model: str
+    target: str
     changes: Mapping[tuple[str, ...], Any] = field(default_factory=dict)
-    renamed: Mapping[str, str] = field(default_factory=dict)  # Channel to another name
-    only: Mapping[str, float] = field(default_factory=dict)  # Conditions of the runs that are taken
-    known: str = ""  # Family of the effect that is known to be undeclared, or none
-    note: str = ""  # What others reached
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    only: Mapping[str, float] = field(default_factory=dict)
+    known: str = ""
+    note: str = ""
 
 
 def _emps() -> Iterator[HandOver]:

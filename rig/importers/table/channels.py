@@ -20,15 +20,20 @@ from rig.importers.table.units import conversion
 
 @dataclass(frozen=True)
 class Samples:
-    """One file in SI units."""
+    """One file in SI units.
 
-    raw: Raw  # The file
-    time_s: FloatArray  # Shape (n,), as it is there
-    # Name to values, shape (n,) each; not finite where a cell is empty
+    Attributes:
+        raw: The file.
+        time_s: Shape (n,), as it is there.
+        channels: Name to values, shape (n,) each; not finite where a cell is empty.
+        conditions: Name to one value, or to values that must be constant in each run.
+        started_at_ns: Time of the first sample where the file holds dates, ns since 1970.
+    """
+
+    raw: Raw
+    time_s: FloatArray
     channels: dict[str, FloatArray]
-    # Name to one value, or to values that must be constant in each run
     conditions: dict[str, float | str | Values]
-    # Time of the first sample where the file holds dates, ns since 1970
     started_at_ns: int | None = None
 
 

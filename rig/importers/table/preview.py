@@ -47,7 +47,7 @@ CLIPPED = 0.005
 
 @dataclass(frozen=True)
 class ChannelView:
-    """One channel over all runs."""
+    """One channel over all runs.
 
     name: str  # The channel
     unit: str  # Its SI unit
@@ -75,7 +75,7 @@ class RunView:
 
 @dataclass(frozen=True)
 class Preview:
-    """A look at a table."""
+    """A look at a table.
 
     runs: tuple[RunView, ...]  # Every run
     channels: tuple[ChannelView, ...]  # Every channel

@@ -18,16 +18,22 @@ Remark = tuple[str, str]
 
 @dataclass(frozen=True)
 class Raw:
-    """One file."""
+    """One file.
 
-    path: Path  # The file
-    # Name to column, shape (n,) each. Columns of a file without a head are named by their number,
-    # from 1.
+    Attributes:
+        path: The file.
+        columns: Name to column, shape (n,) each. Columns of a file without a head are named by
+            their number, from 1.
+        fields: Name to a value that holds for the whole file.
+        remarks: What was found out about the layout, in words.
+        first_line: Line of the file that holds the first sample; 0 where it has no lines.
+    """
+
+    path: Path
     columns: dict[str, Values]
-    # Name to a value that holds for the whole file
     fields: dict[str, float | str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()  # What was found out about the layout, in words
-    first_line: int = 0  # Line of the file that holds the first sample; 0 where it has no lines
+    remarks: tuple[str, ...] = ()
+    first_line: int = 0
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

@@ -35,15 +35,23 @@ NAMES = tuple(JointNames(k + 1, prismatic=False) for k in range(JOINTS))
 
 @dataclass(frozen=True)
 class Named:
-    """One finding of the diagnosis."""
+    """One finding of the diagnosis.
 
-    joint: int  # The joint, from 1
-    family: str  # Its name in the catalogue; `unknown` where it is not named
-    verdict: str  # What is claimed
-    alternatives: tuple[str, ...]  # Names that it could have as well
-    # RMS error on the runs set aside before it, after what was found earlier, N m
+    Attributes:
+        joint: The joint, from 1.
+        family: Its name in the catalogue; `unknown` where it is not named.
+        verdict: What is claimed.
+        alternatives: Names that it could have as well.
+        before_n_m: RMS error on the runs set aside before it, after what was found earlier, N m.
+        after_n_m: The same with it, N m.
+    """
+
+    joint: int
+    family: str
+    verdict: str
+    alternatives: tuple[str, ...]
     before_n_m: float
-    after_n_m: float  # The same with it, N m
+    after_n_m: float
 
 
 Effects = tuple[tuple[int, Term], ...]

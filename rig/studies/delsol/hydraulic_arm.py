@@ -68,13 +68,20 @@ SPREAD = 0.2
 
 @dataclass(frozen=True)
 class HydraulicArm:
-    """One arm drawn at random around the plausible one."""
+    """One arm drawn at random around the plausible one.
 
-    values: FloatArray  # Parameters in the order of `parameter_names`
-    hidden: FloatArray  # Amplitude of hidden friction of each actuated joint, N m
-    hose: float  # Stiffness of the hoses on joint 1, N m/rad
-    constants: FloatArray  # True over nominal pressure constant of each actuated joint
-    # Hidden torque of a drawn family, in place of the friction with memory
+    Attributes:
+        values: Parameters in the order of `parameter_names`.
+        hidden: Amplitude of hidden friction of each actuated joint, N m.
+        hose: Stiffness of the hoses on joint 1, N m/rad.
+        constants: True over nominal pressure constant of each actuated joint.
+        form: Hidden torque of a drawn family, in place of the friction with memory.
+    """
+
+    values: FloatArray
+    hidden: FloatArray
+    hose: float
+    constants: FloatArray
     form: HiddenTorque | None = None
 
 

@@ -61,23 +61,38 @@ LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
 
 @dataclass(frozen=True)
 class Outcome:
-    """One seed's results by one method."""
+    """One seed's results by one method.
 
-    residual_n_m: tuple[float, ...]  # RMS residual of each joint on the points of the fit, N m
-    impact_n: float  # RMS error of the vertical force of the impact, N
-    impact_percent: float  # The same over the force's peak, %
-    sliding_n: float  # RMS error of the sliding force, N
+    Attributes:
+        residual_n_m: RMS residual of each joint on the points of the fit, N m.
+        impact_n: RMS error of the vertical force of the impact, N.
+        impact_percent: The same over the force's peak, %.
+        sliding_n: RMS error of the sliding force, N.
+    """
+
+    residual_n_m: tuple[float, ...]
+    impact_n: float
+    impact_percent: float
+    sliding_n: float
 
 
 @dataclass(frozen=True)
 class DelSolStudy:
-    """Results of the study."""
+    """Results of the study.
 
-    schema: str  # Name of this layout
-    seeds: int  # Arms of each family
-    outcomes: dict[str, tuple[Outcome, ...]]  # By method, one an arm, in the order of their numbers
-    named: tuple[tuple[Named, ...], ...]  # What the diagnosis named on each arm
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        seeds: Arms of each family.
+        outcomes: By method, one an arm, in the order of their numbers.
+        named: What the diagnosis named on each arm.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    seeds: int
+    outcomes: dict[str, tuple[Outcome, ...]]
+    named: tuple[tuple[Named, ...], ...]
+    provenance: Provenance
 
 
 @dataclass(frozen=True)

@@ -27,21 +27,34 @@ COUNTS = (1, 3)
 
 @dataclass(frozen=True)
 class Held:
-    """The interval on runs that were not fitted, each run alike, in the target's SI unit."""
+    """The interval on runs that were not fitted, each run alike, in the target's SI unit.
 
-    instrument: str  # Whose runs; of an adapted estimator `source -> other`
-    target: str  # Channel that is estimated
-    # `run`, `between` or `edge` of the levels of a condition, or the runs adapted with
+    Attributes:
+        instrument: Whose runs; of an adapted estimator `source -> other`.
+        target: Channel that is estimated.
+        left_out: `run`, `between` or `edge` of the levels of a condition, or the runs adapted with.
+        runs: Runs held out; a run counts for each condition whose level was left out.
+        rmse: Error of the estimates.
+        covered: Mean over runs of the share of samples inside their interval.
+        median: Median over runs of that share.
+        worst_run: Smallest share of a run.
+        worst_level: Smallest mean share of one fit.
+        half_width: Mean half width.
+        no_width: Share of the samples for which none is stated.
+        rmse_ratio: Adapted: the error over the median of every other choice of as many runs.
+    """
+
+    instrument: str
+    target: str
     left_out: str
-    runs: int  # Runs held out; a run counts for each condition whose level was left out
-    rmse: float  # Error of the estimates
-    covered: float  # Mean over runs of the share of samples inside their interval
-    median: float  # Median over runs of that share
-    worst_run: float  # Smallest share of a run
-    worst_level: float  # Smallest mean share of one fit
-    half_width: float  # Mean half width
-    no_width: float  # Share of the samples for which none is stated
-    # Adapted: the error over the median of every other choice of as many runs
+    runs: int
+    rmse: float
+    covered: float
+    median: float
+    worst_run: float
+    worst_level: float
+    half_width: float
+    no_width: float
     rmse_ratio: float = float("nan")
 
 

@@ -41,24 +41,38 @@ class InstrumentRow:
 
 @dataclass(frozen=True)
 class DrawnRow:
-    """States adapted with many choices of so many runs, N m."""
+    """States adapted with many choices of so many runs, N m.
 
-    instrument: str  # The instrument
-    runs: int  # Runs adapted with at a time
-    rmse_n_m: tuple[float, ...]  # Error on the runs not used, by choice, rising
-    # Mean over the choices of the share of samples inside their interval; None without
+    Attributes:
+        instrument: The instrument.
+        runs: Runs adapted with at a time.
+        rmse_n_m: Error on the runs not used, by choice, rising.
+        covered: Mean over the choices of the share of samples inside their interval; None without.
+    """
+
+    instrument: str
+    runs: int
+    rmse_n_m: tuple[float, ...]
     covered: float | None
 
 
 @dataclass(frozen=True)
 class InstrumentStudy:
-    """Results."""
+    """Results.
 
-    schema: str  # Name of this layout
-    source: str  # Instrument the estimators were fitted on
-    rows: tuple[InstrumentRow, ...]  # The rows
-    drawn: tuple[DrawnRow, ...]  # What the choice of the runs makes of them
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        source: Instrument the estimators were fitted on.
+        rows: The rows.
+        drawn: What the choice of the runs makes of them.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    source: str
+    rows: tuple[InstrumentRow, ...]
+    drawn: tuple[DrawnRow, ...]
+    provenance: Provenance
 
 
 def recipes(networks: bool) -> dict[str, Recipe]:

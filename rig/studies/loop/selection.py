@@ -29,10 +29,15 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Chosen:
-    """A model and what its last effect gained."""
+    """A model and what its last effect gained.
 
-    model: Model  # The fitted model
-    gain: float  # Share of the squared error of the model before it, on training runs left out
+    Attributes:
+        model: The fitted model.
+        gain: Share of the squared error of the model before it, on training runs left out.
+    """
+
+    model: Model
+    gain: float
 
 
 def selected(

@@ -29,18 +29,31 @@ TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
 
 @dataclass(frozen=True)
 class Task:
-    """One row of the study."""
+    """One row of the study.
 
-    name: str  # Target and regressor of the estimate
-    balance: str  # Equation whose effects are searched
-    target: str  # Channel that is estimated
-    source: str  # Channel of the linear model
-    measured: tuple[str, ...]  # Channels an effect may read, besides the device's clock
-    instead: Mapping[str, str]  # Channel to the one that plays its roles here
-    samples: Samples  # Which samples count
-    parameters: int  # Named parameters at most
-    to_reach: float  # Error to reach, N m
-    beyond: float  # A better one, N m
+    Attributes:
+        name: Target and regressor of the estimate.
+        balance: Equation whose effects are searched.
+        target: Channel that is estimated.
+        source: Channel of the linear model.
+        measured: Channels an effect may read, besides the device's clock.
+        instead: Channel to the one that plays its roles here.
+        samples: Which samples count.
+        parameters: Named parameters at most.
+        to_reach: Error to reach, N m.
+        beyond: A better one, N m.
+    """
+
+    name: str
+    balance: str
+    target: str
+    source: str
+    measured: tuple[str, ...]
+    instead: Mapping[str, str]
+    samples: Samples
+    parameters: int
+    to_reach: float
+    beyond: float
 
 
 _COMMAND = "motor_command_ratio"
@@ -75,39 +88,67 @@ TASKS = (
 
 @dataclass(frozen=True)
 class Step:
-    """One effect added."""
+    """One effect added.
 
-    effect: str  # Id of its form
-    parameters: int  # Its parameters
-    gain: float  # Share of squared error it removed from training runs left out
-    rmse: float  # Error on the test runs with it and those before it, means included, N m
+    Attributes:
+        effect: Id of its form.
+        parameters: Its parameters.
+        gain: Share of squared error it removed from training runs left out.
+        rmse: Error on the test runs with it and those before it, means included, N m.
+    """
+
+    effect: str
+    parameters: int
+    gain: float
+    rmse: float
 
 
 @dataclass(frozen=True)
 class Row:
-    """The answer to a task."""
+    """The answer to a task.
 
-    task: Task  # The task
-    linear: float  # Error of the linear model on the test runs, means included, N m
-    steps: tuple[Step, ...]  # Effects in the order they were added
-    parameters: int  # Named parameters of the last model
-    rmse: float  # Its error on the test runs, means included, N m
-    rmse_without_means: float  # The same with each run's mean error removed
-    runs_improved: int  # Test runs whose error fell
-    rmse_by_run: Mapping[str, tuple[float, float]]  # Test run to the error before and after, N m
-    families: int  # Families tried
-    candidates: int  # Grid points tried
+    Attributes:
+        task: The task.
+        linear: Error of the linear model on the test runs, means included, N m.
+        steps: Effects in the order they were added.
+        parameters: Named parameters of the last model.
+        rmse: Its error on the test runs, means included, N m.
+        rmse_without_means: The same with each run's mean error removed.
+        runs_improved: Test runs whose error fell.
+        rmse_by_run: Test run to the error before and after, N m.
+        families: Families tried.
+        candidates: Grid points tried.
+    """
+
+    task: Task
+    linear: float
+    steps: tuple[Step, ...]
+    parameters: int
+    rmse: float
+    rmse_without_means: float
+    runs_improved: int
+    rmse_by_run: Mapping[str, tuple[float, float]]
+    families: int
+    candidates: int
 
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """The whole study."""
+    """The whole study.
 
-    rows: tuple[Row, ...]  # One a task
-    sealed: Sealed  # The split, the same for every task
-    left_out: Mapping[str, str]  # Runs left out of evidence, with the reason
-    source: str  # Source of the data
-    provenance: Provenance  # When, from which commit and seed
+    Attributes:
+        rows: One a task.
+        sealed: The split, the same for every task.
+        left_out: Runs left out of evidence, with the reason.
+        source: Source of the data.
+        provenance: When, from which commit and seed.
+    """
+
+    rows: tuple[Row, ...]
+    sealed: Sealed
+    left_out: Mapping[str, str]
+    source: str
+    provenance: Provenance
 
 
 def run_study(

@@ -12,16 +12,26 @@ from estimation.recording import Recording
 
 @dataclass(frozen=True)
 class Case:
-    """One machine, or one part of it."""
+    """One machine, or one part of it.
 
-    name: str  # What it is called
-    machine: str  # Shipped machine
-    folder: str  # Folder of its recordings in the data, or `machine-FOLDER.tar.xz`
-    card: str  # Page that says what is declared, published and suspected
-    published: str  # Published error, in words
-    files: str = ""  # Pattern of the files in the folder; all when empty
-    equation: str = ""  # Only this equation; all when empty
-    # Condition to the value that a run must have
+    Attributes:
+        name: What it is called.
+        machine: Shipped machine.
+        folder: Folder of its recordings in the data, or `machine-FOLDER.tar.xz`.
+        card: Page that says what is declared, published and suspected.
+        published: Published error, in words.
+        files: Pattern of the files in the folder; all when empty.
+        equation: Only this equation; all when empty.
+        only: Condition to the value that a run must have.
+    """
+
+    name: str
+    machine: str
+    folder: str
+    card: str
+    published: str
+    files: str = ""
+    equation: str = ""
     only: Mapping[str, float] = field(default_factory=dict)
 
     def wants(self, recording: Recording) -> bool:

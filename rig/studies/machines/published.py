@@ -22,10 +22,15 @@ CUTOFF_HZ, ORDER, BORDER, EVERY = 100.0, 4, 49, 10
 
 @dataclass(frozen=True)
 class Published:
-    """A published model fitted again."""
+    """A published model fitted again.
 
-    parameters: dict[str, float]  # Name with unit to value
-    percent: float  # Norm of the residual over that of the force, %
+    Attributes:
+        parameters: Name with unit to value.
+        percent: Norm of the residual over that of the force, %.
+    """
+
+    parameters: dict[str, float]
+    percent: float
 
 
 def standard(recording: Recording) -> Published:

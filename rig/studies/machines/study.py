@@ -31,32 +31,49 @@ from rig.studies.machines.published import Published, by_direction, standard
 
 @dataclass(frozen=True)
 class Row:
-    """One equation of a machine."""
+    """One equation of a machine.
 
-    case: str  # Name of the machine
-    equation: str  # Name of the equation
-    published: str  # Published error, in words
-    card: str  # Page of the machine
-    runs: tuple[int, int]  # Runs that trained, and that were held out
-    # Error of the declared model on the held-out runs, % of the root mean square of the target
-    # there
+    Attributes:
+        case: Name of the machine.
+        equation: Name of the equation.
+        published: Published error, in words.
+        card: Page of the machine.
+        runs: Runs that trained, and that were held out.
+        declared_percent: Error of the declared model on the held-out runs, % of the root mean
+            square of the target there.
+        found_percent: The same with the effects that were found.
+        findings: What the diagnosis says of the equation, a sentence each.
+        checks: What a technician would check, one for each named effect.
+    """
+
+    case: str
+    equation: str
+    published: str
+    card: str
+    runs: tuple[int, int]
     declared_percent: float
-    found_percent: float  # The same with the effects that were found
-    findings: tuple[str, ...]  # What the diagnosis says of the equation, a sentence each
-    checks: tuple[str, ...]  # What a technician would check, one for each named effect
+    found_percent: float
+    findings: tuple[str, ...]
+    checks: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class MachineStudy:
-    """The study."""
+    """The study.
 
-    rows: tuple[Row, ...]  # One an equation
-    # The published estimates of EMPS made again; empty without its data
+    Attributes:
+        rows: One an equation.
+        reproduced: The published estimates of EMPS made again; empty without its data.
+        skipped: Machines without data, and equations that could not be diagnosed, in words.
+        seconds: Time it took.
+        provenance: Version and seed.
+    """
+
+    rows: tuple[Row, ...]
     reproduced: tuple[tuple[str, Published], ...]
-    # Machines without data, and equations that could not be diagnosed, in words
     skipped: tuple[str, ...]
-    seconds: float  # Time it took
-    provenance: Provenance  # Version and seed
+    seconds: float
+    provenance: Provenance
 
 
 def run_study(

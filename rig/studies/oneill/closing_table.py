@@ -22,13 +22,19 @@ CAUSAL = "causal "
 
 @dataclass(frozen=True)
 class ClosingTable:
-    """Closing samples of many runs."""
+    """Closing samples of many runs.
 
-    # Names of the columns: channels, conditions, and channels after `CAUSAL`
+    Attributes:
+        columns: Names of the columns: channels, conditions, and channels after `CAUSAL`.
+        values: Shape (n, columns); may be a file mapped into memory.
+        run: Index of each sample's run, shape (n,).
+        conditions: Condition to the value of each run, shape (runs,).
+    """
+
     columns: tuple[str, ...]
-    values: FloatArray  # Shape (n, columns); may be a file mapped into memory
-    run: NDArray[np.intp]  # Index of each sample's run, shape (n,)
-    conditions: dict[str, FloatArray]  # Condition to the value of each run, shape (runs,)
+    values: FloatArray
+    run: NDArray[np.intp]
+    conditions: dict[str, FloatArray]
 
     def __getitem__(self, names: Iterable[str]) -> FloatArray:
         """Return some of the columns, shape (n, names)."""

@@ -28,12 +28,18 @@ UNSEEN, LAG = 1.15, 1.2
 
 @dataclass(frozen=True)
 class Reached:
-    """Result of one estimate."""
+    """Result of one estimate.
 
-    live: StateRow  # On runs not seen, every filter causal
-    without_lag: StateRow  # The same without lag
-    unseen: dict[str, StateRow]  # The live error by `lofo` and `lopo`, where there are such levels
-    # Error of the paper's network on the same runs, None where it was not trained
+    Attributes:
+        live: On runs not seen, every filter causal.
+        without_lag: The same without lag.
+        unseen: The live error by `lofo` and `lopo`, where there are such levels.
+        network: Error of the paper's network on the same runs, None where it was not trained.
+    """
+
+    live: StateRow
+    without_lag: StateRow
+    unseen: dict[str, StateRow]
     network: float | None
 
     @property

@@ -36,11 +36,17 @@ EVERY = 24
 
 @dataclass(frozen=True)
 class KindRow:
-    """Error of one kind of estimator on runs held out, N m."""
+    """Error of one kind of estimator on runs held out, N m.
 
-    kind: str  # Its name
-    filters: str  # `zero-phase` or `live`
-    score: Score  # Errors over the closing samples of all runs, each held out once
+    Attributes:
+        kind: Its name.
+        filters: `zero-phase` or `live`.
+        score: Errors over the closing samples of all runs, each held out once.
+    """
+
+    kind: str
+    filters: str
+    score: Score
 
 
 def recipes() -> dict[str, Recipe]:

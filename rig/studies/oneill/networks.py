@@ -52,15 +52,22 @@ MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
 
 @dataclass(frozen=True)
 class Job:
-    """One kind of network under one protocol: a row or two of a table."""
+    """One kind of network under one protocol: a row or two of a table.
 
-    pose: str  # Key of `POSES`
-    # `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks with
-    # physical states, and `causal` for the last of them on channels filtered as live
+    Attributes:
+        pose: Key of `POSES`.
+        way: `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks
+            with physical states, and `causal` for the last of them on channels filtered as live.
+        surrogate: Key of `SURROGATES`.
+        protocol: As for `held_out_masks`.
+        targets: Estimated channels.
+    """
+
+    pose: str
     way: str
-    surrogate: str  # Key of `SURROGATES`
-    protocol: str  # As for `held_out_masks`
-    targets: tuple[str, ...]  # Estimated channels
+    surrogate: str
+    protocol: str
+    targets: tuple[str, ...]
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -100,17 +107,29 @@ class NetworkRow:
 
 @dataclass(frozen=True)
 class NetworkStudy:
-    """Results."""
+    """Results.
 
-    schema: str  # Name of this layout
-    rows: tuple[NetworkRow, ...]  # What was trained
-    not_run: tuple[Job, ...]  # Jobs that were not, or not wholly, trained
-    samples: dict[str, int]  # Closing samples by pose
-    peak_torque_n_m: float  # Largest distal torque of the neutral pose
-    every: dict[str, int]  # Every n-th closing sample of a pose was trained on, by pose
-    settings: Settings  # Settings of the training
-    notes: tuple[str, ...]  # Remarks for the reader
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        rows: What was trained.
+        not_run: Jobs that were not, or not wholly, trained.
+        samples: Closing samples by pose.
+        peak_torque_n_m: Largest distal torque of the neutral pose.
+        every: Every n-th closing sample of a pose was trained on, by pose.
+        settings: Settings of the training.
+        notes: Remarks for the reader.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    rows: tuple[NetworkRow, ...]
+    not_run: tuple[Job, ...]
+    samples: dict[str, int]
+    peak_torque_n_m: float
+    every: dict[str, int]
+    settings: Settings
+    notes: tuple[str, ...]
+    provenance: Provenance
 
     @property
     def grip_force(self) -> tuple[float, float] | None:

@@ -86,11 +86,17 @@ def _held_out_table(study: Study) -> TextTable:
 
 @dataclass(frozen=True)
 class More:
-    """What goes beyond the linear rows, where it was done."""
+    """What goes beyond the linear rows, where it was done.
 
-    networks: NetworkStudy | None = None  # The network rows
-    states: StateStudy | None = None  # The estimates from physical states
-    kinds: tuple[KindRow, ...] = ()  # Every kind of estimator on the same folds
+    Attributes:
+        networks: The network rows.
+        states: The estimates from physical states.
+        kinds: Every kind of estimator on the same folds.
+    """
+
+    networks: NetworkStudy | None = None
+    states: StateStudy | None = None
+    kinds: tuple[KindRow, ...] = ()
 
     @property
     def reached(self) -> list[goals.Reached]:

@@ -18,22 +18,36 @@ from rig.studies.oneill import fits
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Closing samples of one run."""
+    """Closing samples of one run.
 
-    name: str  # The run
-    time_s: FloatArray  # Shape (n,)
-    rows: FloatArray  # Filtered channels of the bank, shape (n, channels)
-    truth: FloatArray  # The target without lag, shape (n,)
+    Attributes:
+        name: The run.
+        time_s: Shape (n,).
+        rows: Filtered channels of the bank, shape (n, channels).
+        truth: The target without lag, shape (n,).
+    """
+
+    name: str
+    time_s: FloatArray
+    rows: FloatArray
+    truth: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Estimates of one target on held-out runs, in its SI unit."""
+    """Estimates of one target on held-out runs, in its SI unit.
 
-    target: str  # Channel that is estimated
-    runs: tuple[Closing, ...]  # The runs
-    before: tuple[FloatArray, ...]  # Estimate by a straight line through the surrogate, by run
-    after: tuple[FloatArray, ...]  # Estimate by physical states, by run
+    Attributes:
+        target: Channel that is estimated.
+        runs: The runs.
+        before: Estimate by a straight line through the surrogate, by run.
+        after: Estimate by physical states, by run.
+    """
+
+    target: str
+    runs: tuple[Closing, ...]
+    before: tuple[FloatArray, ...]
+    after: tuple[FloatArray, ...]
 
     @property
     def median_run(self) -> int:

@@ -29,14 +29,23 @@ RESAMPLED = 2000
 
 @dataclass(frozen=True)
 class StateJob:
-    """One estimator under one protocol."""
+    """One estimator under one protocol.
 
-    pose: str  # Key of `POSES`
-    surrogate: str  # Key of `LOADS`
-    target: str  # Channel that is estimated
-    filters: str = "zero-phase"  # `zero-phase`, or `live` for inputs filtered causally
-    protocol: str = "run-wise"  # `run-wise`, `lofo` or `lopo`
-    without: str = ""  # Effect left out, a key of `EFFECTS`, or empty
+    Attributes:
+        pose: Key of `POSES`.
+        surrogate: Key of `LOADS`.
+        target: Channel that is estimated.
+        filters: `zero-phase`, or `live` for inputs filtered causally.
+        protocol: `run-wise`, `lofo` or `lopo`.
+        without: Effect left out, a key of `EFFECTS`, or empty.
+    """
+
+    pose: str
+    surrogate: str
+    target: str
+    filters: str = "zero-phase"
+    protocol: str = "run-wise"
+    without: str = ""
 
     @property
     def bank(self) -> Bank:
@@ -47,30 +56,49 @@ class StateJob:
 
 @dataclass(frozen=True)
 class Level:
-    """One frequency or power level that was left out."""
+    """One frequency or power level that was left out.
 
-    value: float  # The condition
-    samples: int  # Closing samples held out
-    rmse: float  # Their error
-    covered: float  # Share of them inside their interval
+    Attributes:
+        value: The condition.
+        samples: Closing samples held out.
+        rmse: Their error.
+        covered: Share of them inside their interval.
+    """
+
+    value: float
+    samples: int
+    rmse: float
+    covered: float
 
 
 @dataclass(frozen=True)
 class StateRow:
-    """Error of one job, in the target's SI unit."""
+    """Error of one job, in the target's SI unit.
 
-    job: StateJob  # What was fitted and held out
-    runs: int  # Runs held out
-    score: Score  # Errors over all closing samples of the held-out runs
-    run_offset: float  # Root mean square of the runs' mean errors
-    covered: float  # Share of the samples inside their interval
-    # Between what 95 % of that share lies if other runs like these had come
+    Attributes:
+        job: What was fitted and held out.
+        runs: Runs held out.
+        score: Errors over all closing samples of the held-out runs.
+        run_offset: Root mean square of the runs' mean errors.
+        covered: Share of the samples inside their interval.
+        covered_between: Between what 95 % of that share lies if other runs like these had come.
+        covered_median: Median of that share over runs.
+        covered_worst: Smallest share of a run.
+        inside: Share of the samples inside the range that was fitted.
+        rmse_inside: Error over these samples; NaN where there are none.
+        levels: What was left out in turn, ascending; empty where it was folds of runs.
+    """
+
+    job: StateJob
+    runs: int
+    score: Score
+    run_offset: float
+    covered: float
     covered_between: tuple[float, float]
-    covered_median: float  # Median of that share over runs
-    covered_worst: float  # Smallest share of a run
-    inside: float  # Share of the samples inside the range that was fitted
-    rmse_inside: float  # Error over these samples; NaN where there are none
-    # What was left out in turn, ascending; empty where it was folds of runs
+    covered_median: float
+    covered_worst: float
+    inside: float
+    rmse_inside: float
     levels: tuple[Level, ...]
 
 

@@ -38,12 +38,19 @@ DRAWN = (Bank(LOADS["command"]), "live")
 
 @dataclass(frozen=True)
 class StateStudy:
-    """Results."""
+    """Results.
 
-    schema: str  # Name of this layout
-    rows: tuple[StateRow, ...]  # The rows
-    weights: int  # Number of weights of the neutral pose's estimator
-    notes: tuple[str, ...]  # Remarks for the reader
+    Attributes:
+        schema: Name of this layout.
+        rows: The rows.
+        weights: Number of weights of the neutral pose's estimator.
+        notes: Remarks for the reader.
+    """
+
+    schema: str
+    rows: tuple[StateRow, ...]
+    weights: int
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

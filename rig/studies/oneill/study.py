@@ -67,57 +67,99 @@ OTHERS_REACH_N_M = {"command": 14.17e-3, "current": 14.24e-3, "gearbox": 43.14e-
 
 @dataclass(frozen=True)
 class Row:
-    """One linear fit and its error."""
+    """One linear fit and its error.
 
-    surrogate: str  # Short name of the torque surrogate
-    protocol: str  # Short name of the protocol, see `PROTOCOLS`
-    runs: int  # Number of runs
-    gain: float | None  # Fitted gain; None where several fits were made
-    gain_unit: str  # Its unit
-    offset_n_m: float | None  # Fitted offset; None where several fits were made
-    score: Score  # Errors in N m
+    Attributes:
+        surrogate: Short name of the torque surrogate.
+        protocol: Short name of the protocol, see `PROTOCOLS`.
+        runs: Number of runs.
+        gain: Fitted gain; None where several fits were made.
+        gain_unit: Its unit.
+        offset_n_m: Fitted offset; None where several fits were made.
+        score: Errors in N m.
+    """
+
+    surrogate: str
+    protocol: str
+    runs: int
+    gain: float | None
+    gain_unit: str
+    offset_n_m: float | None
+    score: Score
 
 
 @dataclass(frozen=True)
 class Study:
-    """Results of the study."""
+    """Results of the study.
 
-    schema: str  # Name of this layout
-    source: str  # What the data is
-    measured: bool  # Whether the data was measured on the paper's instrument
-    notes: tuple[str, ...]  # Remarks for a comparison
-    closing_samples: int  # Closing samples of all runs after the paper's processing
-    paper_samples: int  # The paper's count
-    public_samples: int  # The count the public data is known to give
-    runs: tuple[str, ...]  # Names of the runs behind the run-wise rows
-    left_out: dict[str, str]  # Runs left out of these rows, with the reason
-    rows: tuple[Row, ...]  # The linear fits
-    paper: dict[str, PaperRow]  # The paper's rows by surrogate
-    others_reach_n_m: dict[str, float]  # RMSE of others' reproduction of the authors' way
-    # Run-wise error of each run with the measured current, or with what there is in its place
+    Attributes:
+        schema: Name of this layout.
+        source: What the data is.
+        measured: Whether the data was measured on the paper's instrument.
+        notes: Remarks for a comparison.
+        closing_samples: Closing samples of all runs after the paper's processing.
+        paper_samples: The paper's count.
+        public_samples: The count the public data is known to give.
+        runs: Names of the runs behind the run-wise rows.
+        left_out: Runs left out of these rows, with the reason.
+        rows: The linear fits.
+        paper: The paper's rows by surrogate.
+        others_reach_n_m: RMSE of others' reproduction of the authors' way.
+        rmse_by_run_n_m: Run-wise error of each run with the measured current, or with what there
+            is in its place.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    source: str
+    measured: bool
+    notes: tuple[str, ...]
+    closing_samples: int
+    paper_samples: int
+    public_samples: int
+    runs: tuple[str, ...]
+    left_out: dict[str, str]
+    rows: tuple[Row, ...]
+    paper: dict[str, PaperRow]
+    others_reach_n_m: dict[str, float]
     rmse_by_run_n_m: dict[str, float]
-    provenance: Provenance  # When and from what this was made
+    provenance: Provenance
 
 
 @dataclass(frozen=True)
 class Result:
-    """The study, and the samples its figures are drawn from."""
+    """The study, and the samples its figures are drawn from.
 
-    study: Study  # The results
-    surrogate: str  # Surrogate of the figures
-    held_out: Table  # Closing samples of all runs with the run-wise estimate
-    example: Recording  # The run of median error, processed, all its samples
-    line: LinearFit  # The fit, on all other runs' samples, that estimates the example
+    Attributes:
+        study: The results.
+        surrogate: Surrogate of the figures.
+        held_out: Closing samples of all runs with the run-wise estimate.
+        example: The run of median error, processed, all its samples.
+        line: The fit, on all other runs' samples, that estimates the example.
+    """
+
+    study: Study
+    surrogate: str
+    held_out: Table
+    example: Recording
+    line: LinearFit
 
 
 @dataclass(frozen=True)
 class Source:
-    """Data for the study."""
+    """Data for the study.
 
-    campaign: Campaign  # The runs
-    name: str  # What the data is, for the reader
-    measured: bool  # Whether it was measured on the paper's instrument
-    notes: tuple[str, ...] = ()  # Remarks for the reader
+    Attributes:
+        campaign: The runs.
+        name: What the data is, for the reader.
+        measured: Whether it was measured on the paper's instrument.
+        notes: Remarks for the reader.
+    """
+
+    campaign: Campaign
+    name: str
+    measured: bool
+    notes: tuple[str, ...] = ()
 
 
 def open_reference(path: Path) -> Source:

@@ -38,46 +38,71 @@ SIMPLER_PERCENT = (1.0, 3.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One model, fitted on one path and tested on another."""
+    """One model, fitted on one path and tested on another.
 
-    model: str  # Which model
-    fitted_on: str  # Path of the fit
-    tested_on: str  # Path of the test
-    parameters: int  # Number of parameters
-    # Condition number of the fit's weighted columns, each of unit length; None of a damped or
-    # bounded fit, whose damping or bounds set it
+    Attributes:
+        model: Which model.
+        fitted_on: Path of the fit.
+        tested_on: Path of the test.
+        parameters: Number of parameters.
+        condition: Condition number of the fit's weighted columns, each of unit length; None of a
+            damped or bounded fit, whose damping or bounds set it.
+        nrmsd_percent: Error of each joint on the test path, % of its torque's range.
+        fitted_nrmsd_percent: The same on the path of the fit.
+        without_offset_percent: The error on the test path with each joint's mean error removed, or
+            None where it was not asked for.
+    """
+
+    model: str
+    fitted_on: str
+    tested_on: str
+    parameters: int
     condition: float | None
-    # Error of each joint on the test path, % of its torque's range
     nrmsd_percent: tuple[float, ...]
-    fitted_nrmsd_percent: tuple[float, ...]  # The same on the path of the fit
-    # The error on the test path with each joint's mean error removed, or None where it was not
-    # asked for
+    fitted_nrmsd_percent: tuple[float, ...]
     without_offset_percent: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One identified base parameter of the thesis' model."""
+    """One identified base parameter of the thesis' model.
 
-    name: str  # The combination
-    value: float  # By weighted least squares
-    standard_error: float  # Of that value; includes noise only
-    consistent: float  # By the physically consistent fit
+    Attributes:
+        name: The combination.
+        value: By weighted least squares.
+        standard_error: Of that value; includes noise only.
+        consistent: By the physically consistent fit.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    consistent: float
 
 
 @dataclass(frozen=True)
 class Study:
-    """Results of the study."""
+    """Results of the study.
 
-    schema: str  # Name of this layout
-    arm: str  # The arm's table
-    paths: tuple[str, str]  # The two paths; the search fits the first and tests on the second
-    rows: tuple[Row, ...]  # The models, each in both directions, then on further runs
-    thesis: tuple[float, ...]  # The thesis' own errors, %
-    trials: tuple[Trial, ...]  # What the search tried
-    # Identified parameters of the thesis' model on the first path, SI units
+    Attributes:
+        schema: Name of this layout.
+        arm: The arm's table.
+        paths: The two paths; the search fits the first and tests on the second.
+        rows: The models, each in both directions, then on further runs.
+        thesis: The thesis' own errors, %.
+        trials: What the search tried.
+        parameters: Identified parameters of the thesis' model on the first path, SI units.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    arm: str
+    paths: tuple[str, str]
+    rows: tuple[Row, ...]
+    thesis: tuple[float, ...]
+    trials: tuple[Trial, ...]
     parameters: tuple[Parameter, ...]
-    provenance: Provenance  # When and from what this was made
+    provenance: Provenance
 
 
 def run_study(

@@ -86,21 +86,34 @@ JOINTS_ALONE = replace(PSM, wrist=None, wrist_coupling=())
 
 @dataclass(frozen=True)
 class Arm:
-    """One arm's results."""
+    """One arm's results.
 
-    family: str  # Its hidden torque
-    errors: dict[str, dict[str, tuple[float, ...]]]  # NRMSD, %, by table and, in it, by method
-    effects: tuple[str, ...]  # Names of the effects found within its excitation
+    Attributes:
+        family: Its hidden torque.
+        errors: NRMSD, %, by table and, in it, by method.
+        effects: Names of the effects found within its excitation.
+    """
+
+    family: str
+    errors: dict[str, dict[str, tuple[float, ...]]]
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class WrenchStudy:
-    """Results of the simulated study."""
+    """Results of the simulated study.
 
-    schema: str  # Name of this layout
-    seeds: int  # Arms of each family
-    arms: tuple[Arm, ...]  # All arms, in the order of their numbers
-    provenance: Provenance  # When and from what this was made
+    Attributes:
+        schema: Name of this layout.
+        seeds: Arms of each family.
+        arms: All arms, in the order of their numbers.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    seeds: int
+    arms: tuple[Arm, ...]
+    provenance: Provenance
 
     def errors(self, family: str, table: str, method: str) -> FloatArray:
         """Return the errors of a family's arms, %, shape (arms, 6)."""

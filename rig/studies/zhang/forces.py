@@ -29,13 +29,19 @@ EVERY = 5
 
 @dataclass(frozen=True)
 class Learnt:
-    """What is known of an arm with one instrument."""
+    """What is known of an arm with one instrument.
 
-    psm: Psm  # The arm
-    # Of joints 1 to 6, trained with the gripper moving and closed
+    Attributes:
+        psm: The arm.
+        networks: Of joints 1 to 6, trained with the gripper moving and closed.
+        gripper: The gripper's network.
+        physics: Ours.
+    """
+
+    psm: Psm
     networks: tuple[JointNetwork, ...]
-    gripper: JointNetwork  # The gripper's network
-    physics: Physics  # Ours
+    gripper: JointNetwork
+    physics: Physics
 
     def external(self, run: PsmRun) -> dict[str, FloatArray]:
         """Return the torque of a run minus that of free motion, by method, shape (n, 7)."""

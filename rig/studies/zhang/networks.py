@@ -31,10 +31,15 @@ TRANSFER = Settings(nodes=8, iterations=10)
 
 @dataclass(frozen=True)
 class JointNetwork:
-    """One joint's network."""
+    """One joint's network.
 
-    joint: int  # The joint, from 0
-    network: Network  # From states to its torque, N m or N
+    Attributes:
+        joint: The joint, from 0.
+        network: From states to its torque, N m or N.
+    """
+
+    joint: int
+    network: Network
 
     def __call__(self, run: PsmRun) -> FloatArray:
         """Return the torque of each sample, shape (n,)."""

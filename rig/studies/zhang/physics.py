@@ -117,12 +117,18 @@ def of_moving_gripper() -> list[ArmEffect]:
 
 @dataclass(frozen=True)
 class Physics:
-    """A fitted arm: declared columns, the effects found, and networks on the residual."""
+    """A fitted arm: declared columns, the effects found, and networks on the residual.
 
-    arm: Arm  # The arm with its instrument's nominal coupling
-    effects: tuple[ArmEffect, ...]  # What was found, in order
-    values: FloatArray  # Parameters of the declared columns, then of the effects
-    # For each joint, the network on the residual; None where none improves it
+    Attributes:
+        arm: The arm with its instrument's nominal coupling.
+        effects: What was found, in order.
+        values: Parameters of the declared columns, then of the effects.
+        rest: For each joint, the network on the residual; None where none improves it.
+    """
+
+    arm: Arm
+    effects: tuple[ArmEffect, ...]
+    values: FloatArray
     rest: tuple[Network | None, ...]
 
     @property

@@ -71,16 +71,26 @@ CHUNK = 8000
 
 @dataclass(frozen=True)
 class Psm:
-    """One arm with one instrument, drawn around the plausible ones."""
+    """One arm with one instrument, drawn around the plausible ones.
 
-    arm: SimulatedArm  # The arm; its hidden strengths are not used but scale those here
-    kind: Kind  # The instrument's gripper, as drawn
-    memory: FloatArray  # Friction with memory of joints 1 to 6, N m or N
-    cable_n_m: FloatArray  # Friction with memory of the four motors and their cables
-    noise: FloatArray  # Standard deviation of the noise of each joint, N m or N
-    true_coupling: FloatArray  # From motors to roll, pitch, yaw and gripper, shape (4, 4)
-    leak: FloatArray  # A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4)
-    # Hidden torque of a drawn family, in place of friction with memory
+    Attributes:
+        arm: The arm; its hidden strengths are not used but scale those here.
+        kind: The instrument's gripper, as drawn.
+        memory: Friction with memory of joints 1 to 6, N m or N.
+        cable_n_m: Friction with memory of the four motors and their cables.
+        noise: Standard deviation of the noise of each joint, N m or N.
+        true_coupling: From motors to roll, pitch, yaw and gripper, shape (4, 4).
+        leak: A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4).
+        form: Hidden torque of a drawn family, in place of friction with memory.
+    """
+
+    arm: SimulatedArm
+    kind: Kind
+    memory: FloatArray
+    cable_n_m: FloatArray
+    noise: FloatArray
+    true_coupling: FloatArray
+    leak: FloatArray
     form: HiddenTorque | None = None
 
     @property
@@ -97,11 +107,17 @@ class Psm:
 
 @dataclass(frozen=True)
 class PsmRun:
-    """The readings of the arm's sensors in a run."""
+    """The readings of the arm's sensors in a run.
 
-    position: FloatArray  # Measured positions, shape (n, 7), rad or m
-    velocity: FloatArray  # Measured velocities, shape (n, 7)
-    torque: FloatArray  # Joint torques as the nominal coupling shows them, shape (n, 7), N m or N
+    Attributes:
+        position: Measured positions, shape (n, 7), rad or m.
+        velocity: Measured velocities, shape (n, 7).
+        torque: Joint torques as the nominal coupling shows them, shape (n, 7), N m or N.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    torque: FloatArray
 
     def __len__(self) -> int:
         return len(self.position)

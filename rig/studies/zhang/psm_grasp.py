@@ -40,12 +40,19 @@ SENSOR_GAIN, SENSOR_HYSTERESIS_N, SENSOR_NOISE_N = 0.02, 0.04, 0.02
 
 @dataclass(frozen=True)
 class Grasp:
-    """A run with something between the jaws."""
+    """A run with something between the jaws.
 
-    motion: Motion  # The arm's motion as it is measured, lead included
-    arm_m: float  # Lever from the gripper's axis to what it holds
-    touching: FloatArray  # Whether, or how far, the tip may touch its surroundings, shape (n,)
-    scored: np.ndarray  # Samples of the experiment itself, shape (n,)
+    Attributes:
+        motion: The arm's motion as it is measured, lead included.
+        arm_m: Lever from the gripper's axis to what it holds.
+        touching: Whether, or how far, the tip may touch its surroundings, shape (n,).
+        scored: Samples of the experiment itself, shape (n,).
+    """
+
+    motion: Motion
+    arm_m: float
+    touching: FloatArray
+    scored: np.ndarray
 
     def force(self, psm: Psm) -> FloatArray:
         """Return the force on what is held, N: the true angle differs from the measured one."""

@@ -5,15 +5,25 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Kind:
-    """An instrument family as it is drawn around."""
+    """An instrument family as it is drawn around.
 
-    name: str  # Name of the instrument
-    model: str  # Model number, by which its nominal coupling is known
-    open_rad: float  # Angle to which its gripper opens; closed is 0
-    offset_n_m: float  # Torque of the resting gripper
-    spring_n_m_rad: float  # Stiffness of the gripper's cables against opening
-    friction_n_m: float  # Friction of the gripper
-    memory_n_m: float  # Friction with memory of the gripper
+    Attributes:
+        name: Name of the instrument.
+        model: Model number, by which its nominal coupling is known.
+        open_rad: Angle to which its gripper opens; closed is 0.
+        offset_n_m: Torque of the resting gripper.
+        spring_n_m_rad: Stiffness of the gripper's cables against opening.
+        friction_n_m: Friction of the gripper.
+        memory_n_m: Friction with memory of the gripper.
+    """
+
+    name: str
+    model: str
+    open_rad: float
+    offset_n_m: float
+    spring_n_m_rad: float
+    friction_n_m: float
+    memory_n_m: float
 
 
 KINDS = {

@@ -25,11 +25,16 @@ STREAM = 20220
 
 @dataclass(frozen=True)
 class Outcome:
-    """Results of one arm."""
+    """Results of one arm.
 
-    cells: Cells  # Its errors
-    traces: Cells  # Forces over time by `experiment | what`, N
-    # Names of the effects found on the arm with the Cadiere Forceps, in order
+    Attributes:
+        cells: Its errors.
+        traces: Forces over time by `experiment | what`, N.
+        effects: Names of the effects found on the arm with the Cadiere Forceps, in order.
+    """
+
+    cells: Cells
+    traces: Cells
     effects: tuple[str, ...]
 
 

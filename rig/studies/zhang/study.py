@@ -52,15 +52,24 @@ WITHIN = 0.25
 
 @dataclass(frozen=True)
 class ZhangStudy:
-    """Results of the study."""
+    """Results of the study.
 
-    schema: str  # Name of this layout
-    seeds: int  # Arms of each family of hidden torque
-    # Of each arm, in the order of their numbers, its errors by `experiment | condition | method`
+    Attributes:
+        schema: Name of this layout.
+        seeds: Arms of each family of hidden torque.
+        outcomes: Of each arm, in the order of their numbers, its errors by
+            `experiment | condition | method`.
+        traces: Forces over time of the first arm, by `experiment | what`.
+        effects: Of each effect found, on how many arms.
+        provenance: When and from what this was made.
+    """
+
+    schema: str
+    seeds: int
     outcomes: tuple[Cells, ...]
-    traces: Cells  # Forces over time of the first arm, by `experiment | what`
-    effects: dict[str, int]  # Of each effect found, on how many arms
-    provenance: Provenance  # When and from what this was made
+    traces: Cells
+    effects: dict[str, int]
+    provenance: Provenance
 
     def values(self, cell: str, family: str = OWN) -> FloatArray:
         """Return one cell's numbers over a family's arms, shape (arms, numbers)."""

@@ -42,11 +42,17 @@ Estimate = Callable[[Recording], tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class Stiffness:
-    """One place or material."""
+    """One place or material.
 
-    name: str  # Name
-    true_n_rad: float  # What it is, force at the tip over joint angle
-    grasps_n_rad: tuple[float, ...]  # What each grasp gave
+    Attributes:
+        name: Name.
+        true_n_rad: What it is, force at the tip over joint angle.
+        grasps_n_rad: What each grasp gave.
+    """
+
+    name: str
+    true_n_rad: float
+    grasps_n_rad: tuple[float, ...]
 
     @property
     def mean_n_rad(self) -> float:
@@ -56,17 +62,27 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of one method."""
+    """The result of one method.
 
-    method: str  # Name of the method
-    materials: tuple[Stiffness, ...]  # The three materials
-    # Confidence that neighbours in the found order differ, the least of them
+    Attributes:
+        method: Name of the method.
+        materials: The three materials.
+        order_confidence: Confidence that neighbours in the found order differ, the least of them.
+        order_is_right: Whether the order is the true one.
+        places: The seven places.
+        found: Place with the inclusion, from 0.
+        true: Where it is.
+        place_confidence: Confidence that this place is stiffer than the stiffest other.
+    """
+
+    method: str
+    materials: tuple[Stiffness, ...]
     order_confidence: float
-    order_is_right: bool  # Whether the order is the true one
-    places: tuple[Stiffness, ...]  # The seven places
-    found: int  # Place with the inclusion, from 0
-    true: int  # Where it is
-    place_confidence: float  # Confidence that this place is stiffer than the stiffest other
+    order_is_right: bool
+    places: tuple[Stiffness, ...]
+    found: int
+    true: int
+    place_confidence: float
 
 
 @dataclass(frozen=True)

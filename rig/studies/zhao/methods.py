@@ -36,19 +36,28 @@ ToForce = Callable[[Recording], FloatArray]
 
 @dataclass(frozen=True)
 class Lacking:
-    """The effects that the diagnosis finds missing in a degree of freedom's model."""
+    """The effects that the diagnosis finds missing in a degree of freedom's model.
 
-    findings: tuple[tuple[str, str], ...]  # Family and verdict of each finding
-    terms: tuple[Term, ...]  # The effects it named, with the values it found
+    Attributes:
+        findings: Family and verdict of each finding.
+        terms: The effects it named, with the values it found.
+    """
+
+    findings: tuple[tuple[str, str], ...]
+    terms: tuple[Term, ...]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One method on one degree of freedom of one grasper."""
+    """One method on one degree of freedom of one grasper.
 
-    # Estimate less force, mean over the levels, in the order of `INPUTS`
+    Attributes:
+        errors_n: Estimate less force, mean over the levels, in the order of `INPUTS`.
+        delay_ms: Of the estimate behind the force in periodic input; negative where it leads.
+    """
+
     errors_n: tuple[float, float, float]
-    delay_ms: float  # Of the estimate behind the force in periodic input; negative where it leads
+    delay_ms: float
 
 
 def axes_of(prototype: Prototype, dof: str, seed: int, spread: float, family: str = OWN) -> Axes:

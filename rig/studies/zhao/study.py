@@ -43,26 +43,38 @@ LOOKED_AT = 1000
 
 @dataclass(frozen=True)
 class Cell:
-    """One degree of freedom of one grasper."""
+    """One degree of freedom of one grasper.
 
-    seed: int  # Seed of its hidden parameters
-    # Of the paper's estimate over force in long steady grasps; one over its coefficient
+    Attributes:
+        seed: Seed of its hidden parameters.
+        slope: Of the paper's estimate over force in long steady grasps; one over its coefficient.
+        paper: The paper's method.
+        ours: The declared model with the added effects.
+        undeclared: The declared model alone, fitted on the same runs.
+    """
+
+    seed: int
     slope: float
-    paper: Outcome  # The paper's method
-    ours: Outcome  # The declared model with the added effects
-    undeclared: Outcome  # The declared model alone, fitted on the same runs
+    paper: Outcome
+    ours: Outcome
+    undeclared: Outcome
 
 
 @dataclass(frozen=True)
 class Study:
-    """The whole study."""
+    """The whole study.
 
-    prototype: str  # Name of the prototype
-    spread: float  # Spread of the hidden parameters
-    # Degree of freedom to its cells, one a grasper, in the order of their numbers
+    Attributes:
+        prototype: Name of the prototype.
+        spread: Spread of the hidden parameters.
+        cells: Degree of freedom to its cells, one a grasper, in the order of their numbers.
+        lacking: Family and degree of freedom to what the diagnosis found on the grasper it looked
+            at, and what was therefore added to ours.
+    """
+
+    prototype: str
+    spread: float
     cells: Mapping[str, Sequence[Cell]]
-    # Family and degree of freedom to what the diagnosis found on the grasper it looked at, and what
-    # was therefore added to ours
     lacking: Mapping[tuple[str, str], Lacking] = field(default_factory=dict)
 
 
