@@ -15,12 +15,20 @@ from estimation.recording import FloatArray
 class RunEvidence:
     """Samples of one run to fit: every fourth valid closing one.
 
-    design: FloatArray  # The bank's products, shape (n, size)
-    truth: FloatArray  # The target without lag, shape (n,)
-    normal: Normal  # The run's share in the normal equations
-    ranges: FloatArray  # Lowest and highest value of each judged channel, shape (2, judged)
-    places: FloatArray  # Conditions of each sample, shape (n, d); see `estimation.bank.beyond`
-    # What was held constant in the run; the interval grows beyond their levels
+    Attributes:
+        design: The bank's products, shape (n, size).
+        truth: The target without lag, shape (n,).
+        normal: The run's share in the normal equations.
+        ranges: Lowest and highest value of each judged channel, shape (2, judged).
+        places: Conditions of each sample, shape (n, d); see `estimation.bank.beyond`.
+        conditions: What was held constant in the run; the interval grows beyond their levels.
+    """
+
+    design: FloatArray
+    truth: FloatArray
+    normal: Normal
+    ranges: FloatArray
+    places: FloatArray
     conditions: Mapping[str, float | str] = field(default_factory=dict)
 
     @classmethod

@@ -34,8 +34,13 @@ ESTIMATE, SENSOR, SQUARED_ERROR = range(3)
 class Value:
     """A number, or the reason why there is none.
 
-    number: float | None  # The value, or None
-    missing: str = ""  # Why the value is missing; empty when it is not
+    Attributes:
+        number: The value, or None.
+        missing: Why the value is missing; empty when it is not.
+    """
+
+    number: float | None
+    missing: str = ""
 
 
 @dataclass(frozen=True, eq=False)

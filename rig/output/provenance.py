@@ -14,9 +14,16 @@ import rig
 class Provenance:
     """Data needed to reproduce a result.
 
-    date: str  # Day and time, UTC, ISO 8601 to the minute
-    # Commit of the source tree, with `+changes` when files outside `docs` differ from it; `unknown`
-    # outside a git tree
+    Attributes:
+        date: Day and time, UTC, ISO 8601 to the minute.
+        commit: Commit of the source tree, with `+changes` when files outside `docs` differ from
+            it; `unknown` outside a git tree.
+        version: Version of rig.
+        seed: Seed of everything random.
+        command: Command line; of a path only the last part, since the others are the machine's own.
+    """
+
+    date: str
     commit: str
     version: str
     seed: int

@@ -21,7 +21,7 @@ Form = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A function of one variable.
+    """A function of one variable."""
 
     variable: str  # Name of the variable
     low: float  # First point of the grid

@@ -49,12 +49,21 @@ CLIPPED = 0.005
 class ChannelView:
     """One channel over all runs.
 
-    name: str  # The channel
-    unit: str  # Its SI unit
-    least: float  # Least value
-    greatest: float  # Greatest value
-    mean: float  # Mean
-    wrong: tuple[str, ...]  # What may be wrong with it, in words
+    Attributes:
+        name: The channel.
+        unit: Its SI unit.
+        least: Least value.
+        greatest: Greatest value.
+        mean: Mean.
+        wrong: What may be wrong with it, in words.
+    """
+
+    name: str
+    unit: str
+    least: float
+    greatest: float
+    mean: float
+    wrong: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -77,11 +86,19 @@ class RunView:
 class Preview:
     """A look at a table.
 
-    runs: tuple[RunView, ...]  # Every run
-    channels: tuple[ChannelView, ...]  # Every channel
-    first: dict[str, list[float]]  # Channel and time to the values of the first samples
-    wrong: tuple[str, ...]  # What may be wrong with channels together, in words
-    remarks: tuple[str, ...]  # What was assumed, left out or filled in, in words
+    Attributes:
+        runs: Every run.
+        channels: Every channel.
+        first: Channel and time to the values of the first samples.
+        wrong: What may be wrong with channels together, in words.
+        remarks: What was assumed, left out or filled in, in words.
+    """
+
+    runs: tuple[RunView, ...]
+    channels: tuple[ChannelView, ...]
+    first: dict[str, list[float]]
+    wrong: tuple[str, ...]
+    remarks: tuple[str, ...]
 
     @property
     def questions(self) -> list[str]:
