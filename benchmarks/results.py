@@ -95,7 +95,7 @@ PAGES = (
     Page(
         "changes",
         "python -m benchmarks.changes --first 33 --pairs 9 --out docs/results/changes.md",
-        "benchmarks/changes.py estimation/changes estimation/causes rig/simulation/varied",
+        "benchmarks/changes.py estimation/changes estimation/causes benchmarks/rigs",
         5,
     ),
     Page("core-mutants", "python -m benchmarks.core_mutants", _CORE, 60),
@@ -109,7 +109,7 @@ PAGES = (
     Page(
         "diagnosis-numbers",
         "python -m benchmarks.diagnosis.calibrate",
-        f"benchmarks/diagnosis {_DIAGNOSIS} rig/simulation/varied",
+        f"benchmarks/diagnosis {_DIAGNOSIS} benchmarks/rigs",
         60,
     ),
     Page("diagnosis-versions", "python -m benchmarks.diagnosis measure", _DIAGNOSIS, 60),

@@ -17,7 +17,7 @@ from benchmarks.diagnosis.case import KINDS, Case
 from benchmarks.diagnosis.measure import Row, measure
 from benchmarks.diagnosis.page import PAGE, Measured, append, judged_seeds
 from benchmarks.diagnosis.seeds import next_to_judge
-from rig.simulation.varied import part_of
+from benchmarks.rigs import part_of
 
 
 @dataclass(frozen=True)

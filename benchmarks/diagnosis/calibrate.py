@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rigs import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.equations import lay_out, on_one_clock
@@ -27,7 +28,6 @@ from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model
 from rig.output.provenance import commit
-from rig.simulation.varied import CALIBRATE, draw
 
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 GEAR_RATIO = 35.0

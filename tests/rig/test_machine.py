@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs import draw
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from rig.cli.main import main
 from rig.log.convert import write_recording
 from rig.machines.shipped import read_machine, shipped
-from rig.simulation.varied import draw
 
 SLIDE = """
 schema = "rig.machine/1"

@@ -4,10 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
+from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
-from rig.simulation.varied import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
-from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 
 pytestmark = pytest.mark.integration
 
