@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rigs import draw
+from benchmarks.rigs.build import spread_over
 from estimation.changes.compare import Change, compare
 from estimation.files import write_text_atomic
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared
 from rig.output.provenance import Provenance
-from rig.output.table import TextTable, to_markdown
-from rig.simulation.varied import draw
-from rig.simulation.varied.build import spread_over
+from rig.output.table import TextTable, to_page
 
 MOVED: Mapping[str, tuple[str, ...]] = {
     "constant": ("motor.torque_constant gain of motor", "gain of actuator motor_current_a"),
@@ -154,8 +154,8 @@ def _markdown(found: Sequence[Pair]) -> str:
     )
     rows = [[str(p.seed), p.planted or "-", "; ".join(p.found) or "-", p.outcome] for p in found]
     each = TextTable("Pairs", ("seed", "planted", "found", "outcome"), rows)
-    parts = ["# Planted changes", to_markdown(summary).rstrip(), to_markdown(each).rstrip()]
-    return "\n\n".join([*parts, Provenance.now(found[0].seed if found else 0).line()]) + "\n"
+    made = Provenance.now(found[0].seed if found else 0)
+    return to_page(["Planted changes"], [summary, each], made)
 
 
 if __name__ == "__main__":

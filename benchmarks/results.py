@@ -34,7 +34,7 @@ class Page:
         command: Command that makes it, from the project's folder; `{data}` is the folder of the
             measured data, `{state}` one where the command keeps finished parts.
         code: Paths of the code it speaks of.
-        minutes: Processor time, rounded.
+        minutes: Processor time, roughly.
     """
 
     name: str
@@ -95,7 +95,7 @@ PAGES = (
     Page(
         "changes",
         "python -m benchmarks.changes --first 33 --pairs 9 --out docs/results/changes.md",
-        "benchmarks/changes.py estimation/changes estimation/causes rig/simulation/varied",
+        "benchmarks/changes.py estimation/changes estimation/causes benchmarks/rigs",
         5,
     ),
     Page("core-mutants", "python -m benchmarks.core_mutants", _CORE, 60),
@@ -109,7 +109,7 @@ PAGES = (
     Page(
         "diagnosis-numbers",
         "python -m benchmarks.diagnosis.calibrate",
-        f"benchmarks/diagnosis {_DIAGNOSIS} rig/simulation/varied",
+        f"benchmarks/diagnosis {_DIAGNOSIS} benchmarks/rigs",
         60,
     ),
     Page("diagnosis-versions", "python -m benchmarks.diagnosis measure", _DIAGNOSIS, 60),
@@ -163,7 +163,7 @@ PAGES = (
         "rig study pique --data {data}/psm --also one19 --out docs/results/pique.md"
         " --figures docs/figures",
         f"rig/studies/pique {_ARM}",
-        10,
+        1,
     ),
     Page("reliability", "python -m benchmarks.reliability", "drivers firmware rig/recording", 90),
     Page(
@@ -184,7 +184,7 @@ PAGES = (
 
 
 def main() -> int:
-    """List the pages, or make those asked for again; exit 1 when a command failed."""
+    """List the pages, or make those asked for again; exit 1 when one was not made."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__)
     parser.add_argument("--remake", default="", metavar="NAME,...", help="pages, or `old`")
     asked = [name for name in parser.parse_args().remake.split(",") if name]
@@ -208,7 +208,8 @@ def _remake(page: Page, since: int | None) -> int:
     if since == 0 and not page.made()[1].endswith(CHANGES):
         return _note(page, "not older than its code")
     if DATA in page.command and not data:
-        return _note(page, "left out: needs the measured data, set RIG_DATA to its folder")
+        _note(page, "left out: needs the measured data, set RIG_DATA to its folder")
+        return 1
     begun = time.monotonic()
     words = page.words(data)
     _note(page, shlex.join(words))

@@ -6,7 +6,6 @@ one. A file is written under a temporary name, synced, and linked to its own: th
 the name is taken, so nothing is overwritten even by two people at once.
 """
 
-import contextlib
 import itertools
 import json
 import os
@@ -19,6 +18,7 @@ from pathlib import Path
 from calibration.errors import CalibrationError, UnknownNameError
 from calibration.linear import CalibrationSet
 from calibration.record import LINE, CalibrationRecord
+from estimation.files import sync_folder
 
 ENVIRONMENT = "RIG_CALIBRATIONS"
 """Environment variable that names the store's folder."""
@@ -225,7 +225,7 @@ def _create(path: Path, text: str) -> bool:
             path.hardlink_to(part)
         finally:
             part.unlink(missing_ok=True)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except FileExistsError:
         return False
     except OSError as error:
@@ -235,12 +235,3 @@ def _create(path: Path, text: str) -> bool:
             "The store needs a folder you may write, on a file system with hard links.",
         ) from error
     return True
-
-
-def _sync_folder(folder: Path) -> None:
-    with contextlib.suppress(PermissionError):  # Windows opens no folders
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

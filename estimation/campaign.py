@@ -209,10 +209,9 @@ class Campaign:
                 f"{len(evidence)} runs cannot be split into {count} folds.",
                 "Each fold needs at least one run to test and one to fit.",
             )
-        order = np.random.default_rng(seed).permutation(len(evidence))
         return [
-            _split(evidence, f"fold {k + 1}/{count}", {evidence.names[i] for i in order[k::count]})
-            for k in range(count)
+            _split(evidence, f"fold {k}/{count}", {evidence.names[i] for i in fold})
+            for k, fold in enumerate(in_folds(len(evidence), count, seed), 1)
         ]
 
     def leave_one_condition_out(self, condition: str) -> list[Split]:
@@ -269,6 +268,12 @@ class Campaign:
             np.concatenate(run) if run else np.empty(0, np.intp),
             tuple(names),
         )
+
+
+def in_folds(runs: int, count: int, seed: int = 0) -> list[NDArray[np.int_]]:
+    """Return the places of the runs of each fold, in an order drawn by a seed."""
+    order = np.random.default_rng(seed).permutation(runs)
+    return [order[k::count] for k in range(count)]
 
 
 def _split(campaign: Campaign, name: str, test: set[str]) -> Split:

@@ -4,6 +4,7 @@ An existing file is replaced by one of its own kind only: an output option with 
 not cost a recording.
 """
 
+import contextlib
 import os
 import tempfile
 from pathlib import Path
@@ -73,6 +74,16 @@ def check_output(path: Path | None, kind: str) -> None:
         _part_of(path).unlink()
     except OSError as error:
         raise _unwritable(path, error) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until a folder's new names are on the disk."""
+    with contextlib.suppress(PermissionError):  # Windows opens no folders
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _part_of(path: Path) -> Path:

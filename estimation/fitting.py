@@ -6,7 +6,7 @@ column, and the model's own offset becomes the mean over the runs.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -31,6 +31,8 @@ from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
 OFFSET = "sensor.offset"
+MOST_DESCENTS = 20
+SLOPE_STEP = 1e-3  # On the scale that a shape is searched on
 
 Shapes = Literal["search", "near", "keep"]
 
@@ -66,6 +68,8 @@ class _Problem:
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
+    kept: dict[tuple[int, int], tuple[list[float], FloatArray]] = field(default_factory=dict)
+    """Each run's and term's last shape and columns: a search moves one term's shape at a time."""
 
     @property
     def shape_parameters(self) -> list[Parameter]:
@@ -76,9 +80,12 @@ class _Problem:
         """Return all signed columns of a run, shape (n, columns)."""
         blocks = []
         rest = list(shape)
-        for term in self.model.terms:
+        for place, term in enumerate(self.model.terms):
             own, rest = rest[: len(term.effect.shape)], rest[len(term.effect.shape) :]
-            blocks.append(run.columns(term, own))
+            last = self.kept.get((id(run), place))
+            if last is None or last[0] != own:
+                last = self.kept[id(run), place] = own, run.columns(term, own)
+            blocks.append(last[1])
         return np.column_stack(blocks) * self.signs
 
     def gram(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
@@ -279,7 +286,6 @@ def _descended(
     point: list[float],
     reach: Sequence[float],
     bounds: Sequence[tuple[float, float]],
-    most: int = 20,
 ) -> list[float]:
     """Return the minimum near the best point of the grid.
 
@@ -289,7 +295,7 @@ def _descended(
     """
     point = [min(max(x, low), high) for x, (low, high) in zip(point, bounds, strict=True)]
     left = error(point)
-    for _ in range(most):
+    for _ in range(MOST_DESCENTS):
         near = [
             (max(low, x - step), min(high, x + step))
             for x, step, (low, high) in zip(point, reach, bounds, strict=True)
@@ -370,19 +376,17 @@ def _bootstrap(
     return values
 
 
-def _slopes(
-    problem: _Problem, run: FitRun, shape: list[float], free: FloatArray, step: float = 1e-3
-) -> FloatArray:
+def _slopes(problem: _Problem, run: FitRun, shape: list[float], free: FloatArray) -> FloatArray:
     """Return the derivative of the estimate by each shape on its scale, shape (n, shapes)."""
     slopes = np.empty((run.places.size, len(shape)))
     for k, parameter in enumerate(problem.shape_parameters):
         ends = []
         for sign in (1, -1):
-            moved = _unscaled(parameter, _scaled(parameter, shape[k]) + sign * step)
+            moved = _unscaled(parameter, _scaled(parameter, shape[k]) + sign * SLOPE_STEP)
             ends.append(
                 problem.columns(run, [*shape[:k], moved, *shape[k + 1 :]])[:, problem.free] @ free
             )
-        slopes[:, k] = (ends[0] - ends[1]) / (2 * step)
+        slopes[:, k] = (ends[0] - ends[1]) / (2 * SLOPE_STEP)
     return slopes
 
 

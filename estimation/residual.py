@@ -34,15 +34,10 @@ VARIABLES: dict[str, str] = {
 }
 """Variables of the screening, and the channel of each."""
 
-BINS = 24
-"""Bins of a map; its range is that of the middle 98 % of the samples."""
-
-ORDERS = 12
-"""Highest order of a ripple that is looked for, per turn of the motor."""
-
-REST_RAD_S = 0.02
-"""Spindle speed below which the direction of motion counts as none, rad/s."""
-
+SURROGATES = 19  # Number of shifted residuals behind `chance_fraction`
+BINS = 24  # Bins of a map; its range is that of the middle 98 % of the samples
+ORDERS = 12  # Highest order of a ripple that is looked for, per turn of the motor
+REST_RAD_S = 0.02  # Spindle speed below which the direction of motion counts as none, rad/s
 SIMPLER_SHARE = 0.9
 """The direction is ranked before the speed when it explains this share of what the speed does."""
 
@@ -186,16 +181,13 @@ def profile(model: Model, parts: Sequence[RunResidual], variable: str) -> Profil
     return Profile(f"{words}, {unit_of(channel)}", x, left, model.unit)
 
 
-def largest_structure(
-    model: Model, campaign: Campaign, seed: int = 0, surrogates: int = 19
-) -> list[Structure]:
+def largest_structure(model: Model, campaign: Campaign, seed: int = 0) -> list[Structure]:
     """Rank what a model's residual goes with, largest first.
 
     Args:
         model: A fitted model.
         campaign: The runs; two at least.
         seed: Seed of the permutations.
-        surrogates: Number of shifted residuals behind `chance_fraction`.
 
     Returns:
         One structure per variable that varies in the runs, ranked by explained fraction.
@@ -211,7 +203,7 @@ def largest_structure(
         )
     left = centred(model, [part.values for part in runs])
     maps = [_Map.of(model, *parts) for parts in _features(model, runs)]
-    shifted = _surrogates(left, seed, surrogates)
+    shifted = _surrogates(left, seed, SURROGATES)
     chance = max((m.explained(r) for m in maps for r in shifted), default=0.0)
     found: dict[str, Structure] = {}
     for m in maps:

@@ -17,7 +17,7 @@ from benchmarks.diagnosis.case import KINDS, Case
 from benchmarks.diagnosis.measure import Row, measure
 from benchmarks.diagnosis.page import PAGE, Measured, append, judged_seeds
 from benchmarks.diagnosis.seeds import next_to_judge
-from rig.simulation.varied import part_of
+from benchmarks.rigs import part_of
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _generators(options: argparse.Namespace) -> Iterator[Generator]:
             yield Generator(name, list(drawn), seed)
     for path, cases in ((options.otherlab, otherlab.cases), (options.machines, machines.cases)):
         if path is not None and not path.is_dir():
-            _say(f"skipped: there is no folder {path}")
+            _say(f"skipped: no folder {path}")
         elif path is not None:
             yield Generator(path.name, list(cases(path)))
 

@@ -1,33 +1,33 @@
 """Calibrate the numbers of a diagnosis on campaigns drawn at random, and write the results page.
 
 `python -m benchmarks.diagnosis.calibrate` searches the training runs of drawn campaigns whose seeds
-are kept for calibration. Named causes give `sharpness`: the one with the best mean log probability
-of the true family. Clean campaigns give `cause_cost`: the least one with a share of false
-findings below the bound, by split conformal prediction. Resumes where it stopped.
+are kept for calibration, with a cause and without. `sharpness` and `cause_cost` are those with the
+best mean log probability of the truth: of the true family, or of no cause. Resumes where it
+stopped.
 """
 
 import argparse
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.asking import commit
+from benchmarks.rigs import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.equations import lay_out, on_one_clock
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT
-from estimation.causes.search import search
+from estimation.causes.search import probabilities, search
 from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model
-from rig.simulation.varied import CALIBRATE, draw
+from rig.output.provenance import commit
 
 REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 GEAR_RATIO = 35.0
@@ -36,8 +36,11 @@ GEAR_RATIO = 35.0
 KINDS = ("strong", "weak", "outside")
 """Classes of cases with one cause in all runs."""
 
-SHARPNESS = (4.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0)
-FALSE_FINDINGS = 0.01
+SHARPNESS = (6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0)
+COSTS = (0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2)
+LEAST = 1e-3
+"""Probability that a truth which was not considered is given."""
+
 PAGE = Path("docs/results/diagnosis-numbers.md")
 
 
@@ -47,15 +50,22 @@ class Searched:
 
     Attributes:
         name: The case.
-        best: Score of the best cause.
-        scores: Family to the score of its best cause, those above zero.
+        candidates: Family, score and gain of the best of each in the first place.
         families: True families; none in a clean campaign.
     """
 
     name: str
-    best: float
-    scores: Mapping[str, float]
+    candidates: Sequence[tuple[str, float, float]]
     families: Sequence[str]
+
+    def probability(self, sharpness: float, cost: float) -> float:
+        """Return the probability of the truth at other numbers than the shipped ones."""
+        names = [name for name, _, _ in self.candidates]
+        scores, gains = np.array([(s, g) for _, s, g in self.candidates] or [(-1.0, 0.0)]).T
+        shares = probabilities(scores + DEFAULT.cause_cost - cost, gains, sharpness)
+        if not self.families:
+            return float(1.0 - shares.sum())
+        return float(sum(p for n, p in zip(names, shares, strict=False) if n in self.families))
 
 
 def main() -> int:
@@ -83,24 +93,9 @@ def main() -> int:
     return 0
 
 
-def log_score(cases: Sequence[Searched], sharpness: float) -> float:
-    """Return the mean log probability of the true family; of a cause not found, none counts."""
-    found = []
-    for case in cases:
-        if case.scores:
-            top = max(case.scores.values())
-            weights = {f: math.exp(sharpness * (s - top)) for f, s in case.scores.items()}
-            right = sum(w for f, w in weights.items() if f in case.families)
-            found.append(math.log(max(right / sum(weights.values()), 1e-3)))
-    return float(np.mean(found))
-
-
-def least_cost(clean: Sequence[Searched], share: float) -> float | None:
-    """Return the cost of a cause for a share of false findings; None with too few cases."""
-    rank = math.ceil((len(clean) + 1) * (1.0 - share))
-    if rank > len(clean):
-        return None
-    return DEFAULT.cause_cost + sorted(case.best for case in clean)[rank - 1]
+def log_score(cases: Sequence[Searched], sharpness: float, cost: float) -> float:
+    """Return the mean log probability of the truth."""
+    return float(np.mean([math.log(max(c.probability(sharpness, cost), LEAST)) for c in cases]))
 
 
 def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searched:
@@ -113,48 +108,44 @@ def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searc
         layout = lay_out(models, recordings, train)
         add_instruments(layout, train)
         found = search(layout.select(train))
-        scores: dict[str, float] = {}
-        for one in found.conditional[0] if found.conditional else ():
-            if one.score > 0.0:
-                scores.setdefault(one.candidate.cause.family, one.score)
+        ranked = found.conditional[0] if found.conditional else found.first
+        best = {c.candidate.cause.family: c for c in reversed(ranked)}
         families = [family for group in case.truth.families for family in group]
-        content = {"best": found.clean_score, "scores": scores, "families": families}
+        content = {
+            "candidates": [(name, c.score, c.gain) for name, c in best.items()],
+            "families": families,
+        }
         write_text_atomic(path, json.dumps(content))
     content = json.loads(path.read_text())
-    return Searched(path.stem, content["best"], content["scores"], content["families"])
+    return Searched(path.stem, content["candidates"], content["families"])
 
 
 def _page(done: Sequence[Searched], seed: int) -> str:
     clean = [case for case in done if not case.families]
     named = [case for case in done if case.families]
-    found = [case for case in named if case.scores]
-    rows = "\n".join(f"| {s:g} | {log_score(named, s):.3f} |" for s in SHARPNESS)
-    best = max(SHARPNESS, key=lambda s: log_score(named, s))
-    bound = least_cost(clean, FALSE_FINDINGS)
-    false = sum(case.best > 0.0 for case in clean)
-    conformal = (
-        f"{bound:.3f}" if bound is not None else f"not decided by {len(clean)} clean campaigns"
+    pairs = [(s, c) for s in SHARPNESS for c in COSTS]
+    best = max(pairs, key=lambda pair: log_score(done, *pair))
+    head = "| sharpness | " + " | ".join(f"cause_cost {c:g}" for c in COSTS) + " |"
+    rows = "\n".join(
+        f"| {s:g} | " + " | ".join(f"{log_score(done, s, c):.3f}" for c in COSTS) + " |"
+        for s in SHARPNESS
     )
+    false = sum(any(score > 0.0 for _, score, _ in case.candidates) for case in clean)
     return f"""# The numbers of a diagnosis
 
 Written by `python -m benchmarks.diagnosis.calibrate` at commit {commit(Path.cwd())},
 {date.today().isoformat()}, from seed {seed} of the calibration range: {len(named)} campaigns with a
 cause ({", ".join(KINDS)}), {len(clean)} clean ones.
 
-## sharpness
+Mean log probability of the truth: of the true family, or of no cause. Best: sharpness {best[0]:g},
+cause_cost {best[1]:g}. Shipped: {DEFAULT.sharpness:g}, {DEFAULT.cause_cost:g}.
 
-Mean log probability of the true family, over the {len(found)} campaigns in which a cause was found.
-Best: {best:g}. Shipped: {DEFAULT.sharpness:g}.
-
-| sharpness | mean log probability |
-| --- | --- |
+{head}
+|{" --- |" * (1 + len(COSTS))}
 {rows}
 
-## cause_cost
-
-False findings with the shipped cost, before the test runs are opened: {false} of {len(clean)}. The
-least cost for at most {FALSE_FINDINGS:.0%} false findings, by split conformal prediction:
-{conformal}. Shipped: {DEFAULT.cause_cost:g}.
+With the shipped numbers the training runs of {false} of {len(clean)} clean campaigns show a cause,
+before the test runs are opened.
 """
 
 

@@ -89,7 +89,7 @@ class Answer:
 def draw(kind: str, number: int, seed: int) -> Answer:
     """Draw a case's answer; the same class, number and seed give the same case."""
     if kind not in KINDS:
-        raise ValueError(f"There is no class {kind!r}; there are {', '.join(KINDS)}.")
+        raise ValueError(f"Unknown class {kind!r}; there are {', '.join(KINDS)}.")
     word = hashlib.sha256(f"{kind}/{number}/{seed}".encode()).hexdigest()
     random = np.random.default_rng(int(word[:15], 16))
     chain, excitation = CHAINS[int(random.integers(len(CHAINS)))], "usual"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks.diagnosis.case import KINDS, MACHINE
 from benchmarks.diagnosis.measure import Row
+from benchmarks.rigs import part_of
 from estimation.files import write_text_atomic
-from rig.simulation.varied import part_of
 
 PAGE = Path("docs/results/diagnosis-versions.md")
 

@@ -1,13 +1,13 @@
 """Blocks of seeds: a measurement takes one and is named by the first of its seeds.
 
-Which seeds are for what is stated in `rig.simulation.varied.seeds`. Of the calibrating seeds those
+Which seeds are for what is stated in `benchmarks.rigs.seeds`. Of the calibrating seeds those
 below a thousand were also looked at while the first rules were written. Who has seen an answer
 about a case of a judging seed must not judge a version that was changed afterwards with it.
 """
 
 from collections.abc import Collection
 
-from rig.simulation.varied import JUDGE
+from benchmarks.rigs import JUDGE
 
 BLOCK = 1000
 

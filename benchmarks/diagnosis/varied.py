@@ -1,4 +1,4 @@
-"""Cases whose rig, protocol and hidden forms are all drawn at random (`rig.simulation.varied`)."""
+"""Cases whose rig, protocol and hidden forms are all drawn at random (`benchmarks.rigs`)."""
 
 import itertools
 import json
@@ -13,9 +13,9 @@ from benchmarks.diagnosis import scoring
 from benchmarks.diagnosis.case import KINDS, Case, Judgement, Report, write_recordings
 from benchmarks.diagnosis.seeds import BLOCK
 from benchmarks.diagnosis.truths import same_on_one_rig
+from benchmarks.rigs import Case as Drawn
+from benchmarks.rigs import draw
 from estimation.files import write_text_atomic
-from rig.simulation.varied import Case as Drawn
-from rig.simulation.varied import draw
 
 
 def cases(

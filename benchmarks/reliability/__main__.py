@@ -60,7 +60,7 @@ def main() -> int:
     options = parser.parse_intermixed_args()
     unknown = set(options.parts) - set(PARTS)
     if unknown:
-        parser.error(f"there is no part {', '.join(sorted(unknown))}")
+        parser.error(f"unknown part {', '.join(sorted(unknown))}")
     parts = options.parts or PARTS
     short = any(is_short(part, options) for part in parts)
     state, table = (SHORT_STATE, SHORT_TABLE) if short else (STATE, TABLE)

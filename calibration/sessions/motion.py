@@ -15,24 +15,23 @@ RATE_HZ = 1000.0
 START_RAD = -1.047
 """Where a calibration starts: the jaw open."""
 MOVING_RAD_S = 0.2
+PAUSE_S, TRAVEL_RAD = 0.3, 0.9
 KEPT_HZ = 100.0
 
 
-def ramps(speed_rad_s: float, travel_rad: float, pause_s: float = 0.3) -> FloatArray:
+def ramps(speed_rad_s: float, travel_rad: float) -> FloatArray:
     """Return closing and opening once at a constant speed, resting at both ends, rad."""
     ramp = np.arange(0.0, travel_rad, speed_rad_s / RATE_HZ)
-    pause = np.zeros(round(pause_s * RATE_HZ))
+    pause = np.zeros(round(PAUSE_S * RATE_HZ))
     return np.concatenate([pause, ramp, pause + travel_rad, ramp[::-1], pause]) + START_RAD
 
 
-def moves(
-    speeds_rad_s: Sequence[float], loads_a: Sequence[float], repeats: int, travel_rad: float = 0.9
-) -> list[Step]:
+def moves(speeds_rad_s: Sequence[float], loads_a: Sequence[float], repeats: int) -> list[Step]:
     """Return one step for every load, speed and repeat, each closing and opening once."""
     grid = itertools.product(range(repeats), loads_a, speeds_rad_s)
     steps = []
     for repeat, load, speed in grid:
-        angle = ramps(speed, travel_rad)
+        angle = ramps(speed, TRAVEL_RAD)
         steps.append(
             Step(
                 f"move-{load:g}A-{speed:g}rad_s-{repeat}",

@@ -20,10 +20,8 @@ from drivers.transport.python_can import open_can
 TRIES = 3
 REPLY_TIMEOUT_S = 0.02
 """Time for a whole answer: ten times the wire time of the longest at 250 kbit/s."""
-CHECK_S = 1.0
-"""Time between two checks that the sensor still uses its calibration."""
-AFTER_RESTART = 0
-"""The calibration a sensor uses after a restart."""
+CHECK_S = 1.0  # Time between two checks that the sensor still uses its calibration
+AFTER_RESTART = 0  # The calibration a sensor uses after a restart
 
 
 class AtiCan(PolledDevice):

@@ -73,50 +73,6 @@ def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
     return pose
 
 
-def spatial_jacobian(arm: Arm, position: FloatArray) -> FloatArray:
-    """Return the Jacobian to the tip's spatial twist, taken at the base's origin.
-
-    Args:
-        arm: The arm.
-        position: Joint positions, shape (joints,), rad or m.
-
-    Returns:
-        Shape (6, joints): linear velocity first, then angular, in the base frame.
-
-    Raises:
-        ArmError: The number of positions is not the arm's.
-    """
-    return _jacobian(arm, position, "WORLD")
-
-
-def body_jacobian(arm: Arm, position: FloatArray) -> FloatArray:
-    """Return the Jacobian to the tip's body twist, taken at the tip in the tip's frame.
-
-    Args:
-        arm: The arm.
-        position: Joint positions, shape (joints,), rad or m.
-
-    Returns:
-        Shape (6, joints): linear velocity first, then angular, in the tip's frame.
-
-    Raises:
-        ArmError: The number of positions is not the arm's.
-    """
-    return _jacobian(arm, position, "LOCAL")
-
-
-def _jacobian(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
-    pin, model = pinocchio(), built(arm)
-    jacobian: FloatArray = pin.computeFrameJacobian(
-        model,
-        model.createData(),
-        _checked(arm, position),
-        model.getFrameId(TIP),
-        getattr(pin.ReferenceFrame, frame),
-    )
-    return jacobian
-
-
 def _checked(arm: Arm, position: FloatArray) -> FloatArray:
     q = np.asarray(position, dtype=np.float64)
     if q.shape != (len(arm.joints),) or not np.isfinite(q).all():

@@ -100,6 +100,9 @@ def _likely() -> FloatArray:
     return np.diag(np.repeat([LIKELY_FORCE_N**-2, LIKELY_MOMENT_N_M**-2], 3))
 
 
+WINDOW, DEGREE = 61, 3  # Samples of the live window, odd, and degree of its polynomial
+
+
 class LiveWrench:
     """Wrench sample by sample: position and torque in, most likely spatial wrench out.
 
@@ -113,8 +116,6 @@ class LiveWrench:
         values: FloatArray,
         torque_error: FloatArray,
         period_s: float,
-        window: int = 61,
-        order: int = 3,
     ) -> None:
         """Set up.
 
@@ -123,8 +124,6 @@ class LiveWrench:
             values: All parameters in the order of `estimation.arm.regressor.names`.
             torque_error: Standard error of each joint's torque, shape (joints,).
             period_s: Sample period, s.
-            window: Samples of the window, odd.
-            order: Degree of its polynomial.
 
         Raises:
             ArmError: The number of parameters is not the arm's.
@@ -136,12 +135,12 @@ class LiveWrench:
         self._world = self._pin.ReferenceFrame.WORLD
         self._taps = np.stack(
             [
-                signal.savgol_coeffs(window, order, deriv=k, delta=period_s, use="dot")
+                signal.savgol_coeffs(WINDOW, DEGREE, deriv=k, delta=period_s, use="dot")
                 for k in range(3)
             ]
         )
         self._joints = len(arm.joints)
-        self._window = np.zeros((2 * window, 2 * self._joints))
+        self._window = np.zeros((2 * WINDOW, 2 * self._joints))
         self._seen = 0
         self._width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
         self._links, self._linear, self._coulomb, self._offset = _split(arm, values)

@@ -15,9 +15,6 @@ from estimation.causes.joint import Joint, Next, Part
 from estimation.causes.laid import Laid
 from estimation.recording import FloatArray
 
-MOST_CHANGE = 2.0
-"""Factor by which the largest linear term of an equation may change next to a cause."""
-
 
 @dataclass(frozen=True)
 class Block:
@@ -45,19 +42,19 @@ class Outcome:
     Attributes:
         errors: For each family of folds, part to squared error, shape (runs, causes).
         amplitudes: On all runs, shape (causes, k).
-        replaces: Whether a cause stands in for the largest linear term of an equation: a reading of
-            the target through another sensor explains any equation, with no use for the declared
-            terms, but a cause comes in addition to them. Shape (causes,).
+        changes: Equation to the factor by which its largest linear term changes, shape (causes,).
         cross: Products of the columns with the base's residual within runs, weighted, shape
             (runs, causes, k).
         own: Products of the columns with themselves, shape (runs, causes, k, k).
+        base: Products of the base's columns with the columns, shape (runs, causes, base, k).
     """
 
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
-    replaces: NDArray[np.bool_]
+    changes: Mapping[str, FloatArray]
     cross: FloatArray
     own: FloatArray
+    base: FloatArray
 
 
 def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
@@ -137,18 +134,20 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
     entered = {name for name, _ in block.base}
     changes = {
-        name: declared[:, at] / (joint.declared[at] or 1.0)
-        for name, at in joint.largest_linear().items()
+        name: declared[:, at] / (joint.whole(usual)[at] or 1.0)
+        for name, (at, _) in joint.largest_linear.items()
         if name in entered
     }
-    kept = [(change > 1.0 / MOST_CHANGE) & (change < MOST_CHANGE) for change in changes.values()]
-    replaces = ~np.logical_and.reduce(kept) if kept else np.zeros(len(base), dtype=np.bool_)
-    for found in errors:
-        for name, change in changes.items():
-            # in the unit of the equation's largest reading, whose noise the residual may be
-            found[name, "within"] *= np.maximum(1.0, 1.0 / np.maximum(change, 1e-3) ** 2)
-    residual = right - np.einsum("rcik,i->rck", cross, usual)
-    return Outcome(errors, amplitudes, replaces, residual, own)
+    # the columns as they were before declared ones were taken off: in some runs these differ
+    gram = np.asarray(sum((weights[p] * joint.gram[p] for p in inside), zero))
+    count = block.taken.shape[1]
+    mixed = block.taken.swapaxes(1, 2) @ cross[:, :, :count]
+    own = own + mixed + mixed.swapaxes(2, 3)
+    own += block.taken.swapaxes(1, 2) @ gram[:, None, :count, :count] @ block.taken
+    right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
+    cross = cross + gram[:, None, :-1, :count] @ block.taken
+    residual = right - (usual @ cross)
+    return Outcome(errors, amplitudes, changes, residual, own, cross)
 
 
 def _squared(

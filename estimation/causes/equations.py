@@ -155,13 +155,14 @@ class Equation:
         return kinds
 
     @cached_property
-    def of_channel(self) -> list[bool]:
-        """Which of the columns are a channel times a constant."""
-        kinds = []
+    def of_channel(self) -> list[str]:
+        """The channel that each column is a constant times, or nothing."""
+        channels = []
         for term in self.terms:
             linear = isinstance(term.effect, Proportional)
-            kinds += [linear] * (len(term.effect.amplitudes) + len(term.effect.shape))
-        return kinds
+            channel = next(iter(term.channels.values())) if linear else ""
+            channels += [channel] * (len(term.effect.amplitudes) + len(term.effect.shape))
+        return channels
 
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).

@@ -6,6 +6,7 @@ score needs is in cross-products of one run, worked out once, so a fold costs on
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -313,14 +314,16 @@ class Joint:
             out[:, self._equations_at[name]] = taken
         return out
 
-    def largest_linear(self) -> Mapping[str, int]:
-        """Return the place of each equation's largest term that is a channel times a constant."""
+    @cached_property
+    def largest_linear(self) -> Mapping[str, tuple[int, str]]:
+        """Return place and channel of each equation's largest channel times a constant."""
         out = {}
         for name, equation in self.layout.equations.items():
             linear = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
             power = np.diag(self.gram[name, "within"].sum(axis=0))[linear]
             if len(linear):
-                out[name] = int(linear[np.argmax(self.declared[linear] ** 2 * power)])
+                most = int(linear[np.argmax(self.declared[linear] ** 2 * power)])
+                out[name] = most, equation.of_channel[most - self._equations_at[name].start]
         return out
 
     # ---- errors

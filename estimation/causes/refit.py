@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
-from estimation.causes.laid import TINY
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
 from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
@@ -207,11 +206,7 @@ class Refit:
             samples += len(whole)
         gram = np.sum(grams, axis=0)
         penalty, low, high = self._limits(parts)
-        independent = len(grams) * self.numbers.samples_a_run
-        # as in the search: no term exceeds half of all signals
-        error = _unexplained(gram, sum(len(t.effect.amplitudes) for t in self._declared))
-        most = 4.0 * np.diag(gram)[:-1] * error / (max(gram[-1, -1], TINY) * independent)
-        penalty = penalty * samples / independent + most
+        penalty = penalty * samples / (len(grams) * self.numbers.samples_a_run)
         weights = solve_within(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1], low, high)
         level = 0.0
         if self.model.run_offsets:
@@ -266,13 +261,6 @@ class Refit:
                     ),
                 )
         return held[name]
-
-
-def _unexplained(gram: FloatArray, count: int) -> float:
-    """Return the squared error that the first columns of products leave of the last one."""
-    right = gram[:count, -1]
-    explained = right @ np.linalg.lstsq(gram[:count, :count], right)[0]
-    return max(float(gram[-1, -1] - explained), 0.0)
 
 
 def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:

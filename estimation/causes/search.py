@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.causes.blocks import block_of, evaluate
+from estimation.causes.blocks import Outcome, block_of, evaluate
 from estimation.causes.candidates import (
     Candidate,
     Claim,
@@ -24,6 +25,9 @@ from estimation.causes.sources import RELATIVE, Bend
 from estimation.recording import FloatArray
 
 MOST_CAUSES = 3
+
+MOST_CHANGE = 2.0
+"""Factor by which the largest linear term of an equation may change next to a cause."""
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
@@ -45,7 +49,8 @@ class Scored:
         gain: The same with the price left in.
         by_family: Score of each family of folds.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
-        by_run: Products of its columns with the base's residual and with themselves, of each run.
+        by_run: Products of its columns with the base's residual, with themselves and with the base,
+            of each run.
     """
 
     candidate: Candidate
@@ -53,7 +58,7 @@ class Scored:
     gain: float
     by_family: FloatArray
     amplitudes: FloatArray
-    by_run: tuple[FloatArray, FloatArray]
+    by_run: tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -64,14 +69,14 @@ class Found:
         causes: The leading hypothesis, in the order found; empty when nothing is missing.
         conditional: For each cause, every candidate in its place given the others, best first.
         joint: The regression of the training runs without causes.
-        clean_score: The best score when nothing was claimed.
+        first: Every candidate when nothing is claimed, best first.
         late: Short delays of readings that are part of the base.
     """
 
     causes: Sequence[Scored]
     conditional: Sequence[Sequence[Scored]]
     joint: Joint
-    clean_score: float
+    first: Sequence[Scored]
     late: Sequence[Claim] = ()
 
 
@@ -88,11 +93,11 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     ranking = Ranking(joint, candidates(joint), folds_of(train))
     first = ranking.next_to([])
     if not first or first[0].score < 0.0:
-        return Found([], [], joint, first[0].score if first else 0.0, late)
+        return Found([], [], joint, first, late)
     chains = [_chain(ranking, start) for start in _starts(first)]
     causes = max(chains, key=lambda chain: sum(c.score for c in chain))
     causes, conditional = _settled(ranking, causes)
-    return Found(causes, conditional, joint, first[0].score, late)
+    return Found(causes, conditional, joint, first, late)
 
 
 class Ranking:
@@ -169,16 +174,26 @@ def shares_of(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
 
 
 def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
+    """Return the probability of each candidate, shape (n,); the rest to one is that of no cause."""
+    scores, gains = np.array([(s.score, s.gain) for s in ranked]).T
+    return probabilities(scores, gains, numbers.sharpness)
+
+
+def probabilities(scores: FloatArray, gains: FloatArray, sharpness: float) -> FloatArray:
     """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
 
     No cause at all has the score zero. What explains nothing has no share: of each weight that of
     the same candidate without its gain is taken off.
+
+    Args:
+        scores: Of the candidates, shape (n,).
+        gains: Their scores before the price of what was chosen, shape (n,).
+        sharpness: Log odds for one unit of score.
     """
-    scores, gains = np.array([(s.score, s.gain) for s in ranked]).T
-    top = max(0.0, float(scores.max()))
-    explains = -np.expm1(-numbers.sharpness * np.maximum(gains, 0.0))
-    weights = np.exp(numbers.sharpness * (scores - top)) * explains
-    return np.asarray(weights / (weights.sum() + np.exp(-numbers.sharpness * top)))
+    top = float(max(0.0, *scores))
+    explains = -np.expm1(-sharpness * np.maximum(gains, 0.0))
+    weights = np.exp(sharpness * (scores - top)) * explains
+    return np.asarray(weights / (weights.sum() + np.exp(-sharpness * top)))
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
@@ -198,16 +213,38 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     for group in pool:
         block = block_of(joint, group.laid, group.block)
         outcome = evaluate(joint, block, folds, group.precision)
+        replaces = _in_readings(joint, group.candidates, outcome)
         scores, by_family = joint.score(spreads, before, outcome.errors)
         for k, candidate in enumerate(group.candidates):
             amplitudes = outcome.amplitudes[k]
-            if outcome.replaces[k] or _sign_is_wrong(candidate, amplitudes):
+            if replaces[k] or _sign_is_wrong(candidate, amplitudes):
                 continue
             gain = float(scores[k])
             score = gain - _price(candidate, joint.numbers)
-            by_run = outcome.cross[:, k], outcome.own[:, k]
+            by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
             out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
     return out
+
+
+def _in_readings(
+    joint: Joint, candidates: Sequence[Candidate], outcome: Outcome
+) -> NDArray[np.bool_]:
+    """Count errors in the unit of an equation's largest reading, and return who replaces it.
+
+    The residual may be that reading's noise. Who reads the same quantity through another sensor
+    then shares the task with it and halves the noise, with nothing to do with a cause: the factor
+    of the reading becomes smaller, by as much as the noise is less seen. And who reads the target
+    itself has no use for the declared terms; a cause comes in addition to them. Shape (n,).
+    """
+    replaces = np.zeros(len(candidates), dtype=np.bool_)
+    for name, change in outcome.changes.items():
+        channel = joint.largest_linear[name][1]
+        other = np.array([channel not in one.cause.reads for one in candidates])
+        unit = np.where(other, np.maximum(1.0, np.maximum(change, 1e-3) ** -2.0), 1.0)
+        for family in outcome.errors:
+            family[name, "within"][:] *= unit
+        replaces |= (change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE)
+    return replaces
 
 
 def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
@@ -293,19 +330,21 @@ def _on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     count = len(joint.runs)
     if count < 6:
         return []
+    inverse = joint.left_out([[]]).inverse[0]
     named: dict[int, list[Scored]] = {}
     for one in everything:
         if not one.candidate.is_function:
             named.setdefault(len(one.amplitudes), []).append(one)
     promise: list[tuple[float, Candidate, tuple[int, ...]]] = []
     for group in named.values():
-        cross, own = (np.stack([s.by_run[i] for s in group]) for i in (0, 1))
+        cross, own, base = (np.stack([s.by_run[i] for s in group]) for i in range(3))
         order = np.broadcast_to(np.arange(count), (len(group), count))
         sizes = np.argsort(_sizes(cross, own), axis=1)
         for runs in (order, order[:, ::-1], sizes, sizes[:, ::-1]):
             every = np.arange(len(group))[:, None]
-            sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own)]
-            for one, chosen, removed in zip(group, runs, _removed(*sums), strict=True):
+            sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in (cross, own, base)]
+            gains = _removed(inverse, *sums)
+            for one, chosen, removed in zip(group, runs, gains, strict=True):
                 promise += [
                     (float(r), one.candidate, tuple(sorted(chosen[: k + 2].tolist())))
                     for k, r in enumerate(removed)
@@ -334,9 +373,19 @@ def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
     return np.asarray(apart / (shown + 0.1 * shown.mean(axis=1, keepdims=True) + 1e-300))
 
 
-def _removed(cross: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the error that amplitudes remove, from products (..., k) and (..., k, k)."""
-    return np.asarray((cross * _solved(cross, own)).sum(axis=-1))
+def _removed(
+    inverse: FloatArray, cross: FloatArray, own: FloatArray, base: FloatArray
+) -> FloatArray:
+    """Return the error that amplitudes remove, fitted together with the base.
+
+    Args:
+        inverse: Of the base's normal matrix, shape (base, base).
+        cross: Products of the columns with the base's residual, shape (..., k).
+        own: With themselves, shape (..., k, k).
+        base: Of the base's columns with them, shape (..., base, k).
+    """
+    beyond = own - base.swapaxes(-1, -2) @ inverse @ base
+    return np.asarray((cross * _solved(cross, beyond)).sum(axis=-1))
 
 
 def _solved(cross: FloatArray, own: FloatArray) -> FloatArray:

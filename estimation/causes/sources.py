@@ -280,6 +280,12 @@ def _axis(
         role = next(r for r in TURNING if r in channels)
         return _orders(layout, effect, channels[role])
     relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+    if parameter.name == "fall" and relative is not None:
+        # one that falls faster is another form of the change of sign
+        usual = _range(layout, channels["speed"])[1] or 1.0
+        least = max(relative[0], 2.0 * direction_width(layout, place) / usual)
+        count = len(relative) if least < relative[-1] else 0
+        relative = tuple(np.geomspace(least, relative[-1], count))
     if parameter.unit in channels and relative is not None:
         low, high = _range(layout, channels[parameter.unit])
         if parameter.linear:

@@ -171,17 +171,13 @@ def answer(
 
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
-    """Return the posterior over families of one slot, the likeliest first."""
-    shares: dict[str, float] = {}
+    """Return the posterior over families of one slot, each by its best candidate, best first."""
     best: dict[str, Scored] = {}
-    for scored, weight in zip(ranked, posterior(ranked, numbers), strict=True):
-        family = scored.candidate.cause.family
-        shares[family] = shares.get(family, 0.0) + float(weight)
-        best.setdefault(family, scored)
-    return sorted(
-        (Probability(f, share, best[f]) for f, share in shares.items() if share > 0.0),
-        key=lambda p: -p.share,
-    )
+    for scored in ranked:
+        best.setdefault(scored.candidate.cause.family, scored)
+    shares = posterior(list(best.values()), numbers)
+    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
+    return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 
 def _judged(
@@ -194,7 +190,8 @@ def _judged(
     confirmed, notes = _confirmed(found, held_out, numbers)
     for one in confirmed:
         cause = one.scored.candidate.cause
-        acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], one.scored.candidate)
+        earlier = [k.scored.candidate for k in kept]
+        acts_in, settled = held_out.acts_in(earlier, one.scored.candidate)
         if settled:
             notes.append(
                 f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
@@ -233,9 +230,7 @@ def _judged(
     return kept, findings, notes
 
 
-def _confirmed(
-    found: Found, held_out: HeldOut, numbers: Numbers
-) -> tuple[list[Kept], list[str]]:
+def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:
     """Return the causes with evidence on the test runs next to the others, and notes on the rest.
 
     The one with the least evidence goes first: two effects may need one another.
@@ -246,7 +241,9 @@ def _confirmed(
         left.append(Kept(likely[0].best, likely, ranked))
     while left:
         evidence = [
-            held_out.evidence([o.scored.candidate for o in left if o is not one], one.scored.candidate)
+            held_out.evidence(
+                [o.scored.candidate for o in left if o is not one], one.scored.candidate
+            )
             for one in left
         ]
         if min(evidence) >= numbers.kept_evidence:

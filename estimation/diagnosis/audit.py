@@ -1,77 +1,91 @@
-"""The audit before a search: clocks, delays between channels, conditions that never vary.
+"""The audit before a search: clocks that jump or skip, and conditions that never vary.
 
-It decides nothing. Its sentences are the limits of a search on these runs.
+A run whose clock jumps is left out: filters take samples as evenly spaced, and across a gap that
+nobody flagged they join samples that were apart, which looks like a fast motion without a torque.
+All else decides nothing; its sentences are the limits of a search on these runs.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
-from estimation.diagnosis.clock import skips
 from estimation.recording import Recording, shared_columns
-
-PAIRS = (
-    ("motor_angle_rad", "spindle_angle_rad"),
-    ("spindle_angle_rad", "jaw_angle_rad"),
-    ("proximal_torque_n_m", "distal_torque_n_m"),
-)
-"""Channels that move together, the earlier one first."""
-
-BAND_HZ, SEGMENT_S = (0.5, 8.0), 4.0
-COHERENT = 0.9
-"""Frequencies determine a delay where at least this share of the power is common."""
 
 STEADY = 1e-3
 """A condition that varies by less than this share of its size is held."""
 
+SKIP = 1.5
+"""A step of the clock longer than so many periods is a gap."""
+
+LONGEST_S = 0.05
+"""A gap of this length may hide a reversal; a lost sample or two may not."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """One step of a clock that is longer than a period.
+
+    Attributes:
+        at_s: Where it begins, as the run's clock has it.
+        length_s: How long it is.
+        jump: Whether it is long, and no sample at its ends is flagged.
+    """
+
+    at_s: float
+    length_s: float
+    jump: bool
+
+
+def gaps(recording: Recording) -> list[Gap]:
+    """Return the gaps of a run's clock, in order."""
+    steps = np.diff(recording.time_s)
+    if steps.size == 0:
+        return []
+    usual = float(np.median(steps))
+    flagged = recording.flags != 0
+    jumps = ~(flagged[:-1] | flagged[1:]) & (steps > usual + LONGEST_S)
+    return [
+        Gap(float(recording.time_s[k]), float(steps[k]), bool(jumps[k]))
+        for k in np.flatnonzero(steps > SKIP * usual)
+    ]
+
+
+def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Return the runs whose clock does not jump, and a sentence on each other run."""
+    kept, lost = [], []
+    for recording in recordings:
+        jumps = [gap for gap in gaps(recording) if gap.jump]
+        if not jumps:
+            kept.append(recording)
+            continue
+        first = jumps[0]
+        more = "" if len(jumps) == 1 else f", and at {len(jumps) - 1} more places"
+        lost.append(
+            f"Run {recording.name} is left out: its clock jumps by {first.length_s:.3g} s at"
+            f" {first.at_s:.3f} s{more}, and the motion meanwhile is not known."
+        )
+    return kept, lost
+
+
+def skips(recordings: Sequence[Recording]) -> list[str]:
+    """Return the limits that the gaps of used runs set, one sentence a run."""
+    said = []
+    for recording in recordings:
+        found = gaps(recording)
+        if found:
+            longest = max(found, key=lambda gap: gap.length_s)
+            said.append(
+                f"The clock of run {recording.name} skips {len(found)} times, the longest by"
+                f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s:"
+                " an effect of time or history is not decided across it."
+            )
+    return said
+
 
 def audit(recordings: Sequence[Recording]) -> list[str]:
     """Return the limits of the recordings, one sentence each."""
-    return [*skips(recordings), *_delays(recordings), *_excitation(recordings)]
-
-
-def delay_s(recording: Recording, first: str, second: str) -> float | None:
-    """Return the delay of the second channel after the first; None where it is not determined.
-
-    The slope of the cross-spectrum's phase over frequency, weighted by how sure each phase is
-    (Carter, "Coherence and time delay estimation", Proceedings of the IEEE 75, 1987).
-
-    Args:
-        recording: One run; its samples are taken as evenly spaced.
-        first: Channel that should come first.
-        second: Channel that follows it.
-    """
-    rate_hz = recording.sample_rate_hz
-    length = int(SEGMENT_S * rate_hz)
-    if len(recording) < 2 * length:
-        return None
-    one, two = (np.diff(recording[name]) for name in (first, second))
-    f, cross = signal.csd(one, two, rate_hz, nperseg=length)
-    _, common = signal.coherence(one, two, rate_hz, nperseg=length)
-    told = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1]) & (common >= COHERENT) & (common < 1.0)
-    if np.count_nonzero(told) < 3:
-        return None
-    w, phase = 2 * np.pi * f[told], np.angle(cross[told])
-    sure = common[told] / (1.0 - common[told])
-    return float(-np.sum(sure * w * phase) / np.sum(sure * w * w))
-
-
-def _delays(recordings: Sequence[Recording]) -> list[str]:
-    said = []
-    for first, second in PAIRS:
-        held = [r for r in recordings if first in r and second in r]
-        found = [d for r in held if (d := delay_s(r, first, second)) is not None]
-        if len(found) < 3:
-            continue
-        middle = float(np.median(found))
-        spread = float(np.median(np.abs(np.array(found) - middle)))
-        said.append(
-            f"Timing: {second} comes {1e3 * middle:+.1f} ms after {first} (median of"
-            f" {len(found)} runs, half within {1e3 * spread:.1f} ms); this includes the compliance"
-            " between the two sensors."
-        )
-    return said
+    return [*skips(recordings), *_excitation(recordings)]
 
 
 def _excitation(recordings: Sequence[Recording]) -> list[str]:

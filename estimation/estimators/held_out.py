@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.estimators.bank import BankRecipe, fit_runs
 from estimation.scores import Score, score
 
@@ -21,9 +21,8 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
     """
     found = [recipe.evidence_of(recording) for recording in campaign.evidence]
     runs = [run for run in found if run is not None]
-    order = np.random.default_rng(seed).permutation(len(runs))
     estimates, truths = [], []
-    for held_out in (order[k::folds] for k in range(folds)):
+    for held_out in in_folds(len(runs), folds, seed):
         rest = [run for k, run in enumerate(runs) if k not in held_out]
         weights = fit_runs(rest, recipe.bank, recipe.target, recipe.settings).weights
         estimates += [runs[k].design @ weights for k in held_out]

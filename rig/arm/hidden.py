@@ -1,6 +1,6 @@
 """Hidden torque of an arm's joints by families of effects, each joint with a form of its own.
 
-The forms are random tables and banks of elements with memory (`rig.simulation.varied`), so the form
+The forms are random tables and banks of elements with memory (`rig.simulation.forms`), so the form
 of a hidden effect is drawn, not written.
 """
 
@@ -13,9 +13,18 @@ import numpy as np
 from estimation.arm.elements import slip
 from estimation.arm.motion import Motion
 from estimation.recording import FloatArray
-from rig.simulation.varied.forms import Random, course, falling, grid, rising, smooth, spots
-from rig.simulation.varied.frictions import bank, power
-from rig.simulation.varied.hidden import BANK
+from rig.simulation.forms import (
+    BANK,
+    Random,
+    bank,
+    course,
+    falling,
+    grid,
+    power,
+    rising,
+    smooth,
+    spots,
+)
 
 OWN = "the simulation's own"
 """The written form that a study's paper was matched with."""

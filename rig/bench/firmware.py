@@ -162,7 +162,7 @@ def _platformio(board: str, more: list[str]) -> None:
 
 def _require_platformio(board: str) -> None:
     if board not in BOARDS:
-        raise UsageError(f"There is no board {board!r}.", fix=f"Choose {', '.join(BOARDS)}.")
+        raise UsageError(f"The board {board!r} is not known.", fix=f"Choose {', '.join(BOARDS)}.")
     _require_sources()
     if not (SOURCES / "platformio.ini").is_file():
         raise UsageError("This source tree has no platformio.ini.", fix="Update the checkout.")

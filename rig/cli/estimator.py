@@ -37,7 +37,7 @@ def compare(
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.compared import compare as compared
-    from rig.output.table import to_markdown
+    from rig.output.table import to_page
     from rig.reports import compared as shown
 
     files, estimators = (first, second), (load(first), load(second))
@@ -47,11 +47,9 @@ def compare(
         found = compared(files, estimators, campaign, lambda run: bar.advance(task))
     lines, tables = [*shown.lines(found), *sentence(steps)], shown.tables(found)
 
-    def markdown() -> str:
-        parts = ["# Two estimators on the same runs", *lines]
-        parts += [to_markdown(table).rstrip() for table in tables]
-        return "\n\n".join([*parts, found.provenance.line()]) + "\n"
+    def page() -> str:
+        return to_page(["Two estimators on the same runs", *lines], tables, found.provenance)
 
-    show_result(lines, tables, out, markdown, json)
+    show_result(lines, tables, out, page, json)
     if json:
         emit_json(found)

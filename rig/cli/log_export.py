@@ -51,7 +51,7 @@ def export(
     known = [item.value for item in ExportFormat]
     if format_name not in known:
         raise UsageError(
-            f"There is no format {format_name!r}.", fix=f"Choose one of {', '.join(known)}."
+            f"The format {format_name!r} is not known.", fix=f"Choose one of {', '.join(known)}."
         )
     applied = _other_calibrations(path, calibration, record or [], store)
     written = export_log(

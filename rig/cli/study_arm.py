@@ -125,7 +125,7 @@ def excitation(
 ) -> None:
     """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
     from rig.arm.excitation import run_excitation, table, write_trajectory
-    from rig.output.table import to_markdown
+    from rig.output.table import to_page
 
     with progress() as bar:
         task = bar.add_task("starts", total=starts)
@@ -133,11 +133,10 @@ def excitation(
     if trajectory is not None:
         write_trajectory(best, trajectory)
 
-    def markdown() -> str:
-        title = f"# Excitation of the {study.arm}"
-        return f"{title}\n\n{to_markdown(table(study))}\n{study.provenance.line()}\n"
+    def page() -> str:
+        return to_page([f"Excitation of the {study.arm}"], [table(study)], study.provenance)
 
-    show_result([], [table(study)], out, markdown, json)
+    show_result([], [table(study)], out, page, json)
     if json:
         emit_json(study)
 
@@ -228,7 +227,7 @@ def payload(
     """Find a mass added to an arm's insertion axis from its joints' torque."""
     from rig.arm.payload import find_payload, table
     from rig.arm.search import open_paths
-    from rig.output.table import to_markdown
+    from rig.output.table import to_page
 
     with progress() as bar:
         task = bar.add_task("paths", total=None)
@@ -237,10 +236,9 @@ def payload(
             fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
         )
 
-    def markdown() -> str:
-        text = f"# Masses added to an arm\n\n{to_markdown(table(found))}"
-        return f"{text}\n{found.provenance.line()}\n"
+    def page() -> str:
+        return to_page(["Masses added to an arm"], [table(found)], found.provenance)
 
-    show_result([], [table(found)], out, markdown, json)
+    show_result([], [table(found)], out, page, json)
     if json:
         emit_json(found)

@@ -5,7 +5,6 @@ the real one. So a rig is looked for in three places, and the simulated one must
 """
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 
 from rig.configuration.config import SIMULATED, Config, load_config
@@ -21,29 +20,29 @@ ONE_OF = (
 """What to do where no rig is configured."""
 
 
-def own_folder(environment: Mapping[str, str] = os.environ) -> Path:
+def own_folder() -> Path:
     """Return the folder of a person's configurations, `~/.config/rig`."""
-    base = environment.get("XDG_CONFIG_HOME")
+    base = os.environ.get("XDG_CONFIG_HOME")
     return (Path(base) if base else Path.home() / ".config") / "rig"
 
 
-def default_config(environment: Mapping[str, str] = os.environ) -> Path | None:
+def default_config() -> Path | None:
     """Return the configuration that counts where none is named; None without one.
 
     The first of: `$RIG_CONFIG` (a file or a shipped name), `./rig.toml`, `~/.config/rig/rig.toml`.
     """
-    if named := environment.get(ENVIRONMENT):
+    if named := os.environ.get(ENVIRONMENT):
         return Path(named)
-    places = (Path(FILE), own_folder(environment) / FILE)
+    places = (Path(FILE), own_folder() / FILE)
     return next((place for place in places if place.is_file()), None)
 
 
-def configured_rigs(environment: Mapping[str, str] = os.environ) -> list[Path]:
+def configured_rigs() -> list[Path]:
     """Return every configuration somebody may mean: the defaults, and all of `~/.config/rig`."""
-    named = environment.get(ENVIRONMENT)
+    named = os.environ.get(ENVIRONMENT)
     found = [Path(named)] if named else []
     found += [Path(FILE)] if Path(FILE).is_file() else []
-    found += sorted(own_folder(environment).glob("*.toml"))
+    found += sorted(own_folder().glob("*.toml"))
     return list({path.resolve() if path.is_file() else path: path for path in found}.values())
 
 
@@ -66,7 +65,7 @@ def choose_config(config: Path | None, sim: bool) -> Path:
         return SIMULATED
     chosen = config or default_config()
     if chosen is None:
-        raise UsageError("No rig is configured.", "There is no default.", ONE_OF)
+        raise UsageError("No rig is configured.", "None is taken by default.", ONE_OF)
     return chosen
 
 

@@ -13,7 +13,7 @@ from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
 from estimation.causes.equations import on_one_clock
 from estimation.causes.verdict import Answer, answer
-from estimation.diagnosis.clock import steady
+from estimation.diagnosis.audit import steady
 from estimation.diagnosis.paths import PATHS, claim, path_of, split_few, split_paths
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import Sealed, evidence

@@ -1,7 +1,7 @@
 """Hidden friction of the simulated grasper by families, each axis with a form of its own.
 
 A family is a factor on an axis' level of friction: a random table over one variable, of mean 1 over
-its usual range. Functions of the simulated rigs (`rig.simulation.varied`) make the tables.
+its usual range. Functions of `rig.simulation.forms` make the tables.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig.grasper.plant import FORM_VARIABLES, AxisParameters, FloatArray, Form
-from rig.simulation.varied.forms import Random, course, falling, grid, rising, smooth, spots
-from rig.simulation.varied.frictions import power
+from rig.simulation.forms import Random, course, falling, grid, power, rising, smooth, spots
 
 OWN = "the simulation's own"
 """Friction in proportion to the load, by which the paper was matched."""

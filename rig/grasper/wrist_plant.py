@@ -71,20 +71,20 @@ class Wrist:
         return float(matrix[1, 0] / matrix[0, 0])
 
 
-def wrist_campaign(
-    wrist: Wrist, seed: int = 0, runs: int = 12, duration_s: float = 10.0
-) -> Iterator[Recording]:
+RUN_S = 10.0  # Length of each run
+
+
+def wrist_campaign(wrist: Wrist, seed: int = 0, runs: int = 12) -> Iterator[Recording]:
     """Yield runs in which all joints move at once and press against springs, one after the other.
 
     Args:
         wrist: The grasper.
         seed: Seed of motions, springs and noise.
         runs: Number of runs.
-        duration_s: Length of each.
     """
     random = np.random.default_rng(seed)
     for number in range(runs):
-        asked = _motion(random, duration_s)
+        asked = _motion(random, RUN_S)
         stiffness = np.exp(random.uniform(np.log(0.05), np.log(0.4), 3))
         yield play_wrist(f"wrist-{number:02d}", wrist, asked, stiffness, random)
 

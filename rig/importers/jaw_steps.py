@@ -80,7 +80,7 @@ class JawZeros:
         return Campaign(tuple(runs))
 
 
-def jaw_zeros(campaign: Campaign, limit_rad: float = STEP_LIMIT_RAD) -> JawZeros:
+def jaw_zeros(campaign: Campaign) -> JawZeros:
     """Find the jaw's zero in every run by comparing runs under the same conditions.
 
     The load stretches the cable and so moves the jaw by degrees; only runs of the same load, wrist,
@@ -89,7 +89,6 @@ def jaw_zeros(campaign: Campaign, limit_rad: float = STEP_LIMIT_RAD) -> JawZeros
 
     Args:
         campaign: Runs with `jaw_angle_rad`, in the order they were taken.
-        limit_rad: Smaller steps are not reported, rad.
 
     Raises:
         MissingChannelError: A run has no `jaw_angle_rad`.
@@ -104,7 +103,7 @@ def jaw_zeros(campaign: Campaign, limit_rad: float = STEP_LIMIT_RAD) -> JawZeros
     if len(levels) == len(keys):
         return JawZeros(tuple(names), np.zeros(len(names)))
     level_of = np.array([levels[key] for key in keys])
-    zeros = _segmented(np.array(means), level_of, limit_rad)
+    zeros = _segmented(np.array(means), level_of)
     return JawZeros(tuple(names), zeros - zeros[-1])
 
 
@@ -135,7 +134,7 @@ def sentence(steps: Sequence[JawStep]) -> list[str]:
     ]
 
 
-def _segmented(means: FloatArray, level_of: NDArray[np.int_], limit_rad: float) -> FloatArray:
+def _segmented(means: FloatArray, level_of: NDArray[np.int_]) -> FloatArray:
     """Return the zero of each run's segment, shape (runs,)."""
     count = len(means)
     free = int(level_of.max()) + 1
@@ -153,7 +152,7 @@ def _segmented(means: FloatArray, level_of: NDArray[np.int_], limit_rad: float) 
             # what the levels have taken is no evidence; a cut costs its place and its height
             gain = left * np.log(cost / squares) - 2 * len(more) * np.log(count)
             steps = np.abs(np.diff(found)[np.array(trial) - 1])
-            if gain > 0 and steps.min() > limit_rad and (best is None or gain > best[0]):
+            if gain > 0 and steps.min() > STEP_LIMIT_RAD and (best is None or gain > best[0]):
                 best = float(gain), trial, found, squares
         if best is None:
             return zeros

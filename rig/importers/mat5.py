@@ -67,7 +67,7 @@ def read_mat5(content: bytes) -> dict[str, Value]:
     """
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if len(content) < HEADER_BYTES or order is None:
-        raise Mat5Error("there is no MATLAB 5 header in the first 128 bytes")
+        raise Mat5Error("no MATLAB 5 header in the first 128 bytes")
     variables: dict[str, Value] = {}
     for kind, data in _elements(content[HEADER_BYTES:], order):
         if kind == COMPRESSED:

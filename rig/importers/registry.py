@@ -121,7 +121,7 @@ def _opened(path: Path, format_name: str | None) -> Campaign:
             return of_one_rig(importer.open(path))
     raise DataError(
         f"{path} holds no recording that rig reads by itself.",
-        f"{_content(path)} Tried: {', '.join(known)}.",
+        f"{_content(path)} Tried: {', '.join(known)}.".lstrip(),
         "A table of another layout: rig import. One of these formats: name it with --format.",
     )
 

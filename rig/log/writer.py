@@ -21,6 +21,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.files import sync_folder
 from estimation.recording import Mark, Stretch
 from rig import __version__
 from rig.errors import RigError, UsageError
@@ -241,7 +242,7 @@ class LogWriter:
             os.fsync(self._file.fileno())
             self._abandon()
             self.part.rename(self.path)
-            _sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
         return self.path
 
     def discard(self) -> None:
@@ -273,12 +274,3 @@ class LogWriter:
         blocks = [block for blocks in self._pending.values() for block in blocks]
         first = min(int(block["log_time"][0]) for block in blocks)
         return max(int(block["log_time"][-1]) for block in blocks) - first
-
-
-def _sync_folder(folder: Path) -> None:
-    """Wait until the new name is on the disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

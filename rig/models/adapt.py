@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.estimator import Estimator
 from estimation.estimators.adaptation import (
     Adaptable,
@@ -195,10 +195,9 @@ def _scratch(
     names = list(found)
     if len(names) < FOLDS:
         return None
-    order = np.random.default_rng(seed).permutation(len(names))
     estimates, truths = [], []
-    for fold in range(FOLDS):
-        held_out = [names[k] for k in order[fold::FOLDS]]
+    for fold in in_folds(len(names), FOLDS, seed):
+        held_out = [names[k] for k in fold]
         fitted = scratch(source, [found[run] for run in names if run not in held_out])
         for run in held_out:
             if run in unused:

@@ -1,11 +1,13 @@
 """One table, shown in a terminal, in Markdown and in HTML."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
+
+    from rig.output.provenance import Provenance
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,18 @@ def to_markdown(table: TextTable) -> str:
     rule = "|" + "|".join(["---"] + ["---:"] * (len(table.columns) - 1)) + "|"
     lines = [f"## {table.title}", "", line(table.columns), rule, *map(line, table.rows)]
     return "\n".join([*lines, "", table.note] if table.note else lines) + "\n"
+
+
+def to_page(
+    paragraphs: Sequence[str],
+    tables: Iterable[TextTable],
+    provenance: "Provenance",
+    figures: Sequence[str] = (),
+) -> str:
+    """Return a page in Markdown: its title, paragraphs, figures at places from it, and tables."""
+    shown = [f"![{name}]({name})" for name in figures]
+    shown += [to_markdown(table).rstrip() for table in tables]
+    return "\n\n".join([f"# {paragraphs[0]}", *paragraphs[1:], *shown, provenance.line()]) + "\n"
 
 
 def to_rich(table: TextTable) -> "RichTable":

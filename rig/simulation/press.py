@@ -40,30 +40,24 @@ def press_force_n(profile: str, top_n: float, duration_s: float, seed: int) -> F
     return np.asarray(top_n * random.uniform(0.97, 1.0) * raised * tremor)
 
 
+HYSTERESIS_RATIO = 0.3  # Share of the response that goes through the play operators
+CREEP_RATIO = 0.01  # Relative rise a decade of time under load
+
+
 class PressedFsr:
     """The sensor under one press.
 
     Args:
         force_n: Force a tick, shape (n,); its last value holds on.
         seed: Seed of the noise.
-        hysteresis_ratio: Share of the response that goes through the play operators.
-        creep_ratio: Relative rise a decade of time under load.
     """
 
-    def __init__(
-        self,
-        force_n: FloatArray,
-        seed: int = 0,
-        hysteresis_ratio: float = 0.3,
-        creep_ratio: float = 0.01,
-    ) -> None:
+    def __init__(self, force_n: FloatArray, seed: int = 0) -> None:
         self._force_n = force_n
         self._done = 0
         self._plays = np.zeros(len(PLAY_RATIOS))
         self._loaded_s = 0.0
         self._noise = np.random.default_rng(seed)
-        self._hysteresis = hysteresis_ratio
-        self._creep = creep_ratio
 
     def counts(self, ticks: int) -> NDArray[np.int32]:
         """Return the converter's counts of the next ticks, shape (ticks,)."""
@@ -74,11 +68,11 @@ class PressedFsr:
         self._done += 1
         widths = np.array(PLAY_RATIOS) * FULL_SCALE_N
         self._plays = np.clip(self._plays, force - widths, force + widths)
-        felt = (1 - self._hysteresis) * force + self._hysteresis * float(self._plays.mean())
+        felt = (1 - HYSTERESIS_RATIO) * force + HYSTERESIS_RATIO * float(self._plays.mean())
         self._loaded_s = self._loaded_s + TICK_S if force > 0.1 else 0.0
         volts = _volts(felt)
         if self._loaded_s > 0.1:
-            volts *= 1.0 + self._creep * np.log10(self._loaded_s / 0.1)
+            volts *= 1.0 + CREEP_RATIO * np.log10(self._loaded_s / 0.1)
         volts += 0.002 * self._noise.normal()
         return int(min(max(np.floor(volts / VOLT_PER_COUNT + 0.5), 0), TOP_COUNT))
 

@@ -65,84 +65,39 @@ def test_a_recording_gives_nothing_away(number: int) -> None:
     assert not [word for word in (*CHAINS[1:], *NAMES, "clean") if word in said]
 
 
-@pytest.mark.parametrize(
-    ("truth", "report", "result"),
-    [
-        (hidden("clean"), said(), "nothing found"),
-        (hidden("clean"), said(finding("something_missing", "unknown")), "false finding"),
-        (hidden("strong", "motor_ripple"), said(), "nothing found"),
-        (
-            hidden("strong", "motor_ripple"),
-            said(finding("identified", "ripple.motor")),
-            "right name",
-        ),
-        (
-            hidden("strong", "motor_ripple"),
-            said(finding("identified", "ripple.motor", "stretch")),
-            "wrong name",
-        ),
-        (
-            hidden("strong", "motor_ripple"),
-            said(finding("identified", "ripple.motor"), finding("identified", "friction.drag")),
-            "wrong name",
-        ),
-        (
-            hidden("weak", "motor_ripple"),
-            said(finding("one_of", "ripple.current", alternatives=["ripple.motor"])),
-            "one of",
-        ),
-        (
-            hidden("strong", "torque_constant_sag"),
-            said(finding("identified", "sensor.gain_nonlinear")),
-            "right name",
-        ),
-        (
-            hidden("pair", "motor_ripple", "gear_backlash"),
-            said(finding("identified", "ripple.motor")),
-            "nothing found",
-        ),
-        (
-            hidden("outside", "jaw_detent"),
-            said(finding("depends_on", "unknown", "cable", depends_on=["spindle_angle"])),
-            "depends on",
-        ),
-        (
-            hidden("outside", "jaw_detent"),
-            said(finding("depends_on", "unknown", "cable", depends_on=["jaw_angle", "time"])),
-            "something missing",
-        ),
-        (
-            hidden("outside", "cable_load_notch"),
-            said(finding("identified", "friction.position", "cable")),
-            "wrong name",
-        ),
-        (
-            hidden(
-                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
-            ),
-            said(finding("identified", "friction.load")),
-            "wrong name",
-        ),
-        (
-            hidden(
-                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
-            ),
-            said(
-                finding("one_of", "friction.load", alternatives=["friction.position"]),
-                following={"protocol": "x"},
-            ),
-            "one of",
-        ),
-        (
-            hidden(
-                "confounded", "gear_load_friction", either=("friction.load", "friction.position")
-            ),
-            said(finding("one_of", "friction.load", alternatives=["friction.position"])),
-            "something missing",
-        ),
-    ],
-)
-def test_an_answer_is_scored(truth: Truth, report: dict[str, Any], result: str) -> None:
+SCORED = """
+clean | | nothing found
+clean | something_missing unknown | false finding
+strong motor_ripple | | nothing found
+strong motor_ripple | identified ripple.motor | right name
+strong motor_ripple | identified ripple.motor stretch | wrong name
+strong motor_ripple | identified ripple.motor; identified friction.drag | wrong name
+weak motor_ripple | one_of ripple.current motor ripple.motor | one of
+strong torque_constant_sag | identified sensor.gain_nonlinear | right name
+pair motor_ripple gear_backlash | identified ripple.motor | nothing found
+outside jaw_detent | depends_on unknown cable spindle_angle | depends on
+outside jaw_detent | depends_on unknown cable jaw_angle,time | something missing
+outside cable_load_notch | identified friction.position cable | wrong name
+confounded gear_load_friction | identified friction.load | wrong name
+confounded gear_load_friction | one_of friction.load motor friction.position | something missing
+confounded gear_load_friction | one_of friction.load motor friction.position + | one of
+"""
+"""Kind and hidden effects; the findings, each with its verdict, family, equation and what else is
+named; the score. A plus is a proposed experiment."""
+
+
+@pytest.mark.parametrize("row", SCORED.strip().splitlines())
+def test_an_answer_is_scored(row: str) -> None:
+    true, answer, result = (part.strip() for part in row.split("|"))
+    kind, *names = true.split()
+    either = ("friction.load", "friction.position") if kind == "confounded" else ()
+    truth = hidden(kind, *names, either=either)
+    findings = []
+    for words in filter(None, (part.removesuffix("+").split() for part in answer.split(";"))):
+        others = {"one_of": "alternatives", "depends_on": "depends_on"}.get(words[0])
+        named = {others: words[3].split(",")} if others else {}
+        findings.append(finding(*words[:3], **named))
+    report = said(*findings, following={"protocol": "x"} if "+" in answer else None)
     assert outcome(truth, report) == result
     best = {"clean": "nothing found", "outside": "depends on", "confounded": "one of"}
     assert judge(truth, report).right == (result == best.get(truth.kind, "right name"))

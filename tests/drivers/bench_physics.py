@@ -85,36 +85,19 @@ class PlainBench:
 
 
 class ScriptedBench:
-    """No physics: the inputs of each tick, shape (n, 7), are given; then the last ones stay."""
+    """No physics: the inputs of each tick, shape (n, channels), are given; the last ones stay."""
 
-    def __init__(self, inputs: NDArray[np.int32]) -> None:
-        self.inputs = np.ascontiguousarray(inputs, np.int32)
-        self.ticks = 0
-
-    def next_inputs(self) -> NDArray[np.int32]:
-        row = self.inputs[min(self.ticks, len(self.inputs) - 1)]
-        self.ticks += 1
-        return row
-
-    def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
-    ) -> NDArray[np.int32]:
-        rows = np.zeros((ticks, COLUMNS), np.int32)
-        for k, row in enumerate(rows):
-            row[:7] = self.next_inputs()
-            drive_tick(row, target[k], load_ma[k], *drive.arrays)
-        return rows
+    def __init__(self, inputs: NDArray[np.int32], outputs: int = 2, tick_us: int = 1000) -> None:
+        self._inputs = np.ascontiguousarray(inputs, np.int32)
+        self._outputs = np.zeros(outputs, np.int32)
+        self._tick_us, self._ticks = tick_us, 0
 
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         tick = TICK_FUNCTION(tick_address)
-        outputs = np.zeros(2, np.int32)
         for k in range(ticks):
-            inputs = self.next_inputs()
-            clock_us = (tick_us + 1000 * k) % 2**32
-            tick(board_address, clock_us, inputs.ctypes.data, outputs.ctypes.data)
+            inputs = self._inputs[min(self._ticks, len(self._inputs) - 1)]
+            clock_us = (tick_us + self._tick_us * k) % 2**32
+            tick(board_address, clock_us, inputs.ctypes.data, self._outputs.ctypes.data)
+            self._ticks += 1

@@ -186,3 +186,20 @@ def test_an_answer_that_is_no_success_is_a_refusal(function: int) -> None:
     device = AtiSerial(SimulatedTransport(Refusing()))
     with pytest.raises(DriverError, match=f"refused function {function:#04x}"):
         device.start()
+
+
+def test_a_lost_answer_to_the_start_of_the_stream_is_asked_for_again() -> None:
+    cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
+    device = AtiSerial(cable)
+    device.identify()
+
+    def lose(data: bytes) -> bytes:
+        if data[:2] != bytes([protocol.SLAVE, protocol.STREAM]):
+            return data
+        cable.incoming = lambda later: later
+        return b""
+
+    cable.incoming = lose
+    device.start()
+    assert device.counters["retries"] == 1
+    assert len(device.read(0.1)) > 100

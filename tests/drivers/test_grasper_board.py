@@ -15,7 +15,7 @@ from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.grasper_board import INPUTS
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.transport.simulated import SimulatedTransport
-from tests.drivers.bench_physics import TICK_FUNCTION
+from tests.drivers.bench_physics import ScriptedBench
 from tests.drivers.raw_host import RawHost
 
 pytestmark = pytest.mark.integration
@@ -24,26 +24,8 @@ GAINS = np.array([[2.0, 0.01, -20.0, 0.3, 5000.0], [3.0, 0, -9, 1, 4000], [1, 0,
 HELD = {"safe_state": SafeState.HOLD, "hold_command_e4": 300}
 
 
-class ScriptedGrasper:
-    """No physics: the inputs of each tick, shape (n, 9), are given; then the last ones stay."""
-
-    def __init__(self, inputs: NDArray[np.int32]) -> None:
-        self._inputs = np.ascontiguousarray(inputs, np.int32)
-        self._ticks = 0
-
-    def _next(self) -> NDArray[np.int32]:
-        row = self._inputs[min(self._ticks, len(self._inputs) - 1)]
-        self._ticks += 1
-        return row
-
-    def advance_with_board(
-        self, ticks: int, tick_address: int, board_address: int, tick_us: int
-    ) -> None:
-        tick = TICK_FUNCTION(tick_address)
-        outputs = np.zeros(3, np.int32)
-        for k in range(ticks):
-            clock_us = (tick_us + GRASPER.tick_us * k) % 2**32
-            tick(board_address, clock_us, self._next().ctypes.data, outputs.ctypes.data)
+def scripted(inputs: NDArray[np.int32]) -> ScriptedBench:
+    return ScriptedBench(inputs, 3, GRASPER.tick_us)
 
 
 def moving(ticks: int) -> NDArray[np.int32]:
@@ -58,7 +40,7 @@ def moving(ticks: int) -> NDArray[np.int32]:
 
 
 def host_on(library: Path, inputs: NDArray[np.int32], gains: NDArray[Any] = GAINS) -> RawHost:
-    board = FirmwareBoard(ScriptedGrasper(inputs), library=library, profile=GRASPER)
+    board = FirmwareBoard(scripted(inputs), library=library, profile=GRASPER)
     host = RawHost(board, GRASPER, gains)
     assert host.command(Kind.START) is Result.OK
     return host
@@ -143,7 +125,7 @@ def test_refusals(library: Path) -> None:
 
 
 def test_a_board_of_the_other_profile_is_named_before_anything_moves(library: Path) -> None:
-    board = FirmwareBoard(ScriptedGrasper(moving(9)), library=library, profile=GRASPER)
+    board = FirmwareBoard(scripted(moving(9)), library=library, profile=GRASPER)
     logger = TeensyLogger(SimulatedTransport(board))
     with pytest.raises(ProtocolMismatchError, match=r'grasper.*profile = "grasper"'):
         logger.identify()

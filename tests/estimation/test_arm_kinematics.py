@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.arm.kinematics import body_jacobian, spatial_jacobian, tip_pose
+from estimation.arm.kinematics import tip_pose
 from estimation.arm.tables import PSM, DhRow
+from estimation.arm.wrench import body_jacobians, spatial_jacobians
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
@@ -51,16 +52,17 @@ def test_the_spatial_jacobian_holds_the_joints_twists(q):
             expected[:, k] = [*np.cross(origin, axis), *axis]
         else:
             expected[:3, k] = axis
-    np.testing.assert_allclose(spatial_jacobian(PSM, q), expected, atol=1e-12)
+    np.testing.assert_allclose(spatial_jacobians(PSM, q[None])[0], expected, atol=1e-12)
 
 
 @given(within_limits)
 def test_the_body_jacobian_is_the_derivative_of_the_tips_pose(q):
     step, pose = 1e-6, joint_frames(q)[-1]
+    (jacobian,) = body_jacobians(PSM, q[None])
     for k in range(6):
         h = np.zeros(6)
         h[k] = step
         rate = (joint_frames(q + h)[-1] - joint_frames(q - h)[-1]) / (2 * step)
         twist = np.linalg.inv(pose) @ rate  # skew angular part and linear part, in the tip's frame
         linear, angular = twist[:3, 3], (twist[2, 1], twist[0, 2], twist[1, 0])
-        np.testing.assert_allclose(body_jacobian(PSM, q)[:, k], [*linear, *angular], atol=1e-8)
+        np.testing.assert_allclose(jacobian[:, k], [*linear, *angular], atol=1e-8)

@@ -47,12 +47,6 @@ def states(folders, tmp_path_factory):
     return path
 
 
-def test_a_fit_of_states_is_a_file_with_its_instrument(states):
-    estimator = load(states)
-    assert isinstance(estimator, BankEstimator)
-    assert estimator.instrument == "Maryland 1"
-
-
 def test_replay_refuses_another_instrument_unless_allowed(folders, states, capsys):
     words = ["replay", str(folders[1] / "00.mcap"), "--model", str(states), "--speed", "0"]
     assert main([*words, "--plain"]) != 0

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.device import Drive
 from drivers.dynamixel.driver import Dynamixel
 from drivers.dynamixel.fake import DynamixelFake
 from drivers.errors import DisarmUnconfirmedError, DriverError
@@ -34,7 +33,6 @@ pytestmark = pytest.mark.integration
 
 COUNTED = {"teensy": "spindle_count", "teensy-master": "yaw_count"}
 """Drivers whose channels need a calibration, and one of these channels."""
-SHORT = 'name = "short"\n[[runs]]\nkind = "rest"\nduration_s = 1.0\n'
 DRIVES = {"dynamixel": (DynamixelFake, Dynamixel), "moteus": (MoteusFake, Moteus)}
 
 
@@ -182,16 +180,6 @@ def test_the_limits_hold_on_a_drive(rig_of, name: str, change: dict, message: st
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
-def test_a_setpoint_beyond_the_travel_moves_nothing(rig_of, name: str) -> None:
-    rig = rig_of(name)
-    with Session(rig.config, open_logger(rig.config)) as session:
-        next(session.rest(0.1))
-        with pytest.raises(SafetyTripError, match="nothing was moved"):
-            next(moving(session, 1.0, 4.0))
-        assert not rig.in_force
-
-
-@pytest.mark.parametrize("name", sorted(DRIVES))
 def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name: str, monkeypatch) -> None:
     rig = rig_of(name)
     unsafe = pytest.raises((SafetyTripError, DisarmUnconfirmedError), match="not confirm")
@@ -233,13 +221,6 @@ def test_what_needs_a_motor_is_refused_in_words(tmp_path: Path, capsys) -> None:
     drive.write_text(text.format("dynamixel", "drive") + 'url = "sim://"\n' + limits)
     with pytest.raises(UsageError, match="controller"):
         load_config(drive)
-
-
-def test_the_drives_of_the_registry_are_drives() -> None:
-    for name in (*DRIVES, "epos4"):
-        device = fakes()[name](Faults())
-        assert isinstance(device, Drive)
-        device.close()
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))

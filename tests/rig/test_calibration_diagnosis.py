@@ -18,9 +18,6 @@ NOT_DECLARED = pytest.mark.xfail(
     strict=False, reason="only channels of a declared equation are read, and the other axes are not"
 )
 
-FALSE_STEP = pytest.mark.xfail(
-    strict=False, reason="a step and a bent gain are found in a sound encoder's calibration"
-)
 
 SMOOTH_WAVE = pytest.mark.xfail(
     strict=False, reason="a smooth function of the angle explains more than one harmonic of it"
@@ -77,7 +74,7 @@ def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, 
     ("kind", "words"),
     [
         ("gearbox", []),
-        pytest.param("encoder", ["--which", "jaw"], marks=FALSE_STEP),
+        ("encoder", ["--which", "jaw"]),
         ("current", []),
         ("torque", ["--repeats", "4"]),
         ("ft", ["--repeats", "3"]),

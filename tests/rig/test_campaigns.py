@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.campaigns.index import campaigns, default_index
+from rig.campaigns.index import campaigns
 from rig.cli.main import main
 from tests.rig.log.conftest import write_log
 
@@ -160,26 +160,3 @@ def test_the_page_of_one_campaign_is_opened(root, capsys, monkeypatch):
     page.write_text("<!doctype html>")
     assert main(["campaigns", "tuesday", "--open", "--root", str(root)]) == 0
     assert opened == [page.resolve().as_uri()]
-
-
-def test_diagnosing_again_keeps_page_and_result_where_the_list_finds_them(root, monkeypatch):
-    asked = {}
-    monkeypatch.setattr(
-        "rig.cli.diagnose.diagnose", lambda path, **options: asked.update(path=path, **options)
-    )
-    assert main(["campaigns", "monday", "--diagnose", "--root", str(root)]) == 0
-    folder = root / "monday"
-    assert asked == {
-        "path": folder,
-        "report": folder / "diagnosis",
-        "json_out": folder / "diagnosis" / "diagnosis.json",
-    }
-
-
-def test_a_folder_that_is_not_there_is_an_error(tmp_path, capsys):
-    assert main(["campaigns", "--root", str(tmp_path / "absent")]) == 2
-    assert "--root" in capsys.readouterr().err
-
-
-def test_each_folder_of_campaigns_has_its_own_index(tmp_path):
-    assert default_index(tmp_path / "a") != default_index(tmp_path / "b")

@@ -81,19 +81,6 @@ def test_a_simulated_session_says_so_first(words, capsys):
     assert capsys.readouterr().err.startswith("Simulated rig")
 
 
-def test_a_resumed_recording_says_so_too(tmp_path, capsys):
-    protocol = tmp_path / "short.toml"
-    protocol.write_text(
-        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [2.0]\nloads_a = [0.1]\n'
-        "duration_s = 0.5\n"
-    )
-    out = str(tmp_path / "campaign")
-    assert main(["record", "--sim", "-p", str(protocol), "-o", out]) == 0
-    assert capsys.readouterr().err.startswith("Simulated rig")
-    assert main(["record", "--resume", out]) == 0
-    assert capsys.readouterr().err.startswith("Simulated rig")
-
-
 def test_stop_stops_every_configured_rig_and_goes_on_after_a_dead_one(home, capsys):
     (home / "a_dead.toml").write_text(BROKEN)
     (home / "b_unreadable.toml").write_text("name =")

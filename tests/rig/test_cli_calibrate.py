@@ -63,19 +63,6 @@ def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, caps
     assert by_channel(again) == by_channel(said)
 
 
-def test_before_it_starts_a_session_states_what_it_needs_and_what_moves(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    shared = ["--operator", "Ada", "--yes", "--store", "store"]
-    assert main(["calibrate", "torque", "--masses-g", "50,100,150", *shared, "-o", "a"]) == 0
-    said = capsys.readouterr().err
-    first = said.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
-    assert first < said.index("The rig does not move by itself.") < said.index("1/7")
-    assert main(["calibrate", "current", *shared, "-o", "b"]) == 0
-    assert "The rig moves by itself: the spindle turns between" in capsys.readouterr().err
-
-
 def test_a_sensor_that_drifted_since_its_last_calibration_raises_an_alarm(calibrate, tmp_path):
     words = ("torque", "--masses-g", "50,100,150")
     said = calibrate(*words, "--out", "first")[1]
@@ -276,26 +263,6 @@ def test_raw_logs_of_another_kind_are_refused(calibrate):
     assert code == 2
 
 
-@pytest.mark.parametrize("hysteresis", [0.3, 0.0])
-def test_hysteresis_is_identified_in_the_residual_of_a_curve(
-    calibrate, monkeypatch, capsys, tmp_path, hysteresis
-):
-    from rig.simulation import press
-
-    made = press.PressedFsr.__init__
-    monkeypatch.setattr(
-        press.PressedFsr,
-        "__init__",
-        lambda self, force, seed: made(self, force, seed, hysteresis, creep_ratio=0.0),
-    )
-    _, said = calibrate("fsr", "--hold-s", "0", "--curve-only")
-    (digest,) = said["records"]
-    assert main(["cal", "diagnose", digest, "--json", "--ledger", "looks"]) == 0
-    found = json.loads(capsys.readouterr().out)["findings"]
-    possible = {name for f in found for name in (f["family"], *f["alternatives"])}
-    assert ("hysteresis.presliding" in possible) == bool(hysteresis)
-
-
 def test_a_zero_that_moves_within_a_run_is_an_alarm(tmp_path, capsys):
     assert main(["config", "show", "--sim"]) == 0
     tight = tmp_path / "tight.toml"
@@ -307,3 +274,16 @@ def test_a_zero_that_moves_within_a_run_is_an_alarm(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "ALARM: zero of motor_current_a" in said
     assert "good: zero of distal_torque_n_m" in said
+
+
+def test_before_it_starts_a_session_states_what_it_needs_and_what_moves(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    shared = ["--operator", "Ada", "--yes", "--store", "store"]
+    assert main(["calibrate", "torque", "--masses-g", "50,100,150", *shared, "-o", "a"]) == 0
+    said = capsys.readouterr().err
+    first = said.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
+    assert first < said.index("The rig does not move by itself.") < said.index("1/7")
+    assert main(["calibrate", "current", *shared, "-o", "b"]) == 0
+    assert "The rig moves by itself: the spindle turns between" in capsys.readouterr().err

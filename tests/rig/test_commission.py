@@ -1,7 +1,6 @@
 """The first motion of a wired bench: every wrong wire is a sentence, and nothing goes far."""
 
 import ctypes
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
 from rig.configuration.config import Config
 from rig.doctor.commission import REACH_RAD, commission
-from rig.errors import UsageError
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
 
@@ -97,10 +95,3 @@ def test_a_board_without_zeros_does_not_move(monkeypatch: pytest.MonkeyPatch) ->
     assert not last.passed
     assert "rig reference" in last.detail
     assert np.ptp(bench.spindle or [0]) < 5
-
-
-def test_a_rig_with_several_motors_is_refused() -> None:
-    from rig.configuration.config import load_config
-
-    with pytest.raises(UsageError, match="3 motors"):
-        list(commission(load_config(Path("grasper"))))

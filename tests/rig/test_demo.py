@@ -107,8 +107,3 @@ def test_a_fit_reports_the_error_on_runs_it_was_not_fitted_on(demo, told, tmp_pa
     assert main(["replay", str(demo / "logs"), "--model", str(out), "--speed", "0", "--json"]) == 0
     summary = json.loads(capsys.readouterr().out.splitlines()[-1])["summary"]
     assert summary["error_rms"] < 0.05
-
-
-def test_a_fit_of_what_is_not_there_says_so(tmp_path, capsys):
-    assert main(["fit", str(tmp_path / "none")]) == 2
-    assert "There is no file or folder" in capsys.readouterr().err

@@ -133,23 +133,6 @@ def test_hovering_shows_values_with_their_units(opened):
     assert "with the findings" in words
 
 
-def test_dragging_zooms_and_a_button_shows_the_whole_range_again(opened):
-    chart = opened.page.locator(PROFILE)
-    chart.scroll_into_view_if_needed()
-    span = f"(() => {{ const r = document.querySelector('{PROFILE}').layout.xaxis.range;"
-    span += " return r[1] - r[0]; })()"
-    whole = opened.page.evaluate(span)
-    box = chart.bounding_box()
-    middle = box["y"] + box["height"] / 2
-    opened.page.mouse.move(box["x"] + 0.4 * box["width"], middle)
-    opened.page.mouse.down()
-    opened.page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
-    opened.page.mouse.up()
-    opened.page.wait_for_function(f"{span} < {0.5 * whole}")
-    opened.page.locator("figure", has=chart).get_by_role("button", name="Whole range").click()
-    opened.page.wait_for_function(f"{span} > {0.9 * whole}")
-
-
 def test_sides_and_runs_can_be_hidden(opened):
     both = picture(opened, PROFILE)
     assert min(share(both, BEFORE), share(both, AFTER)) > 1e-4

@@ -8,21 +8,7 @@ import pytest
 from estimation.recording import Recording
 from rig.cli.main import main
 from rig.log.convert import write_recording
-
-MODEL = """
-schema = "rig.model/1"
-name = "axis"
-balance = "motor"
-target = "drive_force_n"
-[processing]
-cutoff_hz = 20.0
-[[effects]]
-id = "inertia.missing"
-channels.acceleration = "axis_acceleration_m_s2"
-[[effects]]
-id = "friction.viscous"
-channels.speed = "axis_velocity_m_s"
-"""
+from tests.rig.test_library import MODEL
 
 
 def campaign(folder, seed, damping):

@@ -22,7 +22,7 @@ from rig.doctor.examine import examine
 from rig.doctor.finding import Finding, Level, worst
 from rig.doctor.ports import Port, can_interfaces, port_findings
 from rig.doctor.stream import device_findings
-from rig.doctor.udev import USB, has_rule, udev_rules
+from rig.doctor.udev import USB, udev_rules
 from rig.errors import ExitCode, UsageError
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
@@ -185,10 +185,6 @@ def test_the_rules_name_every_device() -> None:
         vendor, product = identity.split(":")
         assert f'ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}"' in udev_rules()
     assert "0666" not in udev_rules()
-
-
-def test_no_rule_where_there_is_none(tmp_path: Path) -> None:
-    assert not has_rule("16c0:0483", tmp_path)
 
 
 def test_can_interfaces_are_known_by_their_kind(tmp_path: Path) -> None:

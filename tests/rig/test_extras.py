@@ -2,7 +2,6 @@
 
 import ast
 import builtins
-import json
 import sys
 import tomllib
 from importlib import metadata
@@ -42,12 +41,6 @@ def test_the_error_holds_the_command_to_type(words, without_pyarrow, capsys):
     said = capsys.readouterr().err
     assert "Parquet needs pyarrow, which is not installed." in said
     assert f"-m pip install -e '{extras._short(ROOT)}[parquet]'" in said
-
-
-def test_json_holds_the_command_too(words, without_pyarrow, capsys):
-    assert main([*words, "--json"]) == 2
-    fix = json.loads(capsys.readouterr().out)["error"]["fix"]
-    assert fix.endswith("[parquet]'")
 
 
 @pytest.mark.parametrize(("answer", "installed"), [("y\n", True), ("n\n", False), ("\n", False)])

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from drivers.errors import LinkLostError
-from drivers.teensy.core import FirmwareMissingError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED, Trip
 from drivers.transport import open_transport
@@ -98,11 +97,6 @@ def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:
                 pass
     assert "Cut the motor supply" in left.value.fix
     assert link.process.poll() is not None
-
-
-def test_a_missing_program_says_what_to_type(tmp_path: Path) -> None:
-    with pytest.raises(FirmwareMissingError, match="make -C firmware"):
-        FirmwareProcess(program=tmp_path / "none")
 
 
 WATCHER = """

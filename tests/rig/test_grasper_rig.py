@@ -1,7 +1,6 @@
 """The 3-DOF grasper: the session, the recorder and the live display run on its board unchanged."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -137,27 +136,6 @@ def mixed(config: Config, protocol: str, folder: Path) -> None:
     todo = open_campaign_folder(folder, load_protocol(protocol), config, resume=False)
     with Session(config, open_logger(config)) as session:
         list(record_campaign(session, todo[:1], folder))
-
-
-def refused(tmp_path: Path, text: str, change: Callable[[str], str]) -> str:
-    path = tmp_path / "mine.toml"
-    path.write_text(change(text))
-    with pytest.raises(UsageError) as told:
-        load_config(path)
-    return str(told.value)
-
-
-def test_a_wrong_limit_of_the_grasper_is_named_with_the_nearest(tmp_path: Path) -> None:
-    shipped = (Path(__file__).parents[2] / "rig/configuration/shipped/grasper.toml").read_text()
-    told = refused(tmp_path, shipped, lambda t: t.replace("jaw_2_force_n =", "jaw_2_forc_n ="))
-    assert "limits.jaw_2_forc_n" in told
-    assert "'jaw_2_force_n'" in told
-    told = refused(tmp_path, shipped, lambda text: text.replace('profile = "grasper"', ""))
-    assert "[limits] are not those of [logger] profile = 'reference'" in told
-    wrong = ("yaw_current_a = 0.8", "yaw_current_a = 800")
-    told = refused(tmp_path, shipped, lambda t: t.replace(*wrong))
-    assert "limits.yaw_current_a" in told
-    assert "800 A" in told
 
 
 def test_commands_on_the_grasper_as_a_person_types_them(

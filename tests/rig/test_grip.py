@@ -63,15 +63,6 @@ def test_the_load_stays_within_its_share_and_is_off_at_the_end():
     assert last.columns["load_command_a"][-1] == 0.0
 
 
-def test_pieces_decided_on_the_way_are_each_played_once():
-    config = simulated()
-    pieces = ((np.full(50, -1.04), np.zeros(50)) for _ in range(20))
-    with Session(config, transport(config)) as session:
-        numbers = np.concatenate([r.setpoint for r in session.follow(pieces)])
-    played = numbers[numbers >= 0]
-    np.testing.assert_array_equal(np.unique(played), np.arange(1000))
-
-
 def test_a_torque_there_was_no_time_for_is_not_called_held(capsys):
     assert main(["grip", "--torque", "0.06", "--duration", "8", "--json"]) == 1
     out, err = capsys.readouterr()

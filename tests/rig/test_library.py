@@ -108,14 +108,6 @@ def test_tables_of_other_libraries_where_asked(campaign):
     assert len(table) == 6 * TIME_S.size
 
 
-def test_a_polars_table_has_the_same_rows(campaign):
-    pytest.importorskip("polars")
-    table = rig.to_polars(campaign)
-    assert table.columns == list(rig.to_pandas(campaign).columns)
-    assert table.height == 6 * TIME_S.size
-    assert table["run"].n_unique() == 6
-
-
 def test_a_data_set_has_units(campaign):
     pytest.importorskip("xarray")
     found = rig.to_xarray(campaign.runs[0].recording())

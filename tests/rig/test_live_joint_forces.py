@@ -3,23 +3,17 @@
 import json
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from estimation import model_file
-from estimation.model_table import ModelFileError
 from estimation.recording import Recording
 from rig.cli.main import main
-from rig.configuration.config import SHIPPED, load_config
+from rig.configuration.config import SHIPPED
 from rig.diagnosis.subject import subject
-from rig.live.block import LimitStatus
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
 from rig.live.model_status import ModelStatus
-from rig.live.options import ShowOptions
-from rig.live.state import Reading, Snapshot, Value
-from rig.live.view import View
 from rig.log.convert import write_recording
 
 pytestmark = pytest.mark.integration
@@ -67,35 +61,6 @@ def test_an_estimate_beyond_what_was_fitted_is_suspect_and_an_old_fit_stale():
     assert beyond.state == "suspect"
     assert beyond.detail.startswith("Jaw 1 force beyond its fit, ")
     assert beyond.detail.endswith(" N")
-
-
-@pytest.mark.parametrize("line", ['made_at = "yesterday"', "target_range = [1.0]"])
-def test_a_model_file_with_a_strange_date_or_range_is_refused(line, tmp_path):
-    text = MODEL.read_text()
-    key = line.split()[0]
-    kept = [row for row in text.splitlines() if not row.startswith(key)]
-    path = tmp_path / "m.toml"
-    path.write_text("\n".join([*kept, line]))
-    with pytest.raises(ModelFileError, match=key):
-        model_file.read_all(path)
-
-
-def test_the_nearest_limits_are_shown_where_there_is_no_room_for_all():
-    nothing = np.full((2, 500), np.nan)
-    reading = Reading(JOINTS[0], "N", False, Value(1.0), Value(1.0), None, nothing, nothing)
-    limits = tuple(LimitStatus(f"limit_{k}", k / 10, 1.0, "N") for k in range(9))
-    snapshot = Snapshot(1.0, 10, 0, 2000.0, {}, (reading,), (), limits)
-    lines = [line.plain for line in View(snapshot, "x", 0.01).lines(79, 16)]
-    assert len(lines) <= 16
-    shown = [line.split()[0] for line in lines if line.startswith("limit_")]
-    assert shown == sorted(shown)
-    assert shown[-1] == "limit_8"
-    assert f"{9 - len(shown)} more limits, none nearer" in lines
-
-
-def test_the_shipped_model_is_of_the_shipped_configuration():
-    assert load_config(Path("grasper")).model_path == MODEL
-    assert ShowOptions("x").half_widths == {}
 
 
 def test_logs_of_a_grasper_are_diagnosed_axis_by_axis(tmp_path):

@@ -12,11 +12,8 @@ from calibration.record import Validity, record_of_line
 from calibration.store import CalibrationStore
 from rig.live.block import DeviceStatus
 from rig.live.keys import pressed_keys
-from rig.live.options import ShowOptions
 from rig.live.session_blocks import session_blocks
-from rig.live.state import LiveState
 from rig.live.until import until
-from rig.live.view import View
 from rig.log.reader import read_log
 from tests.rig.simulated import short_protocol, simulated, transport
 
@@ -107,29 +104,6 @@ def test_age_and_range_of_calibrations_are_shown(tmp_path, low, days_old, state,
     said = status(block, "calibration")
     assert said.state == state
     assert words in said.detail
-
-
-def test_the_interval_and_the_keys_fit_80_columns(tmp_path):
-    state = LiveState(("distal_torque_n_m",))
-    blocks = watched(simulated(), ["", "r", "m"], tmp_path, duration_s=1.0)
-    from dataclasses import replace
-
-    for block in blocks:
-        state.feed(
-            replace(block, estimates={"distal_torque_n_m": block.columns["distal_torque_n_m"]})
-        )
-    view = View(
-        state.snapshot(),
-        "rig live",
-        0.012,
-        "t tare  m mark",
-        half_widths={"distal_torque_n_m": 0.033},
-    )
-    lines = [line.plain for line in view.lines(79, 23)]
-    assert "±33.0 mN m" in lines[1]
-    assert lines[-1] == "t tare  m mark"
-    assert max(len(line) for line in lines if "traces" not in line) <= 120
-    assert not ShowOptions("x").half_widths
 
 
 def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rig.errors import SafetyTripError, UsageError
+from rig.errors import SafetyTripError
 from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.options import ShowOptions
 from rig.live.run import show
@@ -120,21 +120,6 @@ def test_ctrl_c_quits_with_a_summary_and_closes_the_stream(terminal):
     assert "Stopped after 2.0 s" in console.file.getvalue()
 
 
-def test_ctrl_c_while_drawing_closes_the_stream():
-    closed = []
-
-    class Interrupted(io.StringIO):
-        def write(self, text):
-            if "Grip" in text and not closed:
-                raise KeyboardInterrupt
-            return super().write(text)
-
-    console = Console(file=Interrupted(), force_terminal=False, width=80)
-    summary = show(blocks(40, on_close=lambda: closed.append(True)), ShowOptions("run"), console)
-    assert summary.ended == "interrupted"
-    assert closed == [True]
-
-
 def test_ctrl_c_in_json_still_ends_with_a_summary(capsys):
     show(blocks(4, KeyboardInterrupt()), ShowOptions("run", json=True), people())
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
@@ -147,23 +132,6 @@ def test_a_fault_of_the_stream_is_passed_on_with_the_terminal_given_back():
         show(blocks(10, SafetyTripError("over current")), ShowOptions("run"), console)
     drawn = console.file.getvalue()
     assert drawn.rindex("\x1b[?25h") > drawn.rindex("\x1b[?25l")
-
-
-def test_slow_drawing_skips_frames_but_shows_the_newest_at_the_end():
-    fast, slow = people(terminal=True), people(terminal=True)
-    show(blocks(100), ShowOptions("run"), fast, steady_clock(0.1))
-    frozen = iter([0.0, 60.0, *[60.0] * 10_000])  # drawing the first frame took a minute
-    show(blocks(100), ShowOptions("run"), slow, lambda: next(frozen))
-    assert fast.file.getvalue().count("error rms") >= 40
-    assert slow.file.getvalue().count("error rms") == 2, "the first and the last"
-    assert "4.9 s  1000 Hz" in slow.file.getvalue()
-
-
-def test_one_long_block_is_one_frame(capsys):
-    time_s = np.arange(10_000) / 1000
-    long = SampleBlock(time_s, {GRIP: time_s * 0}, np.zeros(10_000, np.uint8), {}, 0, ())
-    show(iter([long]), ShowOptions("run", json=True), people())
-    assert len(capsys.readouterr().out.splitlines()) == 2
 
 
 def test_silence_is_shown_in_the_clock_of_the_person(capsys):
@@ -180,9 +148,3 @@ def test_silence_is_shown_in_the_clock_of_the_person(capsys):
     assert frames[-1]["channels"][GRIP]["sensor"] is None
     assert frames[-1]["channels"][GRIP]["sensor_missing"] == "no samples arriving"
     assert frames[-1]["devices"][0]["state"] == "stale"
-
-
-@pytest.mark.parametrize("lever_m", [0.0, -0.012, float("nan"), float("inf")])
-def test_a_lever_that_gives_no_force_is_refused(lever_m):
-    with pytest.raises(UsageError, match="lever"):
-        ShowOptions("run", lever_m=lever_m)

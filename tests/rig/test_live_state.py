@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from estimation.recording import Flag
 from rig.live.block import BlockError, DeviceStatus, SampleBlock
-from rig.live.sparkline import round_scale, sparkline
+from rig.live.sparkline import round_scale
 from rig.live.state import LiveState
 from rig.live.text import summary_lines
 from rig.live.window import Window
@@ -36,14 +36,6 @@ def state_of(*blocks):
     for each in blocks:
         state.feed(each)
     return state
-
-
-def test_before_the_first_sample_nothing_is_claimed():
-    snapshot = LiveState((GRIP,)).snapshot()
-    assert snapshot.time_s is None
-    assert snapshot.sample_rate_hz is None
-    assert snapshot.readings[0].sensor.number is None
-    assert snapshot.readings[0].sensor.missing == "no samples arriving"
 
 
 def test_value_is_the_mean_of_the_last_tenth_of_a_second():
@@ -75,22 +67,10 @@ def test_the_error_within_the_fitted_range_is_reported_separately():
     assert "Within" not in " ".join(summary_lines(unsaid, "N m"))
 
 
-def test_sample_rate_is_measured_over_device_time():
-    assert state_of(block(0, 4000, rate=987.0)).snapshot().sample_rate_hz == pytest.approx(987.0)
-
-
 def test_a_gap_lowers_the_measured_rate():
     with_gap = state_of(block(0, 500), block(1000, 1000, lost=500)).snapshot()
     assert with_gap.sample_rate_hz == pytest.approx(750, rel=0.01)
     assert with_gap.lost == 500
-
-
-def test_missing_samples_are_not_received():
-    flags = np.zeros(1000, np.uint8)
-    flags[::4] = Flag.MISSING
-    holed = block(0, 1000, flags=flags, lost=250)
-    assert state_of(holed).snapshot().samples == 750
-    assert state_of(holed).snapshot().sample_rate_hz == pytest.approx(750, rel=0.01)
 
 
 @pytest.mark.parametrize("flag", [f for f in Flag if f])
@@ -103,24 +83,6 @@ def test_flagged_samples_give_the_reason_and_no_number(flag):
     assert reading.estimate.number is None
     assert reading.sensor.missing == flag.name.lower()
     assert snapshot.flagged == {flag.name.lower(): 200}
-
-
-def test_nan_without_a_flag_gives_no_number_either():
-    reading = state_of(block(0, 200, estimate=np.nan)).snapshot().readings[0]
-    assert reading.estimate.missing == "not a number"
-    assert reading.sensor.number == pytest.approx(0.1)
-    assert reading.error_rms is None
-
-
-def test_one_bad_sample_does_not_hide_the_value():
-    reading = state_of(block(0, 99), block(99, 1, sensor=np.nan)).snapshot().readings[0]
-    assert reading.sensor.number == pytest.approx(0.1)
-
-
-def test_absent_sensor_and_estimator_are_distinguished():
-    reading = state_of(block(0, 100, columns={})).snapshot().readings[0]
-    assert reading.estimate.missing == "no estimator"
-    assert reading.sensor.missing == "no sensor"
 
 
 def test_blocks_without_samples_mean_that_nothing_arrives():
@@ -141,23 +103,6 @@ def test_a_restarted_device_clock_begins_the_trace_anew_and_keeps_the_totals():
     assert np.nanmax(snapshot.readings[0].sensor_trace) == pytest.approx(0.1)
     assert snapshot.samples == 4000
     assert state.summary("finished").duration_s == pytest.approx(2.999 + 0.999)
-
-
-def test_trace_keeps_the_extremes_of_what_it_thins_out():
-    sensor = np.zeros(5000)
-    sensor[1234], sensor[4321] = 0.7, -0.3
-    trace = state_of(block(0, 5000, columns={GRIP: sensor})).snapshot().readings[0].sensor_trace
-    assert np.nanmax(trace) == 0.7
-    assert np.nanmin(trace) == -0.3
-
-
-def test_several_quantities_are_watched_at_once():
-    state = LiveState((GRIP, "jaw_angle_rad"))
-    state.feed(block(0, 100, columns={GRIP: np.full(100, 0.1), "jaw_angle_rad": np.full(100, 0.5)}))
-    grip, jaw = state.snapshot().readings
-    assert grip.sensor.number == pytest.approx(0.1)
-    assert jaw.sensor.number == pytest.approx(0.5)
-    assert jaw.unit == "rad"
 
 
 def test_blocks_whose_parts_do_not_fit_are_refused():
@@ -184,24 +129,6 @@ def test_window_does_not_depend_on_how_samples_are_cut_into_blocks(sizes, seed):
     np.testing.assert_allclose(cut.total, whole.total, atol=1e-12)
     np.testing.assert_array_equal(cut.low, whole.low)
     np.testing.assert_array_equal(cut.high, whole.high)
-
-
-def test_sparkline_puts_values_where_the_scale_says():
-    ramp = np.linspace(0, 1, 40)
-    lines = sparkline(ramp, ramp, width=20, height=2, scale=(0.0, 1.0))
-    assert [len(line) for line in lines] == [20, 20]
-    blank = chr(0x2800)
-    assert set(lines[0][:8]) == {blank}
-    assert set(lines[1][12:]) == {blank}
-    assert blank not in lines[1][:8]
-
-
-def test_sparkline_leaves_gaps_open_and_closes_jumps():
-    gap = np.where(np.arange(40) < 20, 0.0, np.nan)
-    assert sparkline(gap, gap, 20, 1, (0.0, 1.0))[0][11:] == chr(0x2800) * 9
-    jump = np.where(np.arange(40) < 20, 0.0, 1.0)
-    lines = sparkline(jump, jump, 20, 3, (0.0, 1.0))
-    assert lines[1].strip(chr(0x2800)), "the middle line holds the jump"
 
 
 @given(*2 * [st.integers(-(10**12), 10**12).map(lambda n: n * 1e-6)])

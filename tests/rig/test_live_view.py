@@ -9,7 +9,6 @@ from rich.console import Console
 
 from estimation.recording import Flag
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.digits import big
 from rig.live.plain import plain_line
 from rig.live.state import LiveState
 from rig.live.view import View
@@ -79,20 +78,6 @@ def test_no_line_is_wider_than_the_terminal_and_the_drawing_fits(width, height):
         assert len(lines) < height
 
 
-def test_large_digits_spell_the_number():
-    text = render(snapshot_of(stream()))
-    for line in big("123.4"):
-        assert line.rstrip() in text
-
-
-def test_traces_are_named_and_their_scale_is_labelled():
-    lines = render(snapshot_of(stream())).splitlines()
-    assert any(line.startswith("estimate") and "150 ┤" in line for line in lines)
-    assert any(line.startswith("sensor") and "150 ┤" in line for line in lines)
-    assert any("mN m, last 10 s" in line for line in lines)
-    assert sum(line.lstrip().startswith("0 ┤") for line in lines) == 2
-
-
 @pytest.mark.parametrize("width", [80, 40])
 def test_flagged_samples_show_the_reason_and_no_number(width):
     flags = np.zeros(12_000, np.uint8)
@@ -103,10 +88,6 @@ def test_flagged_samples_show_the_reason_and_no_number(width):
     assert "no force at the jaw tip" in text
     assert "mN m (" not in text
     assert "123.4" not in text
-
-
-def test_lost_samples_stand_out_in_words():
-    assert "LOST 120 (0.99 %)" in render(snapshot_of(stream(lost=120)))
 
 
 def test_without_an_estimator_the_sensor_is_the_main_value():
@@ -123,11 +104,6 @@ def test_newtons_are_only_claimed_for_the_jaw():
     )
     assert "Spindle torque" in text
     assert " N at " not in text
-
-
-def test_the_lever_arm_is_the_one_given():
-    text = render(snapshot_of(stream()), lever_m=0.0105)
-    assert "11.75 N at the jaw tip (lever 10.5 mm)" in text
 
 
 def test_limits_say_in_words_when_they_are_near_or_unknown():
@@ -165,11 +141,3 @@ def test_plain_line_holds_the_same_facts():
     ):
         assert wanted in line
     assert "52 %" not in line  # a limit is named from 80 % of it on
-
-
-def test_other_quantities_take_one_line_each():
-    block = stream()
-    block = dataclasses.replace(
-        block, columns={**block.columns, "jaw_angle_rad": np.full(12_000, 0.5)}
-    )
-    assert "28.65 deg" in render(snapshot_of(block, (GRIP, "jaw_angle_rad")))

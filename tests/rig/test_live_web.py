@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.recording import Flag
 from rig.cli.main import main
 from rig.errors import UsageError
 from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.options import ShowOptions
-from rig.live.web import HOST, open_page, shown_on, traces
+from rig.live.web import HOST, open_page, shown_on
 from tests.rig.browser import chromium
 
 pytestmark = pytest.mark.integration
@@ -172,16 +171,3 @@ def test_a_taken_port_and_a_host_without_the_page_are_refused(capsys):
         open_page(HOST, taken.getsockname()[1])
     assert main(["live", "--sim", "--host", "192.0.2.1"]) == 2
     assert "--web" in capsys.readouterr().err
-
-
-def test_a_spike_is_in_the_trace_and_a_flagged_sample_is_not():
-    one = block(0)
-    torque = np.full(50, 0.05)
-    torque[[10, 40]] = 0.9, np.nan
-    flags = np.zeros(50, np.uint8)
-    shown = traces([SampleBlock(one.time_s, {GRIP: torque}, flags, {}, 0, ())])
-    assert shown["units"] == {GRIP: "mN m"}
-    assert shown["values"][GRIP] == [50.0, 900.0, 50.0, 50.0]
-    flags[10] = Flag.SATURATED
-    flagged = traces([SampleBlock(one.time_s, {GRIP: torque}, flags, {}, 0, ())])
-    assert flagged["values"][GRIP] == [50.0] * 4

@@ -13,7 +13,6 @@ from rig.configuration.config import load_config
 from rig.diagnosis import loop as looping
 from rig.diagnosis.loop import NO_RIVALS, NOTHING, SPENT, UNIQUE, Budget, run_loop
 from rig.errors import UsageError
-from rig.importers.registry import open_campaign
 from rig.protocols.protocol import load_protocol
 from rig.simulation.hidden import NAMES, UnknownHiddenEffectError, chosen
 from tests.rig.simulated import short_protocol, simulated
@@ -66,19 +65,6 @@ def test_rivals_are_told_apart_by_a_second_campaign_read_with_the_first(tmp_path
     assert {name.split("/")[0] for name in diagnosed.seen[1]} == {"round-1", "round-2"}
     kept = load_protocol(str(tmp_path / "round-2.protocol.toml"))
     assert kept.name == "small"
-
-
-def test_noise_differs_between_rounds(tmp_path, diagnosed):
-    same = {"name": "short", "protocol": short_protocol(2).model_dump(exclude_unset=True)}
-    diagnosed.answers = [answer("one_of", same), answer("identified")]
-    rounds(tmp_path)
-    torques = [
-        run.recording()["proximal_torque_n_m"]
-        for run in open_campaign(tmp_path / "runs").runs
-        if run.name.endswith("000-sine-1Hz-0.1A")
-    ]
-    assert len(torques) == 2
-    assert not (torques[0] == torques[1]).all()
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.fitting import fit
+from benchmarks.rigs import draw
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from rig.cli.main import main
 from rig.log.convert import write_recording
-from rig.machines.recordings import open_recordings
 from rig.machines.shipped import read_machine, shipped
-from rig.simulation.fitted import plant_of
-from rig.simulation.varied import draw
 
 SLIDE = """
 schema = "rig.machine/1"
@@ -183,10 +180,3 @@ def test_another_gear_ratio_is_fitted_with_its_file_and_contradicted_without(gea
         for equations in (own, other["equations"])
     ]
     assert 5 * errors[0] < errors[1]
-
-
-def test_the_simulated_rig_has_the_gear_of_the_machine(geared):
-    file, runs = geared
-    campaign = open_recordings(runs, file)
-    models = [fit(m, campaign, bootstrap=0) for m in declared(read_machine(file))]
-    assert plant_of(models).gear_ratio == pytest.approx(20.0)

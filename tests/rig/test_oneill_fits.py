@@ -17,7 +17,7 @@ def test_fits_find_the_line():
     line, score = fits.score_authors(x, y)
     assert (line.gain, line.offset) == pytest.approx((3.0, -0.5))
     assert (score.samples, score.rmse) == (3500, pytest.approx(0.0, abs=1e-12))
-    assert fits.score_pooled(x, y)[1].rmse > 1.0
+    assert fits.score(fits.fit_line(x, y)(x), y).rmse > 1.0
     _, held_out = fits.score_random(x, y, seed=1)
     assert held_out.samples == 600
     assert fits.score_random(x, y, seed=1) == fits.score_random(x, y, seed=1)
@@ -31,7 +31,8 @@ def test_a_constant_surrogate_cannot_be_fitted():
 def test_run_wise_scores_use_every_run_once_and_are_worse_than_pooled():
     closing = fits.closing_campaign(campaign(), [fits.TARGET, "motor_current_a"])
     table = closing.concatenate([fits.TARGET, "motor_current_a"])
-    _, pooled = fits.score_pooled(table.columns["motor_current_a"], table.columns[fits.TARGET])
+    current, torque = table.columns["motor_current_a"], table.columns[fits.TARGET]
+    pooled = fits.score(fits.fit_line(current, torque)(current), torque)
     fitter = fits.linear_fitter("motor_current_a")
     scored = {
         name: fits.held_out(splits, ["motor_current_a"], fitter)

@@ -28,15 +28,6 @@ def test_shipped_plans_are_whole_and_move_the_spindle_without_jumps(name):
         assert np.abs(np.diff(plan.target_angle_rad)).max() * trajectory.SAMPLE_RATE_HZ < 4.0
 
 
-def test_the_thorough_protocol_has_repeats_and_load_staircases():
-    plans = load_protocol("thorough").plans()
-    stairs = [p for p in plans if p.conditions["trajectory"] == "loads"]
-    assert len(stairs) >= 2
-    assert all(np.unique(p.load_command_a.round(3)).size > 5 for p in stairs)
-    sines = [p.conditions["load_command_a"] for p in plans if p.conditions["trajectory"] == "sine"]
-    assert all(sines.count(load) >= 2 for load in sines)
-
-
 @given(st.floats(-1.5, 0.5), st.floats(0.1, 0.8), st.floats(0.05, 1.0))
 def test_a_sine_opens_at_its_start_and_closes_by_twice_its_amplitude(start, amplitude, frequency):
     angle = trajectory.sine(4.0 / frequency, start, amplitude, frequency)
@@ -52,19 +43,6 @@ def test_a_speed_staircase_holds_each_speed(speeds):
     for speed in speeds:
         assert np.isclose(rate, speed, rtol=1e-6).sum() >= 0.9 * 0.5 / speed * 1000 - 2
     assert angle[0] == angle[-1] == -1.0
-
-
-def test_a_minimum_jerk_move_starts_and_ends_at_rest():
-    angle = trajectory.minimum_jerk(-1.0, 0.5, 2.0)
-    assert (angle[0], angle[-1]) == pytest.approx((-1.0, 0.5))
-    assert abs(angle[1] - angle[0]) < 1e-6
-    assert np.all(np.diff(angle) >= 0)
-
-
-def test_a_relaxation_dies_out_at_its_centre():
-    angle = trajectory.relaxation(0.2, 0.1, 2.0, 4)
-    assert np.abs(angle[-50:] - 0.2).max() < 0.005
-    assert np.abs(angle[:300] - 0.2).max() > 0.04
 
 
 def write(tmp_path, text):

@@ -1,7 +1,6 @@
 """Pages of HTML: well formed, without references to anything outside, and quiet in a browser."""
 
 import re
-import shutil
 import subprocess
 from html.parser import HTMLParser
 from io import StringIO
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jinja2 import UndefinedError
 
 from estimation.diagnosis.result import Value
 from estimation.effects import catalogue
@@ -17,15 +15,15 @@ from estimation.fitting import fit
 from estimation.model_file import read
 from estimation.residual import largest_structure
 from rig.output import figures
-from rig.output.binning import binned
 from rig.output.provenance import Provenance, commit
-from rig.output.render import render, write_report
+from rig.output.render import write_report
 from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports.diagnosis_words import meaning, sizes_of
 from rig.reports.first_look import first_look
 from rig.studies.oneill.page import page
 from rig.studies.oneill.study import Source, run_study
 from tests.estimation.synthetic import campaign
+from tests.rig.browser import chromium
 
 pytestmark = pytest.mark.integration
 
@@ -114,39 +112,15 @@ def test_the_screening_page_describes_the_residual_and_no_more(pages):
 
 @NAMES
 def test_a_browser_opens_a_page_without_an_error(pages, name, tmp_path):
-    browser = shutil.which("chromium")
-    if browser is None:
-        pytest.skip("no chromium on the path: the page was not opened in a browser")
     path = write_report(tmp_path / f"{name}.html", pages[name])
-    done = subprocess.run(
-        [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-            "--no-first-run",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--virtual-time-budget=2000",
-            "--enable-logging=stderr",
-            "--dump-dom",
-            path.as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-    assert "CONSOLE" not in done.stderr, done.stderr
-    assert done.stdout.count("<svg") == 3
-    assert "</html>" in done.stdout
-
-
-def test_a_template_that_lacks_a_name_is_an_error():
-    with pytest.raises(UndefinedError):
-        render("study.html", {"title": "x"})
+    messages: list[str] = []
+    with chromium() as browser:
+        opened = browser.new_page()
+        opened.on("console", lambda m: messages.append(m.text))
+        opened.on("pageerror", lambda e: messages.append(str(e)))
+        opened.goto(path.as_uri())
+        assert messages == []
+        assert opened.locator("svg").count() == 3
 
 
 def test_figures_do_not_share_ids_and_thin_long_lines():
@@ -158,25 +132,6 @@ def test_figures_do_not_share_ids_and_thin_long_lines():
     assert not set(ids[0]) & set(ids[1])
     assert len(drawn[0]) < 100_000
     assert "currentColor" in drawn[0]
-
-
-def test_bins_with_few_samples_are_left_out():
-    x = np.concatenate([np.zeros(500), np.ones(500), [0.5]])
-    centres, mean, low, high = binned(x, x, 10)
-    assert centres == pytest.approx([0.05, 0.95])
-    assert mean == pytest.approx([0.0, 1.0])
-    assert np.all(low <= high)
-
-
-def test_names_under_pairs_of_bars_stand_upright_when_they_would_touch():
-    few = figures.paired_bars({"a": (2.0, 1.0)}, ("before", "after"), "N m", "few")
-    runs = {f"{k:03d}-fourier-0.95A": (2.0, 1.0) for k in range(9)}
-    many = figures.paired_bars(runs, ("before", "after"), "N m", "many")
-    assert "rotate(-90)" in many.replace(" ", "")
-    assert "008-fourier-0.95A" in many
-    for drawn in (few, many):
-        assert "before" in drawn
-        assert "after" in drawn
 
 
 @pytest.mark.parametrize("family", sorted({e.family for e in catalogue().values()}))

@@ -55,12 +55,6 @@ def test_limits_reach_the_board_in_its_own_counts():
     assert limits.min_spindle == -limits.max_spindle == -3911
 
 
-def test_a_channel_the_rig_does_not_have_is_not_limited():
-    config = simulated(firmware=True)
-    limits = board_limits(config, shipped_calibration_set("canopen"))
-    assert limits.max_proximal == limits.max_distal == TOP
-
-
 CROSSINGS = {
     Trip.OVERHEATED: ({"continuous_current_a": 0.05, "heat_a2_s": 0.01}, {}),
     Trip.STALLED: ({"stall_current_a": 0.1, "stall_s": 0.2, "stall_motor_angle_rad": 3.0}, {}),
@@ -114,22 +108,6 @@ def test_the_host_repeats_what_the_board_is_blind_to():
     assert crossing is not None
     assert crossing.code is Trip.OVER_CURRENT
     assert HostWatch([0.0] * 5, Limits(), ReferenceMachine()).check(reading) is None
-
-
-def test_the_hosts_watch_carries_on_from_reading_to_reading():
-    config = simulated(firmware=True)
-    with Session(config, transport(config)) as session:
-        reading = next(session.rest(0.2))
-    counts = reading.counts.copy()
-    counts["status"] |= STATUS_ARMED
-    counts["proximal"] = 77
-    stuck = dataclasses.replace(reading, counts=counts)
-    patient = dataclasses.replace(Limits(), stale_ticks=len(counts) + 50)
-    watch = HostWatch([0.0] * 5, patient, ReferenceMachine())
-    assert watch.check(stuck) is None
-    crossing = watch.check(stuck)
-    assert crossing is not None
-    assert (crossing.code, crossing.channel) == (Trip.SENSOR_STALE, "proximal")
 
 
 def test_a_value_that_is_no_number_is_beyond_every_limit():

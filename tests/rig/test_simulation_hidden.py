@@ -79,26 +79,6 @@ def test_motor_ripple_shows_in_current_at_its_order(plain: Columns) -> None:
     assert amplitudes[1] < 0.1 * amplitudes[0]
 
 
-def test_gear_load_friction_costs_more_current_at_more_load() -> None:
-    effect = [HiddenEffect("gear_load_friction", 2.0)]
-    extra = [
-        mean(sweep(effect, load_a=load), "motor_current_a")
-        - mean(sweep([], load_a=load), "motor_current_a")
-        for load in (0.1, 0.9)
-    ]
-    assert extra[1] > 3.0 * extra[0] > 0.0
-
-
-def test_stribeck_friction_costs_more_current_when_slow() -> None:
-    effect = [HiddenEffect("gear_stribeck", 1.0, (8.0,))]
-    extra = [
-        mean(sweep(effect, speed), "motor_current_a") - mean(sweep([], speed), "motor_current_a")
-        for speed in (0.1, 1.0)
-    ]
-    assert extra[0] > 4e-3
-    assert extra[0] > 4.0 * abs(extra[1])
-
-
 def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses() -> None:
     gap = 8e-3
 
@@ -112,71 +92,12 @@ def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses() -> None:
     )
 
 
-def test_eccentricity_waves_the_twist_along_the_spindle(plain: Columns) -> None:
-    bent = sweep([HiddenEffect("gear_eccentricity", 1.0, (16.0, 0.3))])
-    amplitudes = []
-    for columns in (bent, plain):
-        inside = closing(columns)
-        twist = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
-        phase = 16.0 * columns["spindle_angle_rad"][inside]
-        amplitudes.append(wave(columns, twist[inside], phase))
-    assert amplitudes[0] == pytest.approx(2e-3, rel=0.4)
-    assert amplitudes[1] < 0.1e-3
-
-
-def test_torque_constant_sag_needs_more_current_for_the_same_torque(plain: Columns) -> None:
-    sagging = sweep([HiddenEffect("torque_constant_sag", 1.0, (0.2,))])
-    assert mean(sagging, "proximal_torque_n_m") == pytest.approx(
-        mean(plain, "proximal_torque_n_m"), rel=0.01
-    )
-    assert mean(sagging, "motor_current_a") > 1.06 * mean(plain, "motor_current_a")
-
-
 def test_the_bent_current_sensor_changes_only_what_is_measured(plain: Columns) -> None:
     bent = sweep([HiddenEffect("current_sensor_bend", 1.0, (0.1,))])
     for name, values in plain.items():
         if name != "motor_current_a":
             assert bent[name].tobytes() == values.tobytes()
     assert mean(bent, "motor_current_a") > 1.08 * mean(plain, "motor_current_a")
-
-
-def test_the_tight_spot_shows_in_proximal_torque_at_its_place(plain: Columns) -> None:
-    tight = sweep([HiddenEffect("cable_position_friction", 1.0, (-0.5, 0.1))])
-    at_spot = [mean(c, "proximal_torque_n_m", -0.52, -0.48) for c in (tight, plain)]
-    beyond = [mean(c, "proximal_torque_n_m", -0.2, -0.15) for c in (tight, plain)]
-    assert at_spot[0] - at_spot[1] == pytest.approx(15e-3, rel=0.1)
-    assert beyond[0] - beyond[1] < 1e-3
-
-
-def test_presliding_builds_up_after_a_reversal(plain: Columns) -> None:
-    bristly = sweep([HiddenEffect("cable_presliding", 1.0, (0.2,))])
-    soon = [mean(c, "proximal_torque_n_m", -0.95, -0.93) for c in (bristly, plain)]
-    late = [mean(c, "proximal_torque_n_m", -0.2, -0.15) for c in (bristly, plain)]
-    assert late[0] - late[1] == pytest.approx(12e-3, rel=0.1)
-    assert 1e-3 < soon[0] - soon[1] < 8e-3
-
-
-def test_cable_creep_lets_the_jaw_go_on_after_a_load_step() -> None:
-    smooth = PlantParameters(jaw_friction_n_m=0.0, load_friction_n_m=0.0)
-    hold = np.full(4000, -0.5)
-    load = np.where(np.arange(4000) < 1000, 0.1, 0.9)
-    start = round(0.5 * 8192 / (2 * np.pi))
-    late = []
-    for effects in ([HiddenEffect("cable_creep", 1.0, (0.8,))], []):
-        bench = SimulatedBench(smooth, effects=effects, start_count=start)
-        jaw = play(bench, hold, load)["jaw_angle_rad"]
-        late.append(jaw[1500:1550].mean() - jaw[-50:].mean())
-    assert late[0] > 5e-3
-    assert abs(late[1]) < 2e-3
-
-
-def test_the_jaw_spring_opposes_closing_more_when_more_closed(plain: Columns) -> None:
-    sprung = sweep([HiddenEffect("jaw_spring", 1.0, (0.6, 0.5))])
-    rise = [
-        mean(c, "proximal_torque_n_m", -0.2, -0.15) - mean(c, "proximal_torque_n_m", -0.7, -0.65)
-        for c in (sprung, plain)
-    ]
-    assert rise[0] > rise[1] + 5e-3
 
 
 def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
@@ -198,18 +119,6 @@ def test_every_effect_is_visible_and_the_rig_stays_under_control(
     assert any(columns[name].tobytes() != values.tobytes() for name, values in plain.items())
 
 
-def test_a_stiffening_gear_twists_less_than_in_proportion() -> None:
-    def twist(effects: Sequence[HiddenEffect], load_a: float) -> float:
-        columns = sweep(effects, load_a=load_a)
-        difference = columns["motor_angle_rad"] / 35.0 - columns["spindle_angle_rad"]
-        return float(difference[closing(columns)].mean())
-
-    def growth(effects: Sequence[HiddenEffect]) -> float:
-        return twist(effects, 0.9) / twist(effects, 0.1)
-
-    assert growth([HiddenEffect("gear_stiffening", 1.0)]) < 0.9 * growth([])
-
-
 def test_the_late_jaw_encoder_answers_its_delay_later(plain: Columns) -> None:
     late = sweep([HiddenEffect("jaw_delay", 1.0, (20.0,))])
     inside = closing(plain)
@@ -224,22 +133,6 @@ def test_the_asymmetric_motor_costs_current_on_opening_only(plain: Columns) -> N
     constant = PlantParameters().torque_constant_n_m_a
     assert abs(change[closing(plain)].mean()) < 1e-3
     assert change[opening][:800].mean() == pytest.approx(-0.3e-3 / constant, rel=0.15)
-
-
-def test_the_warm_winding_needs_more_current_later() -> None:
-    hold = np.full(8000, OPEN_RAD + 0.5)
-    start = round(-(OPEN_RAD + 0.5) * 8192 / (2 * np.pi))
-    bench = SimulatedBench(effects=[HiddenEffect("winding_heat", 1.0, (3.0,))], start_count=start)
-    current = play(bench, hold, np.full(8000, 0.9))["motor_current_a"]
-    assert current[-500:].mean() > 1.02 * current[1000:1500].mean()
-
-
-def test_the_two_state_friction_remembers_that_it_was_fast() -> None:
-    effect = [HiddenEffect("gear_two_state", 1.0, (14.0,))]
-    slow = mean(sweep(effect, 0.08), "motor_current_a") - mean(sweep([], 0.08), "motor_current_a")
-    fast = mean(sweep(effect, 0.6), "motor_current_a") - mean(sweep([], 0.6), "motor_current_a")
-    assert abs(slow) < 2e-3
-    assert fast > 8e-3
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -10,7 +10,6 @@ from drivers.teensy.logic import Drive
 from rig.protocols import trajectory
 from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
-from rig.simulation.hidden import HiddenEffect
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.play import play
 
@@ -60,22 +59,6 @@ def test_energy_is_kept_when_nothing_dissipates() -> None:
     energies = energies_after_a_pluck(FREE, 2000)
     assert energies[0] == pytest.approx(0.5 * 0.751 * 0.1**2)
     np.testing.assert_allclose(energies, energies[0], rtol=0.03)
-
-
-def test_an_eccentric_gear_keeps_energy_too() -> None:
-    effect = HiddenEffect("gear_eccentricity", 5.0, (16.0, 0.4))
-    bench = SimulatedBench(FREE, effects=[effect], start_count=683)
-    bench._state[places.JAW_ANGLE] -= 0.1
-    bench._state[places.MOTOR_SPEED] = 60.0
-    bench._state[places.SPINDLE_SPEED] = 60.0 / 35.0
-    none, drive = np.zeros(1, np.int32), Drive.idle()
-    energies = []
-    for _ in range(300):  # before the jaw meets its stop
-        angle = 16.0 * float(bench.state[places.SPINDLE_ANGLE])
-        error = 5.0 * 2e-3 * (np.sin(angle + 0.4) + 0.3 * np.sin(2.0 * angle))
-        energies.append(energy_j(bench.state, FREE, error))
-        bench.advance(1, none, none, drive)
-    np.testing.assert_allclose(energies, energies[0], rtol=0.02)
 
 
 def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
@@ -148,16 +131,6 @@ def test_the_controller_follows_the_reference_sinusoid(frequency_hz: float, load
     assert np.degrees(np.abs(error_rad).max()) < 2.5
     # no limit cycle: the command moves by little more than its own quanta from tick to tick
     assert np.std(np.diff(columns["motor_command_ratio"][1000:])) < 20e-4
-
-
-def test_the_open_stop_holds_the_jaw_against_the_load() -> None:
-    p = PlantParameters(jaw_friction_n_m=0.0, load_friction_n_m=0.0)
-    bench = SimulatedBench(p, start_count=1800)
-    hold = np.full(3000, -1800 * 2 * np.pi / 8192)
-    play(bench, hold, np.full(3000, 1.0))
-    state = bench.state
-    assert p.stop_open_rad - 0.01 < state[places.JAW_ANGLE] < p.stop_open_rad
-    assert abs(state[places.JAW_SPEED]) < 1e-6
 
 
 def test_the_drive_limits_its_current() -> None:

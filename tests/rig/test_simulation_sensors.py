@@ -43,16 +43,6 @@ def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
     return bench.advance(1000, target, load, Drive.armed(GAINS))
 
 
-def test_raw_signs_on_closing() -> None:
-    rows = closing(QUIET)
-    change = rows[-1].astype(int) - rows[0].astype(int)
-    for column in (sensors.MOTOR, sensors.JAW, sensors.PROXIMAL, sensors.CURRENT, sensors.FSR):
-        assert change[column] > 0
-    for column in (sensors.SPINDLE, sensors.DISTAL, sensors.COMMAND_E4):
-        assert change[column] < 0
-    np.testing.assert_array_equal(rows[:, sensors.LOAD_MA], 500)
-
-
 def test_channels_are_closing_positive_and_agree() -> None:
     target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.25)
     columns = play(SimulatedBench(sensors_parameters=QUIET), target, np.full(4000, 0.5))
@@ -68,13 +58,6 @@ def test_channels_are_closing_positive_and_agree() -> None:
     commanded = 2.06 * columns["motor_command_ratio"][:-1]
     np.testing.assert_allclose(measured, commanded, atol=0.02)
     assert np.corrcoef(measured, commanded)[0, 1] > 0.999
-
-
-def test_torque_comes_in_its_quantum() -> None:
-    rows = rest(SensorParameters(), 2000)
-    for column in (sensors.PROXIMAL, sensors.DISTAL):
-        assert np.all(rows[:, column] % 2 == 0)
-        assert np.unique(rows[:, column]).size > 5
 
 
 def test_noise_has_the_stated_size_and_channels_are_unrelated() -> None:
@@ -103,14 +86,6 @@ def test_zero_offset_and_drift_show_at_rest() -> None:
     assert torque[-200:].mean() == pytest.approx(0.0199, abs=1e-4)
 
 
-def test_the_random_walk_of_the_zero_grows_with_the_root_of_time() -> None:
-    walking = SensorParameters(proximal_noise_n_m=0.0, torque_walk_n_m_s=5e-3)
-    walks = np.array([rest(walking, 1000, seed)[:, sensors.PROXIMAL] for seed in range(60)])
-    spread = walks.std(axis=0) * 0.000039811
-    assert spread[-1] == pytest.approx(5e-3, rel=0.3)
-    assert spread[249] == pytest.approx(2.5e-3, rel=0.3)
-
-
 def test_converters_saturate_at_their_limits() -> None:
     narrow = SensorParameters(torque_limit_count=400.0, current_limit_count=50.0)
     rows = closing(narrow)
@@ -119,13 +94,6 @@ def test_converters_saturate_at_their_limits() -> None:
     assert rows[:, sensors.CURRENT].max() == 50
     assert rest(SensorParameters(fsr_offset_count=-10.0), 100)[:, sensors.FSR].min() == 0
     assert rest(SensorParameters(fsr_offset_count=5000.0), 100)[:, sensors.FSR].max() == 4095
-
-
-def test_the_force_sensor_reads_grip_over_the_lever_arm() -> None:
-    rows = closing(QUIET)
-    torque = -rows[-1, sensors.DISTAL] * 0.000039811
-    grip_n = rows[-1, sensors.FSR] * QUIET.fsr_n_per_count
-    assert grip_n * 0.012 == pytest.approx(torque, rel=0.01)
 
 
 def test_disarmed_commands_are_zero_and_the_controller_rests() -> None:

@@ -1,6 +1,5 @@
 """The simulated null: the declared model with the references and noise of a recording."""
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -102,17 +101,6 @@ def test_the_simulated_nulls_motor_residual_has_no_structure_beyond_chance(
 ) -> None:
     again = fit(fitted[0], twin, bootstrap=0)
     assert not largest_structure(again, twin)[0].stands_out
-
-
-def test_simulated_nulls_are_seeded_differ_and_can_be_pickled(
-    recorded: Campaign, fitted: list[Model]
-) -> None:
-    one = Campaign(recorded.runs[:1])
-    maker = pickle.loads(pickle.dumps(build_twin(fitted, one)))  # noqa: S301 - our own bytes
-    (first,), (again,), (other,) = maker(1), maker(1), maker(2)
-    name = "proximal_torque_n_m"
-    assert np.array_equal(first[name], again[name])
-    assert not np.array_equal(first[name], other[name])
 
 
 def test_a_campaign_without_trajectory_or_an_unfitted_model_is_refused(

@@ -61,12 +61,6 @@ def test_the_page_begins_with_every_false_name():
     assert "coupling.kinematic on joint 3, friction.stribeck on joint 2" in said
 
 
-def test_a_points_condition_is_that_of_its_own_rows():
-    rows = np.random.default_rng(0).normal(size=(4, 5, 96))
-    expected = [np.linalg.cond(point) for point in rows]
-    np.testing.assert_allclose(delsol.conditions(rows), expected)
-
-
 def test_the_excitation_keeps_to_table_1():
     motions = delsol.swings(np.random.default_rng(0))
     assert len(motions) == 5 * delsol.SWINGS * delsol.POSES

@@ -39,13 +39,6 @@ def test_adapting_helps_and_a_fit_anew_stands_beside_the_first_row(study):
     assert len(second.unused) == len(first.unused) - 1
 
 
-def test_the_page_holds_a_row_for_each_choice_of_runs(study):
-    assert [row[2] for row in shown.table(study).rows] == ["01", "01, 05"]
-    page = shown.markdown(study)
-    assert "on other" in shown.lead(study)
-    assert shown.lead(study) in page
-
-
 def test_every_single_run_and_threes_are_adapted_with(study):
     one, three = study.drawn
     assert (one.runs, len(one.rmse_n_m)) == (1, 9)

@@ -1,9 +1,7 @@
 """`rig study oneill` on an analytic campaign, and on the measured data where it is there."""
 
 import json
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import typer
@@ -39,13 +37,6 @@ def test_every_surrogate_is_fitted_by_every_protocol(result):
     row = next(r for r in result.study.rows if r.protocol == "authors" and r.surrogate == "current")
     assert row.gain_unit == "N m/A"
     assert row.gain == pytest.approx(0.94, rel=0.1)
-
-
-def test_the_study_is_repeatable_and_its_seed_matters(result):
-    again = run_study(Source(campaign(), "analytic rig", measured=False), seed=3)
-    assert rows(again) == rows(result)
-    other = run_study(Source(campaign(), "analytic rig", measured=False), seed=4)
-    assert rows(other)["current", "random"] != rows(result)["current", "random"]
 
 
 def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
@@ -112,22 +103,6 @@ def test_the_reference_part_is_picked_and_said(tmp_path, monkeypatch):
     assert "do not apply" in other.notes[0]
 
 
-def test_an_archive_of_several_parts_is_narrowed(tmp_path, monkeypatch):
-    names = ["Tool_4_Maryland_L_4/00", "Tool_4_Maryland_L_4/01", "Tool_5_Maryland_L_2/00"]
-    monkeypatch.setattr(study, "open_campaign", lambda path: named(names))
-    archive = tmp_path / "everything.tar.xz"
-    archive.touch()
-    source = open_reference(archive)
-    assert source.campaign.names == tuple(names[:2])
-    assert "2 of 3 runs" in source.notes[0]
-
-
-def test_conditions_held_out_have_readable_headings(result):
-    assert "| surrogate | samples at random | runs | a frequency (LOFO) |" in shown.markdown(
-        result.study
-    )
-
-
 def command_line() -> typer.Typer:
     app = typer.Typer()
     app.add_typer(study_app)
@@ -149,23 +124,6 @@ def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
     assert "Table I: proximal torque" in done.stderr
     assert (tmp_path / "d" / "oneill.md").read_text().startswith("# Grip torque and jaw angle")
     assert (tmp_path / "r" / "oneill.html").read_text().startswith("<!DOCTYPE html>")
-
-
-def test_without_data_the_same_is_done_on_a_simulated_campaign(monkeypatch):
-    seeds: list[int] = []
-
-    def simulate(seed: int) -> Campaign:
-        seeds.append(seed)
-        return campaign()
-
-    simulation = SimpleNamespace(simulate_reference_campaign=simulate)
-    monkeypatch.setitem(sys.modules, "rig.simulation.campaign", simulation)
-    words = ["study", "oneill", "--json", "--seed", "9"]
-    done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
-    found = json.loads(done.stdout)
-    assert seeds == [9]
-    assert not found["measured"]
-    assert found["source"] == "simulated reference campaign, seed 9"
 
 
 @pytest.mark.measured

@@ -9,8 +9,6 @@ import typer
 from typer.testing import CliRunner
 
 from estimation.campaign import Campaign
-from estimation.errors import MissingExtraError
-from estimation.networks import training
 from estimation.networks.training import Settings, has_torch, train
 from estimation.scores import rmse
 from rig.cli.study import study_app
@@ -19,11 +17,9 @@ from rig.studies.oneill import networks as study
 from rig.studies.oneill import networks_page as shown
 from rig.studies.oneill import study as linear
 from rig.studies.oneill.closing_table import CAUSAL, closing_table, held_out_masks
-from rig.studies.oneill.data import network_tables
 from rig.studies.oneill.networks import CHANNELS, NetworkStudy, jobs, run_networks
 from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
-from rig.studies.oneill.study import Source, run_study
-from rig.studies.oneill.tables import tables as paper_tables
+from rig.studies.oneill.study import Source
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.long
@@ -87,13 +83,6 @@ def test_every_row_of_the_papers_tables_has_a_job():
     assert len(PAPER) == 4 + 9 + 9 + 10 + 10
 
 
-def test_data_of_experiment_3_is_missed_out_loud(tmp_path):
-    tables, notes = network_tables(with_jaw(), {"00": "flagged"}, tmp_path)
-    assert list(tables) == ["neutral"]
-    assert len(tables["neutral"].conditions["frequency_hz"]) == 8
-    assert [n for n in notes if "experiment 3, pitch" in n]
-
-
 @pytest.fixture(scope="module")
 def deep(table, tmp_path_factory) -> NetworkStudy:
     if not has_torch():
@@ -140,30 +129,6 @@ def test_rows_are_scored_next_to_the_paper(deep):
     assert "a frequency (LOFO)" in held_out.columns
     assert deep.grip_force is not None
     assert any("Grip force at 12 mm" in note for note in shown.notes(deep))
-
-
-def test_the_papers_tables_are_row_by_row_next_to_the_printed_ones(deep):
-    trained = {(r.pose, r.way, r.target, r.surrogate): r for r in deep.rows}
-    one = next(iter(trained.values()))
-    rows = [
-        replace(one, pose=pose, way=way, target=target, surrogate=surrogate, protocol="random")
-        for pose, way, target, surrogate in PAPER
-    ]
-    lines = run_study(Source(campaign(), "analytic rig", measured=False)).study
-    shown_tables = paper_tables(lines, replace(deep, rows=tuple(rows)))
-    found = {table.title.split(":")[0]: table for table in shown_tables}
-    count = {title: len(table.rows) for title, table in found.items()}
-    assert count == {"Table I": 6 + 4, "Table II": 9, "Table III": 9, "Table IV": 10, "Table V": 10}
-    assert found["Table V"].rows[5][0] == "varied roll: command"
-    assert found["Table V"].rows[5][6:9] == ["5.50", "15.42", "7.91"]
-    assert found["Table II"].rows[0][0] == "staged: command"
-    assert found["Table I"].rows[-1][6:9] == ["3.82", "10.04", "4.94"]
-
-
-def test_without_torch_it_is_said_what_to_install(table, tmp_path, monkeypatch):
-    monkeypatch.setattr(training, "has_torch", lambda: False)
-    with pytest.raises(MissingExtraError, match="torch"):
-        run_networks({"neutral": table}, tmp_path)
 
 
 @torch_only

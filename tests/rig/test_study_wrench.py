@@ -14,16 +14,14 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, spatial_jacobians
-from rig.arm.hidden import FAMILIES, bouc_wen, draw_hidden
-from rig.arm.simulated import GRIP_N_M, contact, contact_motion, excitation, passed_on, pin
+from rig.arm.hidden import FAMILIES
+from rig.arm.simulated import contact_motion
 from rig.studies.pique.wrench import (
     BODY,
     HAND,
     OURS,
     SERIES,
     THESIS,
-    TWISTED,
-    ati,
     in_tip_frame,
     one_arm,
 )
@@ -56,39 +54,6 @@ def test_the_command_reports_every_family(tmp_path, monkeypatch):
     assert "| thesis | 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in out.read_text()
 
 
-def test_dahl_friction_turns_over_its_displacement_and_stays_within_one():
-    there_and_back = np.concatenate([np.linspace(0, 1, 1001), np.linspace(1, 0.9, 101)])[:, None]
-    friction = bouc_wen(there_and_back, np.array([0.05]))[:, 0]
-    assert np.isclose(friction[1000], 1.0, atol=1e-3)
-    assert np.isclose(friction[1050], 1 - 2 * (1 - np.exp(-1)), atol=0.02)
-    assert np.abs(friction).max() <= 1
-
-
-def test_every_hidden_family_has_the_asked_size_and_its_own_form():
-    motion, asked = excitation(np.random.default_rng(1), 30.0), np.linspace(0.5, 3.0, 6)
-    for family in FAMILIES[1:]:
-        one, same, other = (
-            draw_hidden(family, np.random.default_rng(seed), motion, asked)(motion)
-            for seed in (5, 5, 6)
-        )
-        np.testing.assert_allclose(np.std(one, axis=0), asked)
-        np.testing.assert_array_equal(one, same)
-        assert np.all(np.std(one - other, axis=0) > 1e-3 * asked)
-
-
-def test_a_pin_passes_on_forces_and_no_more_torsion_than_the_grip_holds():
-    rng = np.random.default_rng(3)
-    motion = contact_motion(rng, 20.0)
-    wrench = pin(rng, motion, *TWISTED)
-    assert np.abs(wrench[:, :3]).max(axis=0) == pytest.approx(TWISTED[0], rel=0.3)
-    felt = passed_on(motion, wrench)
-    assert np.array_equal(felt[:, :3], wrench[:, :3])
-    torsion = np.abs(in_tip_frame(felt, motion.position)[:, 5])
-    assert torsion.max() == pytest.approx(GRIP_N_M, rel=1e-6)
-    gentle = pin(rng, motion, TWISTED[0], 0.9 * GRIP_N_M)
-    assert np.allclose(passed_on(motion, gentle), gentle)
-
-
 def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
     rng = np.random.default_rng(3)
     motion = contact_motion(rng, 1.0)
@@ -99,15 +64,6 @@ def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
         for jacobians, each in ((spatial_jacobians, wrench), (body_jacobians, there))
     )
     assert np.allclose(at_base, at_tip)
-
-
-def test_contact_stays_within_seven_newton_and_the_sensor_close_to_it():
-    rng = np.random.default_rng(3)
-    wrench = contact(rng, contact_motion(rng, 20.0))
-    assert 0 < np.abs(wrench[:, :3]).max() <= 7
-    seen = ati(wrench, rng)
-    assert not np.allclose(seen, wrench, atol=1e-3)
-    assert np.sqrt(np.mean((seen - wrench)[:, :3] ** 2)) < 0.4
 
 
 def test_an_interrupted_study_says_how_to_go_on(tmp_path, monkeypatch, capsys):

@@ -8,15 +8,13 @@ from typer.testing import CliRunner
 
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
-from rig.arm.hidden import FAMILIES, bouc_wen
+from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import draw_arm
 from rig.cli.study import study_app
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
-from rig.studies.zhang import rest as zhang_rest
-from rig.studies.zhang.psm import GRIPPER, RATE_HZ, WRIST, PsmRun, simulate, with_instrument
-from rig.studies.zhang.psm_grasp import configurations, grasp_and_release
+from rig.studies.zhang.psm import GRIPPER, simulate, with_instrument
 from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies.zhang.seed import one_arm
@@ -47,50 +45,6 @@ def test_shown_torque_is_the_true_one_through_both_couplings(psm):
     assert abs(leaked[5]) > 1e-4
     assert leaked[2] > 0.1
     np.testing.assert_allclose(leaked[:2], 0, atol=1e-9)
-
-
-def test_paths_keep_to_the_limits_and_a_held_gripper_stays(psm):
-    rng = np.random.default_rng(3)
-    path = random_path(rng, 20.0)
-    limits = np.array([(joint.lower, joint.upper) for joint in psm.table.joints])
-    assert np.all((path >= limits[:, 0]) & (path <= limits[:, 1]))
-    moving = moving_gripper(rng, 20.0, 0.8)
-    assert 0 < moving.min() < 0.1
-    assert moving.max() == pytest.approx(0.8)
-    motion = with_gripper(path, 0.2, 0.8)
-    assert motion.position[0, GRIPPER] == pytest.approx(0.8)
-    assert np.all(motion.position[lead_samples() :, GRIPPER] == 0.2)
-
-
-def test_every_instrument_has_a_nominal_coupling():
-    rng = np.random.default_rng(4)
-    arm = draw_arm(rng)
-    for name in KINDS:
-        psm = with_instrument(rng, arm, name)
-        assert psm.leak.shape == (4, 4)
-        assert 0 < np.abs(psm.leak - np.eye(4)).max() < 0.8
-        assert np.array(psm.table.wrist_coupling).shape == (3, 3)
-
-
-def test_grasps_hold_what_the_paper_holds(psm):
-    rng = np.random.default_rng(5)
-    force = grasp_and_release(rng).force(psm)
-    assert 3.5 < force.max() < 5.0
-    assert force[: 10 * round(RATE_HZ)].max() == 0
-    grasp, place = configurations(rng)
-    held = grasp.force(psm)
-    assert set(place) == {-1, 0, 1, 2, 3, 4}
-    assert held[place == 0].mean() == pytest.approx(3.0, abs=0.1)
-    assert np.ptp([held[place == k].mean() for k in range(5)]) > 0.05
-    wrist = grasp.motion.position[:, WRIST]
-    np.testing.assert_allclose(wrist[place == 1, 1], np.radians(60.0))
-
-
-def test_networks_see_the_gripper_from_joint_3_on():
-    for joint in range(7):
-        names = zhang_networks.input_names(joint, gripper=True)
-        assert any(name.startswith("q7") for name in names) == (joint >= 2)
-        assert not any(name[1] == "7" for name in zhang_networks.input_names(joint, gripper=False))
 
 
 def test_states_are_causal(psm):
@@ -168,29 +122,3 @@ def here(one_seed, seeds, workers, start):
 def nothing_left(one_seed, seeds, workers, start):
     assert seeds == []
     return iter(())
-
-
-def test_motion_of_a_run_does_not_trail_a_smooth_path():
-    time = np.arange(200) / RATE_HZ
-    rise = np.outer(0.3 * time**4 - time**2, np.ones(GRIPPER + 1))
-    run = PsmRun(rise, np.zeros_like(rise), np.zeros_like(rise))
-    motion = zhang_physics.motion_of_run(run)
-    known = slice(zhang_physics.WINDOW, None)
-    np.testing.assert_allclose(motion.velocity[known, 0], (1.2 * time**3 - 2 * time)[known])
-    np.testing.assert_allclose(motion.acceleration[known, 0], (3.6 * time**2 - 2)[known])
-
-
-@torch_only
-def test_the_network_on_the_residual_learns_memory_and_not_noise(psm):
-    rng = np.random.default_rng(8)
-    motion = with_gripper(random_path(rng, 120.0), 0.1, 0.8)
-    memory = bouc_wen(motion.position[:, :1], np.array([0.1]))[:, 0]
-    noise = rng.normal(size=len(motion))
-    cut = 5 * len(motion) // 6
-    for joint in (0, 5):
-        rows = zhang_rest.rest_rows(psm.table, joint, motion)
-        assert zhang_rest.rest_network(rows[:cut:5], noise[:cut:5]) is None
-    rows = zhang_rest.rest_rows(psm.table, 0, motion)
-    found = zhang_rest.rest_network(rows[:cut:5], memory[:cut:5])
-    assert found is not None
-    assert np.std(memory[cut:] - found(rows[cut:])[:, 0]) < 0.1 * np.std(memory[cut:])

@@ -12,8 +12,8 @@ from rig.cli.main import main
 from rig.grasper.angle_led import angle_led
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES, OWN, with_family
-from rig.grasper.inputs import end_of_hold, hold, periodic
-from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis, vary
+from rig.grasper.inputs import end_of_hold, hold
+from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis
 from rig.studies.zhao import study as zhao
 from rig.studies.zhao.haptics import run_haptics
 from rig.studies.zhao.methods import Lacking, axes_of, lacking
@@ -33,30 +33,6 @@ def test_without_friction_the_papers_equations_give_the_force():
     at = slice(round(end_of_hold(3.0)[0] * RATE_HZ), round(end_of_hold(3.0)[1] * RATE_HZ))
     assert found[at].mean() == pytest.approx(1.5, abs=0.01)
     assert played["force_n"][at].mean() == pytest.approx(1.5, abs=0.01)
-
-
-def test_inputs_reach_the_force_they_are_asked_for():
-    played = play_axis(IDEAL, periodic(IDEAL, 1.0), 0)
-    last_cycle = played["force_n"][-round(RATE_HZ / 2) :]
-    assert last_cycle.max() == pytest.approx(1.0, abs=0.1)
-    assert last_cycle.min() == pytest.approx(0.0, abs=0.1)
-
-
-def test_a_held_grasp_lets_go_of_friction_and_not_of_force():
-    axis = PROTOTYPES["third"].axes["pitch"][0]
-    played = play_axis(axis, hold(axis, 1.5, 10.0), 0)
-    current, force = (
-        [values[round(t * RATE_HZ) :][:400].mean() for t in (1.1, 10.5)]
-        for values in (played["motor_current_a"], played["force_n"])
-    )
-    assert current[1] < 0.85 * current[0]
-    assert force[1] == pytest.approx(force[0], rel=0.03)
-
-
-def test_graspers_differ_by_their_seed_and_repeat_by_it():
-    axis = PROTOTYPES["third"].axes["yaw"][0]
-    assert vary(axis, 3, 0.1) == vary(axis, 3, 0.1) != vary(axis, 4, 0.1)
-    assert vary(axis, 3, 0.0) == axis
 
 
 def test_a_drawn_friction_is_repeated_by_its_seed_and_moves_the_current():

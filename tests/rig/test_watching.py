@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import model_file
-from estimation.campaign import Campaign
 from estimation.fitting import fit
-from estimation.model import NotFittedError
 from estimation.recording import Recording
 from rig.bench.session import Session
 from rig.cli.main import main
@@ -85,11 +83,6 @@ def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(
     assert [m.balance for m in declared_models(path, "gearbox")] == ["gearbox"]
 
 
-def test_a_model_without_values_cannot_be_watched() -> None:
-    with pytest.raises(NotFittedError, match="not fitted"):
-        watch_runs(Path("motor"))
-
-
 def test_a_stream_says_since_when_its_model_no_longer_fits() -> None:
     campaign = synthetic.campaign()
     fitted = fit(model_file.read(Path("motor")), campaign, bootstrap=0)
@@ -116,19 +109,3 @@ def test_a_stream_without_the_models_channels_is_not_watched() -> None:
     last = list(watched(replay_blocks(bare, (), None), fitted))[-1].devices[-1]
     assert last.state == "not watched"
     assert "channel" in last.detail or "lacks" in last.detail
-
-
-def test_closing_the_watched_stream_closes_the_rigs() -> None:
-    closed = []
-
-    def stream():
-        try:
-            yield from replay_blocks(synthetic.run("r", 0.3, 0.1, seed=1), (), None)
-        finally:
-            closed.append(True)
-
-    fitted = fit(model_file.read(Path("motor")), Campaign.of(synthetic.campaign()), bootstrap=0)
-    watched_stream = watched(stream(), fitted)
-    next(watched_stream)
-    watched_stream.close()
-    assert closed == [True]

@@ -129,7 +129,7 @@ def cases(path: Path) -> Iterator[Case]:
         if (path / name).is_dir():
             yield from (case(path / name, hand_over) for hand_over in hand_overs())
         else:
-            sys.stderr.write(f"{name} skipped: there is no folder {path / name}\n")
+            sys.stderr.write(f"{name} skipped: no folder {path / name}\n")
 
 
 def case(folder: Path, hand_over: HandOver) -> Case:

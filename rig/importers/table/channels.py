@@ -219,7 +219,7 @@ def _in_order(mapping: Mapping, known: set[str]) -> list[tuple[str, str]]:
         missing = set(names_in(text)) - known - {n for n, _ in ordered}
         if missing:
             raise DataError(
-                f"{mapping.where('formulas', name)}: there is no channel or condition"
+                f"{mapping.where('formulas', name)}: no channel or condition is called"
                 f" {sorted(missing)[0]!r}.",
                 f"There are {', '.join(sorted(known))}.",
             )

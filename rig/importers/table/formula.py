@@ -93,7 +93,7 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
             return float(number)
         case ast.Name(id=name):
             if name not in values:
-                raise FormulaError(f"there is no channel or condition {name!r}")
+                raise FormulaError(f"no channel or condition is called {name!r}")
             return values[name]
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             return OPERATORS[type(op)](_value(left, values), _value(right, values))

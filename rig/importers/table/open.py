@@ -138,7 +138,9 @@ def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
         return {}
     where, path = mapping.where("side_file"), file.parent / name
     if not path.is_file():
-        raise UsageError(f"{where}: there is no file {path}.", fix="Put it next to the data.")
+        raise UsageError(
+            f"{where}: the file {path} does not exist.", fix="Put it next to the data."
+        )
     side = read_delimited(path, Layout())
     if "file" not in side.columns:
         raise DataError(

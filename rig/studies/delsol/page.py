@@ -9,7 +9,7 @@ import numpy as np
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, names_of
 from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.coverage import coverage
 from rig.studies.delsol.diagnosis import JOINTS, PULLS, Named
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC, RUNS
@@ -85,20 +85,8 @@ def lead(study: DelSolStudy) -> str:
 
 
 def markdown(study: DelSolStudy, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page.
-
-    Args:
-        study: The study.
-        figures: Places of its figures, from where the page will be.
-    """
-    parts = [
-        f"# {TITLE}",
-        lead(study),
-        NOTE,
-        *(to_markdown(table).rstrip() for table in tables(study)),
-    ]
-    parts += [f"![]({name})" for name in figures]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    """Return the study as a Markdown page."""
+    return to_page([TITLE, lead(study), NOTE], tables(study), study.provenance, figures)
 
 
 def write_figures(folder: Path, study: DelSolStudy) -> list[Path]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimation.bank.interval import covered_share
 from estimation.bank.states import Bank
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
 from estimation.estimators.adaptation import adapted_states, spread_out
 from estimation.estimators.bank import EVERY, BankEstimator, fit_runs, rows_of
@@ -119,9 +119,8 @@ def _reduced(campaign: Campaign) -> dict[str, list[RunEvidence]]:
 
 def _splits(runs: Sequence[RunEvidence], seed: int) -> Iterator[tuple[str, NDArray[np.int_]]]:
     """Yield what is left out and its runs."""
-    order = np.random.default_rng(seed).permutation(len(runs))
-    for fold in range(FOLDS):
-        yield "run", order[fold::FOLDS]
+    for fold in in_folds(len(runs), FOLDS, seed):
+        yield "run", fold
     for condition in CONDITIONS.values():
         values = np.array([float(run.conditions[condition]) for run in runs])
         levels = np.unique(values)

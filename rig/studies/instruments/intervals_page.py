@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.instruments.intervals import COUNTS, Held, IntervalStudy
 from rig.studies.oneill.networks_page import SHOWN
 
@@ -95,6 +95,4 @@ def _none(row: Held) -> str:
 
 def markdown(study: IntervalStudy) -> str:
     """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", " ".join(lead(study))]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    return to_page([TITLE, " ".join(lead(study))], tables(study), study.provenance)

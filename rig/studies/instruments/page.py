@@ -2,7 +2,7 @@
 
 from statistics import median
 
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.instruments.study import InstrumentStudy
 
 TITLE = "An estimator of one instrument on others"
@@ -69,6 +69,4 @@ def table(study: InstrumentStudy) -> TextTable:
 
 def markdown(study: InstrumentStudy) -> str:
     """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study)]
-    parts += [to_markdown(part).rstrip() for part in (table(study), drawn_table(study))]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    return to_page([TITLE, lead(study)], [table(study), drawn_table(study)], study.provenance)

@@ -1,6 +1,6 @@
 """The study of the closed loop as tables for any medium, and as Markdown."""
 
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.loop.study import TIMELESS, LoopStudy, Row
 
 TITLE = "The loop closed on measured data: from a linear model to named effects"
@@ -44,9 +44,7 @@ def tables(study: LoopStudy) -> list[TextTable]:
 
 def markdown(study: LoopStudy) -> str:
     """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study), *notes(study)]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    return to_page([TITLE, lead(study), *notes(study)], tables(study), study.provenance)
 
 
 def _errors(study: LoopStudy) -> TextTable:

@@ -1,6 +1,6 @@
 """The study of other people's machines as tables and as a Markdown page."""
 
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.machines.cases import CASES
 from rig.studies.machines.study import MachineStudy
 
@@ -66,9 +66,6 @@ def tables(study: MachineStudy) -> list[TextTable]:
 def markdown(study: MachineStudy) -> str:
     """Return the study as a Markdown page."""
     cards = sorted({case.card for case in CASES})
-    parts = [f"# {TITLE}", lead(study)]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
-    if study.skipped:
-        parts.append("Not studied: " + " ".join(study.skipped))
-    parts.append("Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + ".")
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    linked = "Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + "."
+    skipped = ["Not studied: " + " ".join(study.skipped)] if study.skipped else []
+    return to_page([TITLE, lead(study), *skipped, linked], tables(study), study.provenance)

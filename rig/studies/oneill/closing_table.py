@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
 from estimation.derived import causal_channels
 from estimation.recording import FloatArray
@@ -125,16 +125,15 @@ def held_out_masks(table: ClosingTable, protocol: str, folds: int, seed: int) ->
         folds: Folds of `run-wise`.
         seed: Seed of `random` and `run-wise`, as of `Campaign.folds`.
     """
-    generator = np.random.default_rng(seed)
     if protocol == "random":
         mask = np.zeros(len(table.run), bool)
-        order = generator.permutation(len(mask))
+        order = np.random.default_rng(seed).permutation(len(mask))
         mask[order[: round(fits.TEST_SHARE * len(mask))]] = True
         return [mask]
     if protocol == "run-wise":
-        order = generator.permutation(int(table.run.max()) + 1)
-        count = min(folds, len(order))
-        return [np.isin(table.run, order[k::count]) for k in range(count)] if count > 1 else []
+        runs = int(table.run.max()) + 1
+        parts = in_folds(runs, min(folds, runs), seed) if runs > 1 else []
+        return [np.isin(table.run, part) for part in parts]
     condition = table.conditions[{"lofo": "frequency_hz", "lopo": "load_command_a"}[protocol]]
     levels = np.unique(condition)
     if len(levels) < 2 or not np.isfinite(condition).all():

@@ -76,12 +76,6 @@ def score_authors(surrogate: FloatArray, torque: FloatArray) -> tuple[LinearFit,
     return fit, score(fit(surrogate[first:]), torque[first:])
 
 
-def score_pooled(surrogate: FloatArray, torque: FloatArray) -> tuple[LinearFit, Score]:
-    """Fit and score on the same samples, all of them."""
-    fit = fit_line(surrogate, torque)
-    return fit, score(fit(surrogate), torque)
-
-
 def score_random(surrogate: FloatArray, torque: FloatArray, seed: int) -> tuple[LinearFit, Score]:
     """Fit on a random 85 % of the samples and score on the rest, as the paper does.
 
@@ -147,7 +141,6 @@ def score_table(table: Table) -> Score:
 def closing_campaign(
     campaign: Campaign,
     names: Iterable[str],
-    keep_flagged: bool = True,
     on_run: Callable[[Recording], None] = lambda run: None,
 ) -> Campaign:
     """Reduce a campaign to its closing samples, held in memory; excluded runs stay excluded.
@@ -155,7 +148,6 @@ def closing_campaign(
     Args:
         campaign: Raw runs, read one at a time.
         names: Channels to keep.
-        keep_flagged: See `closing_samples`.
         on_run: Called with each processed run, before it is reduced.
     """
     wanted = list(names)
@@ -164,6 +156,6 @@ def closing_campaign(
         for recording in campaign:
             run = processed(recording, wanted)
             on_run(run)
-            yield closing_samples(run, keep_flagged)
+            yield closing_samples(run)
 
     return Campaign.of(reduced())

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from estimation.bank.states import EFFECTS, Bank
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
 from estimation.derived import causal_channels
 from estimation.estimators.bank import (
@@ -174,8 +174,7 @@ def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> 
 def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
     """Return the indices of the runs held out together; empty when it cannot be done."""
     if protocol == "run-wise":
-        order = np.random.default_rng(seed).permutation(len(runs))
-        return [order[k::FOLDS] for k in range(FOLDS)] if len(runs) >= FOLDS else []
+        return in_folds(len(runs), FOLDS, seed) if len(runs) >= FOLDS else []
     condition = CONDITIONS[protocol]
     if any(condition not in run.conditions for run in runs):
         return []

@@ -8,7 +8,7 @@ import numpy as np
 from rig.arm.search import DAMPING, LEAST_GAIN
 from rig.arm.within import STRETCHES
 from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.coverage import coverage
 from rig.studies.pique.study import EFFECTS, THESIS, WITHIN, Row, Study
 
@@ -83,16 +83,13 @@ def tables(study: Study) -> list[TextTable]:
 
 
 def markdown(study: Study, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page.
-
-    Args:
-        study: The study.
-        figures: Places of its figures, from where the page will be.
-    """
-    parts = [f"# {TITLE}", lead(study), f"Arm: {study.arm}.", *notes(study)]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
-    parts += [f"![]({name})" for name in figures]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    """Return the study as a Markdown page."""
+    return to_page(
+        [TITLE, lead(study), f"Arm: {study.arm}.", *notes(study)],
+        tables(study),
+        study.provenance,
+        figures,
+    )
 
 
 def write_figures(folder: Path, study: Study) -> list[Path]:

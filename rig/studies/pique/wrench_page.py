@@ -10,7 +10,7 @@ from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
 from rig.arm.simulated import CONTACT_SHARE, GRIP_N_M
 from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.pique.wrench import (
@@ -88,16 +88,8 @@ def tables(study: WrenchStudy) -> list[TextTable]:
 
 
 def markdown(study: WrenchStudy, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page.
-
-    Args:
-        study: The study.
-        figures: Places of its figures, from where the page will be.
-    """
-    shown = (to_markdown(table).rstrip() for table in tables(study))
-    parts = [f"# {TITLE}", lead(study), *NOTES, *shown]
-    parts += [f"![]({name})" for name in figures]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    """Return the study as a Markdown page."""
+    return to_page([TITLE, lead(study), *NOTES], tables(study), study.provenance, figures)
 
 
 def write_figures(folder: Path, study: WrenchStudy) -> list[Path]:

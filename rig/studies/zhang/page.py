@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhang.free import (
@@ -117,10 +117,7 @@ def tables(study: ZhangStudy) -> list[TextTable]:
 
 def markdown(study: ZhangStudy, figures: Sequence[str] = ()) -> str:
     """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study), *notes(study)]
-    parts += [f"![{name}]({name})" for name in figures]
-    parts += [to_markdown(table).rstrip() for table in tables(study)]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
+    return to_page([TITLE, lead(study), *notes(study)], tables(study), study.provenance, figures)
 
 
 def _missed(study: ZhangStudy) -> str:

@@ -12,7 +12,7 @@ from rig.grasper.inputs import hold, periodic
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
 from rig.output.figures import bars, over_time, write_svgs
 from rig.output.provenance import Provenance
-from rig.output.table import TextTable, to_markdown
+from rig.output.table import TextTable, to_page
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhao.haptics import LEVEL, Answer
@@ -105,10 +105,8 @@ def markdown(
     study: Study, haptics: Sequence[Sequence[Answer]] = (), figures: Sequence[str] = ()
 ) -> str:
     """Return the study as a Markdown page."""
-    parts = [f"# {TITLE}", lead(study), *notes(study)]
-    parts += [f"![{name}]({name})" for name in figures]
-    parts += [to_markdown(table).rstrip() for table in tables(study, haptics)]
-    return "\n\n".join([*parts, Provenance.now(0).line()]) + "\n"
+    paragraphs = [TITLE, lead(study), *notes(study)]
+    return to_page(paragraphs, tables(study, haptics), Provenance.now(0), figures)
 
 
 def write_figures(

@@ -14,8 +14,6 @@ from rig.grasper.dvrk import TOOLS, dvrk_coupling
 from rig.grasper.three_dof import (
     Drive,
     coupled_grasper,
-    jaw_angles,
-    jaw_torques,
     planetary_grasper,
 )
 from rig.grasper.wrist import CablePath, Planetary
@@ -78,34 +76,6 @@ def test_the_papers_grasper():
     assert grasper.joint_position([0, turn, 0]) == pytest.approx([0, 2 * math.pi, 4 * math.pi])
     # a grasp torque is shared by both jaws, with opposite sign
     assert grasper.actuator_torque([0, 0, 0.33]) == pytest.approx([0, 0.01, -0.01])
-
-
-@given(st.floats(0.5, 1.4), st.floats(-50, 50))
-def test_a_wrong_pulley_ratio_gives_the_residual_coupling_of_equation_5(ratio, motor):
-    path = replace(PATH, d2_m=PATH.d1_m * ratio)
-    grasper = planetary_grasper(path)
-    yaw, pitch, grasp = grasper.joint_position([motor, 0.0, 0.0])
-    alpha = beta = motor / 66
-    assert pitch == pytest.approx(-(path.d2_m * beta - path.d1_m * alpha) / path.d3_m, abs=1e-12)
-    assert grasp == pytest.approx(0.0, abs=1e-12)
-    assert yaw == pytest.approx(alpha + beta)
-    # so a pitch torque is felt at the yaw motor, a grasp torque is not
-    felt = grasper.actuator_torque([[0, 1.0, 0], [0, 0, 1.0]])[:, 0]
-    assert felt == pytest.approx([(1 - ratio) * path.d1_m / path.d3_m / 66, 0.0], abs=1e-12)
-
-
-def test_a_coupled_graspers_jaws_stay_behind_when_it_yaws():
-    grasper = coupled_grasper(0.004, 0.004, Drive(1.0, 0.004))
-    assert grasper.joint_position([0.3, 0, 0]) == pytest.approx([0.3, -0.3, 0])
-    # to yaw with the jaws in line, their motors move along
-    assert grasper.actuator_position([0.3, 0, 0]) == pytest.approx([0.3, 0.3, 0.3])
-
-
-@given(vectors(3), vectors(3))
-def test_jaws_and_joints_carry_the_same_power(angles, torques):
-    by_joint = np.sum(angles[:, 1:] * torques[:, 1:], axis=-1)
-    by_jaw = np.sum(jaw_angles(angles) * jaw_torques(torques), axis=-1)
-    np.testing.assert_allclose(by_joint, by_jaw, rtol=1e-9, atol=1e-8)
 
 
 def test_the_cadiere_forceps_torques_and_the_printed_equation_4():

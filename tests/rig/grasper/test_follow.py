@@ -10,7 +10,7 @@ import pytest
 
 from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy_master.fake import MIDDLE, REACH, open_fake
+from drivers.teensy_master.fake import REACH, open_fake
 from drivers.transport.faulty import Faults
 from rig.bench.firmware import source_hash
 from rig.bench.logger import open_logger
@@ -66,16 +66,6 @@ def remembered(device):
     return counts
 
 
-def test_the_potentiometers_come_in_counts_at_2_khz(potentiometers):
-    names = [channel.name for channel in potentiometers.channels]
-    assert names == ["yaw_count", "pitch_count", "grasp_count"]
-    assert {c.rate_hz for c in potentiometers.channels} == {2000.0}
-    batches = [potentiometers.read(0.1) for _ in range(40)]
-    yaw = np.concatenate([batch.columns["yaw_count"] for batch in batches])
-    assert yaw.max() == pytest.approx(MIDDLE + REACH, abs=2)
-    assert np.abs(np.diff(yaw)).max() <= 1
-
-
 def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potentiometers):
     counts = remembered(potentiometers)
     asked = list(setpoints(potentiometers, CHIEF, HERE, 1.0, scale=0.5))
@@ -84,12 +74,6 @@ def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potent
     assert len(axes) == 2000
     np.testing.assert_allclose(axes[0], HERE)
     np.testing.assert_allclose(axes, HERE + axes_of_joints(0.5 * (joints - joints[0])), atol=1e-12)
-
-
-def test_a_silent_master_is_reported(potentiometers):
-    potentiometers.stop()
-    with pytest.raises(LinkTimeoutError, match="sent nothing"):
-        next(setpoints(potentiometers, CHIEF, HERE, 1.0))
 
 
 def test_three_motors_go_where_the_master_goes(link, capsys):
@@ -176,3 +160,9 @@ def test_what_cannot_be_followed_is_refused(config, url, said, library, tmp_path
     chosen = bench if config == "bench" else load_config(Path(config))
     with pytest.raises(UsageError, match=said):
         following.follow_master(chosen, url, 1.0, 0.2, tmp_path)
+
+
+def test_a_silent_master_is_reported(potentiometers):
+    potentiometers.stop()
+    with pytest.raises(LinkTimeoutError, match="sent nothing"):
+        next(setpoints(potentiometers, CHIEF, HERE, 1.0))

@@ -2,11 +2,10 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from rig.cli.main import main
-from rig.grasper.wrist_plant import Wrist, play_wrist
+from rig.grasper.wrist_plant import Wrist
 
 pytestmark = pytest.mark.integration
 
@@ -42,24 +41,6 @@ def test_a_wrong_pulley_ratio_is_found_from_a_folder_of_recordings(tmp_path):
 
 def test_the_right_pulley_ratio_lacks_nothing(tmp_path):
     assert diagnosed(tmp_path / "right", pulley_ratio=1.0)["findings"] == []
-
-
-def test_the_residual_coupling_is_equation_5():
-    # a carrier angle of a shortens the cable by (d2 - d1) a / 2; the jaw's radius is 2.5 mm
-    expected = -(1.2 - 1.0) * 0.004 / 2 / 0.0025 / 2  # yaw is twice the carrier's angle
-    assert Wrist(1.2).pitch_per_yaw == pytest.approx(expected)
-
-
-def test_a_yaw_alone_turns_the_jaws_of_the_wrong_wrist_along():
-    yaw = 0.5 * np.sin(np.linspace(0.0, 6.0, 4000))
-    asked = np.column_stack([yaw, 0 * yaw, 0 * yaw])
-    for ratio in (1.0, 1.3):
-        wrist = Wrist(ratio)
-        run = play_wrist("yaw", wrist, asked, np.zeros(3), np.random.default_rng(0))
-        slope = np.polyfit(run["yaw_tip_angle_rad"], run["pitch_tip_angle_rad"], 1)[0]
-        assert slope == pytest.approx(wrist.pitch_per_yaw, abs=2e-3)
-        # nothing else moves: the motors of the jaws were not asked to, and grasp stays
-        assert np.abs(run["grasp_tip_angle_rad"]).max() < 0.01
 
 
 def test_designs_are_listed_with_the_most_compact_one(capsys):

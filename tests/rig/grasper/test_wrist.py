@@ -22,11 +22,6 @@ def test_the_path_length_is_that_of_its_straight_lines_and_arcs():
     assert path.length_m() == pytest.approx(math.pi * d)  # a quarter, a half and a quarter turn
 
 
-def test_far_apart_the_cable_is_nearly_straight():
-    path = CablePath(1e-6, 1e-6, 1e-6, 0.01, 0.02, 0.03, 0.04)
-    assert path.length_m() == pytest.approx(0.1, rel=1e-3)
-
-
 @given(angles, angles, ratios)
 def test_equation_5_is_the_difference_of_equations_1_and_4(alpha, beta, ratio):
     d1, d2, d3 = 0.004, 0.004 * ratio, 0.005
@@ -41,13 +36,6 @@ def test_the_rule_decouples_whatever_the_gears(ratio, sun, alpha):
     path = CablePath(0.004, 0.004 * gears.decoupling_pulley_ratio, 0.005, 0.0, 0.1, 0.1)
     beta = alpha / gears.alpha_over_beta
     assert path.shortening_m(alpha, beta) == pytest.approx(0.0, abs=1e-15)
-
-
-@given(ratios, st.floats(-3.0, 0.5))
-def test_willis_equation_holds(ratio, sun):
-    gears = Planetary(ratio, sun)
-    carrier, planet = 1.0, gears.yaw_over_carrier
-    assert (carrier - sun) / (planet - carrier) == pytest.approx(ratio)
 
 
 def test_the_papers_wrist_turns_twice_its_input():
@@ -79,14 +67,6 @@ def test_of_27_designs_the_papers_is_the_most_compact(gear_ratios):
     assert (best.planetary, best.drive) == (Planetary(1.0, 0.0), "carrier")
     rivals = [d for d in found if d is not best and not d.obstacle]
     assert all((d.area, d.extra_stages) > (best.area, best.extra_stages) for d in rivals)
-
-
-def test_a_fixed_sun_cannot_drive():
-    blocked = [d for d in designs() if d.obstacle]
-    assert len(blocked) == 3
-    assert {(d.planetary.sun_over_carrier, d.drive) for d in blocked} == {(0.0, "gear 1")}
-    with pytest.raises(GrasperError, match="None"):
-        most_compact(blocked)
 
 
 @pytest.mark.parametrize(("ratio", "sun"), [(0.0, 0.0), (math.nan, 0.0), (1.0, 1.0)])

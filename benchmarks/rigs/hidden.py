@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.recording import FloatArray
-from rig.simulation.varied.forms import Table
+from rig.simulation.forms import BANK, Table
 
 VARIABLES = (
     "one",
@@ -47,12 +47,7 @@ beyond its spring's, a torque against the spindle, elongation of the cable beyon
 torque against the jaw in front of its sensor, cable wound beyond a round pulley's."""
 
 OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
-MOST = 2
-"""Most effects at once."""
-
-BANK = 40
-"""Most elements side by side of an operator with memory."""
-
+MOST = 2  # Most effects at once
 SHAPES = 4
 TABLE_POINTS = 2048
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.rigs import kernel
+from benchmarks.rigs.faults import Fault
+from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.plant import Plant
 from estimation.recording import FloatArray
-from rig.simulation.varied import kernel
-from rig.simulation.varied.faults import Fault
-from rig.simulation.varied.forms import POINTS, Random, Table, grid
-from rig.simulation.varied.hidden import Hidden
-from rig.simulation.varied.plant import Plant
+from rig.simulation.forms import POINTS, Random, Table, grid
 
 TICK_S = 1e-3
 MARGIN = 0.15

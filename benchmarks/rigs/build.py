@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.rigs import equivalent, kernel, structure
+from benchmarks.rigs.drawn import Drawn, Ranges, ranges_of
+from benchmarks.rigs.faults import Fault
+from benchmarks.rigs.plant import draw_controller, draw_plant, over
+from benchmarks.rigs.protocol import draw_protocol
+from benchmarks.rigs.recipes import RECIPES, STRENGTHS, needs_rest
+from benchmarks.rigs.residual import EQUATIONS
+from benchmarks.rigs.sensors import draw_chain
+from benchmarks.rigs.stage import EPOCH_NS, FIRST, Stage, Switched, UnstableError
+from benchmarks.rigs.strength import Fits, amplitude_for, fits_of, shown
+from benchmarks.rigs.truth import HiddenTruth, Truth
 from estimation.campaign import with_campaign_time
-from rig.simulation.varied import equivalent, kernel, structure
-from rig.simulation.varied.drawn import Drawn, Ranges, ranges_of
-from rig.simulation.varied.faults import Fault
-from rig.simulation.varied.forms import Random
-from rig.simulation.varied.plant import draw_controller, draw_plant, over
-from rig.simulation.varied.protocol import draw_protocol
-from rig.simulation.varied.recipes import RECIPES, STRENGTHS, needs_rest
-from rig.simulation.varied.residual import EQUATIONS
-from rig.simulation.varied.sensors import draw_chain
-from rig.simulation.varied.stage import EPOCH_NS, FIRST, Stage, Switched, UnstableError
-from rig.simulation.varied.strength import Fits, amplitude_for, fits_of, shown
-from rig.simulation.varied.truth import HiddenTruth, Truth
+from rig.simulation.forms import Random
 
 TRIED_RUNS = 5
 DRAWS = 2

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.rigs.plant import Plant, over
 from estimation.recording import FloatArray
 from rig.protocols import trajectory
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
-from rig.simulation.varied.forms import Random
-from rig.simulation.varied.plant import Plant, over
 
 LEAD_S = 0.8
 """Time before a run's first sample in which the load comes and nothing moves."""

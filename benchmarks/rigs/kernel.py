@@ -21,9 +21,10 @@ from typing import Any
 import numba
 import numpy as np
 
+from benchmarks.rigs import hidden
 from rig.simulation import plant as reference
+from rig.simulation.forms import BANK
 from rig.simulation.plant import TICK_S, braking, clip
-from rig.simulation.varied import hidden
 
 (
     MOTOR_ANGLE,
@@ -63,7 +64,7 @@ LOGGED = 8
 P_MOTOR, P_CONSTANT, P_GEAR, P_SPINDLE, P_CABLE, P_JAW, P_PULLEY = range(len(hidden.PLACES))
 TABLE, STOPS, RELAYS, BOUC_WEN, LAGS = range(len(hidden.OPERATORS))
 ACCELERATION_LAG_S = 4e-3
-BANK, POINTS, MOST = hidden.BANK, hidden.TABLE_POINTS, hidden.MOST
+POINTS, MOST = hidden.TABLE_POINTS, hidden.MOST
 
 
 def _fingerprint() -> str:

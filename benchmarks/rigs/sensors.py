@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
+from benchmarks.rigs.plant import Plant, over
 from estimation.recording import FloatArray
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
-from rig.simulation.varied.forms import Random
-from rig.simulation.varied.plant import Plant, over
 
 READINGS = (
     "motor_angle_rad",

@@ -5,10 +5,10 @@ rig, its controller and sensors, the protocol and the form of what is hidden are
 seed, over factors; a form is a random function, so no case repeats another's formula.
 """
 
-from rig.simulation.varied.case import Case, NoCaseError, draw
-from rig.simulation.varied.recipes import KINDS
-from rig.simulation.varied.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
-from rig.simulation.varied.truth import HiddenTruth, Truth
+from benchmarks.rigs.case import Case, NoCaseError, draw
+from benchmarks.rigs.recipes import KINDS
+from benchmarks.rigs.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
+from benchmarks.rigs.truth import HiddenTruth, Truth
 
 __all__ = [
     "CALIBRATE",

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.rigs import kernel, residual
+from benchmarks.rigs.drawn import Drawn
+from benchmarks.rigs.faults import Fault, error_of
+from benchmarks.rigs.hidden import MOST, Hidden, rows_of
+from benchmarks.rigs.plant import Controller, Plant, constants_of
+from benchmarks.rigs.protocol import LEAD_S, Plan, Protocol
+from benchmarks.rigs.residual import Prepared
+from benchmarks.rigs.sensors import READINGS, Chain, noise_of, read
 from estimation.recording import FloatArray, Instrument, Recording
-from rig.simulation.varied import kernel, residual
-from rig.simulation.varied.drawn import Drawn
-from rig.simulation.varied.faults import Fault, error_of
-from rig.simulation.varied.hidden import MOST, Hidden, rows_of
-from rig.simulation.varied.plant import Controller, Plant, constants_of
-from rig.simulation.varied.protocol import LEAD_S, Plan, Protocol
-from rig.simulation.varied.residual import Prepared
-from rig.simulation.varied.sensors import READINGS, Chain, noise_of, read
 
 EPOCH_NS = 1_700_000_000_000_000_000
 RATE_HZ = 1000.0
@@ -112,7 +112,7 @@ class Stage:
         true = {name: moved.true[:, k] for k, name in enumerate(READINGS)}
         found: dict[str, FloatArray] = {}
         for s in faults:
-            assert isinstance(s.drawn.part, Fault)  # noqa: S101 - narrows the type
+            assert isinstance(s.drawn.part, Fault)
             error = error_of(s.drawn.part, s.amplitude, true, FIRST, self.plans[index].start_s)
             found[s.drawn.part.reading] = found.get(s.drawn.part.reading, 0.0) + error
         return found

@@ -4,13 +4,24 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
+from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.plant import Plant, over
 from estimation.recording import FloatArray
-from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
-from rig.simulation.varied.forms import Random, Table, bend, course, falling, grid, rising, smooth
-from rig.simulation.varied.hidden import BANK, Hidden
-from rig.simulation.varied.plant import Plant, over
+from rig.simulation.forms import (
+    BANK,
+    Random,
+    Table,
+    bank,
+    bend,
+    course,
+    falling,
+    grid,
+    power,
+    rising,
+    smooth,
+)
 
-Form = Callable[[FloatArray], FloatArray]
 Drawer = Callable[[Random, Ranges], Table]
 """Draws one factor of an effect over its variable's range."""
 
@@ -23,16 +34,6 @@ def level(plant: Plant, place: str) -> float:
     """Return a tenth of the torque at a place."""
     torque = 0.1 * plant.pull * plant.load_scale
     return torque / plant.ratio if place == "motor" else torque
-
-
-def power(random: Random, low: float, high: float) -> Form:
-    """Return a distorted power of a size on the unit range, with its exponent drawn."""
-    exponent, factor = random.uniform(low, high), bend(random)
-
-    def form(x: FloatArray) -> FloatArray:
-        return np.asarray(x**exponent * np.interp(x, grid(), factor))
-
-    return form
 
 
 def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:
@@ -136,26 +137,6 @@ def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
         WORDS["motor"], "friction.load_viscous", ("velocity", "load"),
         Hidden("motor", "table", tables), level(plant, "motor"),
     )  # fmt: skip
-
-
-def bank(random: Random, reach: float) -> tuple[str, FloatArray, FloatArray]:
-    """Draw an operator with memory of some reach: its kind, reaches and weights.
-
-    Stops side by side (Prandtl-Ishlinskii, Maxwell slip), relays side by side (Preisach) or a loop
-    after Bouc and Wen.
-    """
-    kind = str(random.choice(["stops", "relays", "bouc_wen"]))
-    if kind == "bouc_wen":
-        shape = np.array([reach, random.uniform(1.0, 3.0), random.uniform(0.5, 1.0)])
-        return kind, shape, np.ones(1)
-    count = int(random.integers(3, 12)) if kind == "stops" else BANK
-    weights = random.gamma(random.uniform(0.6, 2.0), size=count)
-    weights /= weights.sum()
-    reaches = reach * np.exp(random.uniform(-1.2, 0.4, count))
-    if kind == "stops":
-        return kind, reaches, weights
-    middle = reach * random.normal(0.0, 0.6, BANK)
-    return kind, np.concatenate([middle + reaches, middle - reaches]), weights
 
 
 def loop(place: str) -> Recipe:

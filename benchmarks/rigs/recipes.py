@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 
-from rig.simulation.varied.broken import BROKEN
-from rig.simulation.varied.drawn import Recipe
-from rig.simulation.varied.drives import DRIVES
-from rig.simulation.varied.forms import Random
-from rig.simulation.varied.frictions import FRICTIONS, WITHIN
-from rig.simulation.varied.outside import OUTSIDE
+from benchmarks.rigs.broken import BROKEN
+from benchmarks.rigs.drawn import Recipe
+from benchmarks.rigs.drives import DRIVES
+from benchmarks.rigs.frictions import FRICTIONS, WITHIN
+from benchmarks.rigs.outside import OUTSIDE
+from rig.simulation.forms import Random
 
 KINDS = ("strong", "weak", "pair", "outside", "some_runs", "confounded", "clean")
 
@@ -19,7 +19,7 @@ STRENGTHS = {
     "some_runs": (2.2, 5.0),
     "confounded": (1.4, 4.0),
 }
-"""Kind to the strength of each of its effects, see `rig.simulation.varied.strength`."""
+"""Kind to the strength of each of its effects, see `benchmarks.rigs.strength`."""
 
 CATALOGUED: Mapping[str, Recipe] = {**FRICTIONS, **DRIVES, **BROKEN}
 RECIPES: Mapping[str, Recipe] = {**CATALOGUED, **WITHIN, **OUTSIDE}

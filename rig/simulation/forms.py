@@ -4,6 +4,7 @@ All are tables over a range of one variable, shape (`POINTS`,); between its poin
 and beyond its ends it stays at its last value.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,26 +13,21 @@ from estimation.recording import FloatArray
 
 POINTS = 129
 WAVES = 24
+BANK = 40  # Most elements side by side of an operator with memory
 
 Random = np.random.Generator
+Form = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A function of one variable.
+    """A function of one variable."""
 
-    Attributes:
-        variable: Name from `rig.simulation.varied.hidden.VARIABLES`.
-        low: First point of the grid.
-        high: Last point.
-        values: Shape (`POINTS`,).
-        periodic: Whether it repeats itself beyond the range; its last value is then its first.
-    """
-
-    variable: str
-    low: float
-    high: float
-    values: FloatArray
+    variable: str  # Name of the variable
+    low: float  # First point of the grid
+    high: float  # Last point
+    values: FloatArray  # Shape (`POINTS`,)
+    # Whether it repeats itself beyond the range; its last value is then its first
     periodic: bool = False
 
     @property
@@ -165,3 +161,33 @@ def course(random: Random, x: FloatArray) -> FloatArray:
     form = kinds[int(random.integers(len(kinds)))]
     form = form * np.interp(x, np.linspace(x[0], x[-1], POINTS), bend(random, 0.25))
     return np.asarray(form / np.max(np.abs(form)))
+
+
+def power(random: Random, low: float, high: float) -> Form:
+    """Return a distorted power of a size on the unit range, with its exponent drawn."""
+    exponent, factor = random.uniform(low, high), bend(random)
+
+    def form(x: FloatArray) -> FloatArray:
+        return np.asarray(x**exponent * np.interp(x, grid(), factor))
+
+    return form
+
+
+def bank(random: Random, reach: float) -> tuple[str, FloatArray, FloatArray]:
+    """Draw an operator with memory of some reach: its kind, reaches and weights.
+
+    Stops side by side (Prandtl-Ishlinskii, Maxwell slip), relays side by side (Preisach) or a loop
+    after Bouc and Wen.
+    """
+    kind = str(random.choice(["stops", "relays", "bouc_wen"]))
+    if kind == "bouc_wen":
+        shape = np.array([reach, random.uniform(1.0, 3.0), random.uniform(0.5, 1.0)])
+        return kind, shape, np.ones(1)
+    count = int(random.integers(3, 12)) if kind == "stops" else BANK
+    weights = random.gamma(random.uniform(0.6, 2.0), size=count)
+    weights /= weights.sum()
+    reaches = reach * np.exp(random.uniform(-1.2, 0.4, count))
+    if kind == "stops":
+        return kind, reaches, weights
+    middle = reach * random.normal(0.0, 0.6, BANK)
+    return kind, np.concatenate([middle + reaches, middle - reaches]), weights

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from rig.simulation.varied.drawn import Drawn, Ranges, Recipe, order_over
-from rig.simulation.varied.faults import Fault
-from rig.simulation.varied.forms import POINTS, Random, Table, course, grid, wave
-from rig.simulation.varied.frictions import power
-from rig.simulation.varied.plant import Plant, over
+from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
+from benchmarks.rigs.faults import Fault
+from benchmarks.rigs.plant import Plant, over
+from rig.simulation.forms import POINTS, Random, Table, course, grid, power, wave
 
 TURN = 2.0 * np.pi
 PLACES = {

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.rigs.sensors import lagged
 from estimation.recording import FloatArray
-from rig.simulation.varied.forms import Table
-from rig.simulation.varied.sensors import lagged
+from rig.simulation.forms import Table
 
 KINDS = ("function", "delay", "lag", "creep")
 
@@ -60,7 +60,7 @@ def error_of(
         parts = zip(fault.weights, fault.times_s, strict=True)
         slow = sum(w * (lagged(own, float(time)) - own) for w, time in parts)
         return np.asarray(amplitude * slow)
-    assert fault.table is not None  # noqa: S101 - narrows the type
+    assert fault.table is not None
     clocks: dict[str, FloatArray] = {"run_time": t, "campaign_time": start_s + t}
     source: FloatArray = clocks[fault.source] if fault.source in clocks else true[fault.source]
     return amplitude * fault.table.at(source)

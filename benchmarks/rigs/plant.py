@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.simulation.forms import Random
 from rig.simulation.plant import TICK_S
-from rig.simulation.varied.forms import Random
 
 USUAL_ACCELERATION_RAD_S2 = 12.0
 USUAL_SPEED_RAD_S = 1.5

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rig.simulation.varied.drawn import Drawn, Ranges, Recipe, order_over
-from rig.simulation.varied.forms import Random, Table, bend, grid, knee, rising, wave
-from rig.simulation.varied.frictions import LOOPS, WORDS, bank, level, power
-from rig.simulation.varied.hidden import Hidden
-from rig.simulation.varied.plant import Plant, over
+from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
+from benchmarks.rigs.frictions import LOOPS, WORDS, level
+from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.plant import Plant, over
+from rig.simulation.forms import Random, Table, bank, bend, grid, knee, power, rising, wave
 
 TURN = 2.0 * np.pi
 BANK_OF_LAGS = 3

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rigs.build import build
+from benchmarks.rigs.recipes import KINDS, recipes_for
+from benchmarks.rigs.seeds import part_of
+from benchmarks.rigs.stage import Stage, Switched
+from benchmarks.rigs.truth import Truth
 from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import RigError, UsageError
 from rig.log.convert import write_recording
-from rig.simulation.varied.build import build
-from rig.simulation.varied.recipes import KINDS, recipes_for
-from rig.simulation.varied.seeds import part_of
-from rig.simulation.varied.stage import Stage, Switched
-from rig.simulation.varied.truth import Truth
 
 ATTEMPTS = 40
 
@@ -96,7 +96,7 @@ def draw(seed: int, kind: str, *, gear_ratio: float | None = None) -> Case:
     """Draw a case; the same seed and kind give the same samples.
 
     Args:
-        seed: Of one of the ranges in `rig.simulation.varied.seeds`.
+        seed: Of one of the ranges in `benchmarks.rigs.seeds`.
         kind: One of `KINDS`.
         gear_ratio: Gear ratio of the rig instead of the drawn one, for a reader whose derived
             channels are made for one ratio.

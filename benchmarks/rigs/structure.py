@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from benchmarks.rigs import residual
+from benchmarks.rigs.hidden import MOST, Hidden
+from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared
+from benchmarks.rigs.stage import FIRST, RATE_HZ, Stage, Switched, signature
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray
-from rig.simulation.varied import residual
-from rig.simulation.varied.hidden import MOST, Hidden
-from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared
-from rig.simulation.varied.stage import FIRST, RATE_HZ, Stage, Switched, signature
 
 Columns = Mapping[str, tuple[FloatArray, ...]]
 """Equation to its true columns, one array (n, effects) a run, filtered, at every sample."""

@@ -4,12 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.rigs import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
+from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 from estimation.recording import Recording
-from rig.errors import UsageError
 from rig.importers.registry import open_campaign
-from rig.simulation.varied import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
-from rig.simulation.varied.plant import draw_plant
-from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared, fit, prepare
 
 pytestmark = pytest.mark.integration
 
@@ -36,20 +34,6 @@ def test_a_seed_and_kind_give_the_same_samples_every_time() -> None:
         assert first.conditions == second.conditions
         for name in first.columns:
             np.testing.assert_array_equal(first[name], second[name])
-
-
-def test_seeds_differ_in_rig_protocol_and_effect() -> None:
-    cases = [case_of("strong", FIRST + k) for k in range(3)]
-    assert len({case.stage.plant.ratio for case in cases}) == 3
-    assert len({case.stage.protocol for case in cases}) == 3
-    assert len({case.truth.effects[0].recipe for case in cases}) == 3
-
-
-def test_rigs_vary_over_factors() -> None:
-    plants = [draw_plant(np.random.default_rng(k)) for k in range(20)]
-    for name in ("ratio", "constant", "gear_stiffness", "cable_stiffness", "motor_inertia"):
-        values = [getattr(plant, name) for plant in plants]
-        assert max(values) > 10.0 * min(values), name
 
 
 @pytest.mark.parametrize(("kind", "low", "high"), [("strong", 2.2, 5.0), ("weak", 1.25, 1.9)])
@@ -96,11 +80,6 @@ def test_an_effect_of_some_runs_is_in_these_alone() -> None:
         assert same != (k in there)
 
 
-def test_a_pair_holds_two_families() -> None:
-    first, second = case_of("pair").truth.effects
-    assert first.family != second.family
-
-
 def test_a_confounded_case_states_the_families_that_cannot_be_separated() -> None:
     truth = case_of("confounded").truth
     assert len(truth.together) >= 2
@@ -139,14 +118,3 @@ def test_ranges_of_seeds_are_apart() -> None:
         assert not any(seed in other for seed in (one[0], one[-1]))
         assert not any(seed in one for seed in (other[0], other[-1]))
     assert [part_of(r[0]) for r in (CALIBRATE, DEVELOP, JUDGE)] == ["calibrate", "develop", "judge"]
-
-
-def test_a_seed_of_no_range_and_an_unknown_kind_are_refused() -> None:
-    with pytest.raises(UsageError):
-        draw(-1, "strong")
-    with pytest.raises(UsageError):
-        draw(FIRST, "huge")
-
-
-def test_a_given_gear_ratio_is_kept() -> None:
-    assert draw(FIRST, "clean", gear_ratio=35.0).stage.plant.ratio == 35.0

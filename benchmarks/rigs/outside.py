@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rig.simulation.varied.drawn import Drawn, Ranges, Recipe
-from rig.simulation.varied.forms import Random, Table, falling, grid, smooth, spots
-from rig.simulation.varied.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
-from rig.simulation.varied.hidden import Hidden
-from rig.simulation.varied.plant import Plant
+from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
+from benchmarks.rigs.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
+from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.plant import Plant
+from rig.simulation.forms import Random, Table, falling, grid, smooth, spots
 
 UNKNOWN = "unknown"
 

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from benchmarks.rigs import residual
+from benchmarks.rigs.residual import EQUATIONS, GEARBOX, Fitted, Prepared
 from estimation.derived import zero_phase_channels
 from estimation.effects import Remembering
 from estimation.model import Term
 from estimation.recording import FloatArray, Recording
 from rig.simulation.reference_roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, candidates
-from rig.simulation.varied import residual
-from rig.simulation.varied.residual import EQUATIONS, GEARBOX, Fitted, Prepared
 
 POINTS = 25
 """Most points of a family's shapes that are tried."""

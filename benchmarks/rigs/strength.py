@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.simulation.varied import residual
-from rig.simulation.varied.faults import Fault
-from rig.simulation.varied.hidden import Hidden
-from rig.simulation.varied.residual import EQUATIONS, Fitted, Prepared
-from rig.simulation.varied.stage import Stage, Switched, UnstableError
+from benchmarks.rigs import residual
+from benchmarks.rigs.faults import Fault
+from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared
+from benchmarks.rigs.stage import Stage, Switched, UnstableError
 
 SHOWN = {
     "motor": ("motor",),

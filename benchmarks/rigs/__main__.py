@@ -1,4 +1,4 @@
-"""Draw a case to a folder: `python -m rig.simulation.varied --seed 5 --kind strong --out DIR`.
+"""Draw a case to a folder: `python -m benchmarks.rigs --seed 5 --kind strong --out DIR`.
 
 The logs go to DIR/runs and the answer to DIR/answer.json, so that DIR/runs can be diagnosed blind.
 """
@@ -8,14 +8,14 @@ import json
 import sys
 from pathlib import Path
 
+from benchmarks.rigs import KINDS, draw
 from estimation.files import write_text_atomic
 from rig.errors import RigError
-from rig.simulation.varied import KINDS, draw
 
 
 def main() -> int:
     """Draw the case that the command line names."""
-    parser = argparse.ArgumentParser(prog="python -m rig.simulation.varied", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.rigs", description=__doc__)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--kind", choices=KINDS, required=True)
     parser.add_argument("--out", type=Path, required=True, help="Folder; made if missing.")
