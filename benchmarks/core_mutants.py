@@ -54,7 +54,7 @@ RULES = (
 EQUIVALENT = {
     "std::uint32_t sequence_ = 0;": "a board sends samples from a start on, which sets it to 0",
     "return {{0, 0, 0, 0, kFullScaleE4}": "of a board's own gains only the largest command is read",
-    "std::int64_t far_ticks_ = 0;": "the first target is within the window, so the first tick sets it to 0",
+    "std::int64_t far_ticks_ = 0;": "the first target is within its window, so a tick sets it to 0",
 }
 """Beginnings of lines whose change no input can show, and why."""
 _STATEMENT = re.compile(r"\s+[\w.\[\]>()*-]+(\s*[-+*|&]?=\s|\(|\+\+|--).*;(\s*//.*)?")

@@ -11,7 +11,7 @@ IMPORT = re.compile(r"^\s*(?:from|import) (drivers\.\S+)(?: import (.+))?", re.M
 
 
 def test_no_driver_imports_a_fake() -> None:
-    assert len(FAKES) > 4
+    assert "fake" in FAKES
     for path in ROOM.rglob("*.py"):
         if path.stem not in FAKES:
             for module, names in IMPORT.findall(path.read_text()):
