@@ -239,7 +239,7 @@ def _in_readings(
     replaces = np.zeros(len(candidates), dtype=np.bool_)
     for name, change in outcome.changes.items():
         channel = joint.largest_linear[name][1]
-        other = np.array([channel not in one.cause.reads for one in candidates])
+        other = np.array([not {*one.cause.reads} <= {channel} for one in candidates])
         unit = np.where(other, np.maximum(1.0, np.maximum(change, 1e-3) ** -2.0), 1.0)
         for family in outcome.errors:
             family[name, "within"][:] *= unit

@@ -73,6 +73,22 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
 
 
+def test_an_angle_that_follows_the_load_is_not_taken_for_a_cause() -> None:
+    runs = recordings(spring=True)
+    assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
+
+
+def test_a_test_run_decides_itself_where_the_training_runs_do_not() -> None:
+    plain, rippled = recordings(), recordings(_rippled)
+    having = (1, 2, 5, 6, 7, 10)
+    runs = [rippled[k] if k in having else plain[k] for k in range(12)]
+    answer = diagnose(runs, [motor()], split(runs))
+    (finding,) = answer.findings
+    assert finding.family == "ripple.motor"
+    assert {*finding.runs_affected} == {f"{k:02d}" for k in having}
+    assert any("these test runs themselves" in note for note in answer.notes)
+
+
 def test_the_test_runs_do_not_reach_the_choice(found: Found) -> None:
     runs = recordings(_rippled)
     held_out = set(split(runs).confirm)
