@@ -88,7 +88,7 @@ class RecordedRuns(StandardReadable, Triggerable):
         self._thread = ThreadPoolExecutor(1)  # a session is read by one thread
         with self.add_children_as_readables():
             self.run = soft_signal_rw(int, 0)
-            self.log, self._set_log = soft_signal_r_and_setter(str)
+            self.log_path, self._set_log_path = soft_signal_r_and_setter(str)
             self.samples, self._set_samples = soft_signal_r_and_setter(int)
             self.lost, self._set_lost = soft_signal_r_and_setter(int)
             self.remark, self._set_remark = soft_signal_r_and_setter(str)
@@ -114,7 +114,7 @@ class RecordedRuns(StandardReadable, Triggerable):
         except asyncio.CancelledError:
             self._closing.set()
             raise
-        self._set_log(str(result.path))
+        self._set_log_path(str(result.path))
         self._set_samples(result.samples)
         self._set_lost(result.lost)
         self._set_remark(result.remark)

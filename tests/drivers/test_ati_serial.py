@@ -1,7 +1,5 @@
 """The digital F/T: messages as published, its calibration put in force, its stream."""
 
-import struct
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +9,6 @@ from drivers import modbus
 from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
-from drivers.ati_serial.fake_modbus import ModbusServer
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.transport.faulty import FaultyTransport, once
 from drivers.transport.simulated import SimulatedTransport
@@ -76,34 +73,6 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     assert np.allclose(got, expected)
     device.close()
     assert not fake.server.streaming
-
-
-def test_a_calibration_laid_out_by_hand_is_read_through_another_makers_server() -> None:
-    """Source: the public driver `ati_force_torque`: offsets in registers, high byte first."""
-    matrix = np.arange(36, dtype=np.float32).reshape(6, 6) * 10 - 100
-    block = bytearray(protocol.encode_calibration(example_calibration()))
-    for offset, data in (
-        (0, b"FT12345\0"),
-        (4, b"SI-130-10".ljust(32, b"\0")),
-        (32, struct.pack(">36f", *matrix.ravel())),
-        (104, bytes([2, 3])),
-        (117, struct.pack(">I", 1_000_000)),
-        (119, struct.pack(">I", 500_000)),
-        (121, struct.pack(">6H", 540, 541, 542, 543, 544, 545)),
-        (127, struct.pack(">6H", 34920, 34921, 34922, 34923, 34924, 34925)),
-    ):
-        block[2 * offset : 2 * offset + len(data)] = data
-    fake = AtiSerialFake()
-    fake.server = ModbusServer(0x00E3, bytes(block))
-    device = AtiSerial(SimulatedTransport(fake))
-    identity = device.identify()
-    assert (identity.model, identity.serial) == ("ATI digital F/T SI-130-10", "FT12345")
-    sums = np.abs(matrix).sum(axis=1) * 32768
-    tops = [channel.upper for channel in device.channels]
-    assert tops == pytest.approx([*sums[:3] / 1e6, *sums[3:] / 5e5])
-    device.start()
-    expected = (540, 541, 542, 543, 544, 545, 34920, 34921, 34922, 34923, 34924, 34925)
-    assert tuple(fake.server.registers(0, 12)) == expected
 
 
 def test_a_stream_left_on_by_another_program_is_ended_first() -> None:

@@ -57,7 +57,7 @@ def test_a_scan_records_a_run_a_point_and_names_its_log(engine, rig):
     events = [doc["data"] for kind, doc in seen if kind == "event"]
     assert [event["rig-run"] for event in events] == [2, 0]
     for event in events:
-        log = read_log(Path(event["rig-log"]))
+        log = read_log(Path(event["rig-log_path"]))
         assert log.run.name == rig.names[event["rig-run"]]
         assert log.end.clean
         assert (event["rig-samples"], event["rig-lost"], event["rig-remark"]) == (1000, 0, "")
