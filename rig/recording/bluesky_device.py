@@ -53,7 +53,7 @@ class RecordedRuns(StandardReadable, Triggerable):
         folder: Folder of the logs.
         names: Names of the runs, in the order of their numbers.
         run: Signal: number of the run that the next trigger records.
-        log: Signal: path of the log of the last one.
+        log_path: Signal: path of the log of the last one.
         samples, lost: Signals: samples recorded, and lost on the way from the logger.
         remark: Signal: what was not as planned; empty where all was.
     """
