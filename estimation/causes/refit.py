@@ -6,7 +6,7 @@ runs. Shapes stay as they were found. Fits and errors count the samples that the
 standstill friction takes any value.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -147,9 +147,10 @@ class Refit:
             return None
         return known[0].whole[channel][known[1]]
 
-    def errors(self, solved: Solved) -> Errors:
-        """Return the errors on the test runs."""
-        found = [(name, self.residuals(solved, name)) for name in self.test_names]
+    def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
+        """Return the errors on the test runs, or on some of them."""
+        names = [name for name in self.test_names if name not in without]
+        found = [(name, self.residuals(solved, name)) for name in names]
         left = {name: one[1] for name, one in found if one is not None}
         return Errors(
             {name: float(np.sum((e - e.mean()) ** 2)) for name, e in left.items()},

@@ -28,6 +28,10 @@ class Refits:
         recordings: The runs, with the campaign's time.
         sealed: Which runs train and which test.
         numbers: What decides.
+
+    Attributes:
+        open: Test runs not counted in errors: a cause that begins at one time of the campaign may
+            have begun before them or after.
     """
 
     def __init__(
@@ -39,6 +43,7 @@ class Refits:
             for name, e in layout.equations.items()
         }
         self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
+        self.open: set[str] = set()
 
     def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> None:
         """Add a cause to every equation it enters.
@@ -63,7 +68,7 @@ class Refits:
 
     def test_errors(self, name: str) -> Errors:
         """Return an equation's errors on the test runs with the causes so far."""
-        return self.of[name].errors(self.after(name))
+        return self.of[name].errors(self.after(name), self.open)
 
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""
@@ -74,7 +79,7 @@ class Refits:
         out = {}
         for name, refit in self.of.items():
             solved = (self.before(name), self.after(name))
-            old, new = (refit.errors(s) for s in solved)
+            old, new = (refit.errors(s, self.open) for s in solved)
             out[name] = Error(
                 before=old.rmse,
                 after=new.rmse,

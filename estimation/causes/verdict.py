@@ -193,9 +193,12 @@ def _judged(
         earlier = [k.scored.candidate for k in kept]
         acts_in, settled = held_out.acts_in(earlier, one.scored.candidate)
         if settled:
+            counted = one.scored.candidate.acts is not None
+            refits.open |= set() if counted else {*settled}
             notes.append(
                 f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
-                " there; these test runs themselves do."
+                " there; "
+                + ("these test runs themselves do." if counted else "not counted in the errors.")
             )
         home = cause.place.home
         entered = dict.fromkeys(e.equation for e in cause.place.enters)

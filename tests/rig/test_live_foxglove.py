@@ -40,9 +40,11 @@ async def first_sample(server):
     for k in range(2000):  # the server takes the subscription in its own time
         server.send(block(0.05 * k))
         await asyncio.sleep(0.01)
-        for message in messages:
+        for message in list(messages):
             if isinstance(message, bytes):
                 link.close()
+                while messages[-1] is not None:  # the connection is closed in its own time
+                    await asyncio.sleep(0.01)
                 return json.loads(message[13:])
             for channel in json.loads(message).get("channels", ()):
                 if channel["topic"] == "/rig/sample" and not is_subscribed:

@@ -1,17 +1,22 @@
 """What is written is read back, by us and by two independent readers."""
 
+import io
+import signal
+
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from estimation.recording import Flag, Mark, Stretch
 from rig.errors import DataError, UsageError
+from rig.log.container import Container
 from rig.log.messages import UnflaggedSampleError
 from rig.log.reader import DamagedLogError, read_log
 from rig.log.run import RunEnd, RunInfo
-from rig.log.scan import NotALogError
+from rig.log.scan import NotALogError, scan
 from rig.log.schema import Field, Stream
 from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import FLUSH_AFTER_S, MAX_LOSS_S, LogExistsError, LogWriteError, LogWriter
@@ -264,3 +269,28 @@ def test_a_log_being_written_is_refused_unless_asked_for(tmp_path):
         with pytest.raises(DamagedLogError, match="not finished") as caught:
             read_log(writer.part)
         assert f"rig log repair {writer.part}" in caught.value.fix
+
+
+def test_a_signal_while_bytes_are_written_does_not_spoil_the_checksum(tmp_path):
+    class Signalled(io.FileIO):
+        comes = False
+
+        def write(self, data):
+            size = super().write(data)
+            if self.comes:
+                signal.raise_signal(signal.SIGINT)
+            return size
+
+    path = tmp_path / "a.mcap"
+    with Signalled(path, "w") as file:
+        container = Container(file, "rig test")
+        file.comes = True
+        with pytest.raises(KeyboardInterrupt):
+            container.add_metadata("note", {"a": "b"})
+        file.comes = False
+        container.finish()
+    with path.open("rb") as file:
+        assert make_reader(file, validate_crcs=True).get_summary() is not None
+        file.seek(0)
+        list(StreamReader(file, validate_crcs=True).records)
+    assert not scan(path.read_bytes(), path).damage
