@@ -271,6 +271,17 @@ def test_a_log_being_written_is_refused_unless_asked_for(tmp_path):
         assert f"rig log repair {writer.part}" in caught.value.fix
 
 
+@pytest.fixture
+def terminated():
+    def handler(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, handler)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.usefixtures("terminated")
 def test_a_signal_while_bytes_are_written_does_not_spoil_the_checksum(tmp_path):
     class Signalled(io.FileIO):
         comes = False
@@ -278,7 +289,7 @@ def test_a_signal_while_bytes_are_written_does_not_spoil_the_checksum(tmp_path):
         def write(self, data):
             size = super().write(data)
             if self.comes:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(signal.SIGTERM)
             return size
 
     path = tmp_path / "a.mcap"
