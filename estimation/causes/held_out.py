@@ -41,9 +41,11 @@ class HeldOut:
         change at one time of the campaign may be before it or after it. The cause acts in it if it
         lowers the error there, next to the causes before it.
         """
-        known, gains = self._known(cause), self._gains(before, cause)
+        known = self._known(cause)
+        is_open = [name for name, acts in known.items() if acts is None]
+        gains = self._gains(before, cause) if is_open else {}
         acts = {name: gains[name] > 0.0 if x is None else x for name, x in known.items()}
-        return acts, [name for name, x in known.items() if x is None]
+        return acts, is_open
 
     def _known(self, candidate: Candidate) -> Mapping[str, bool | None]:
         """Return whether a cause acts in each run; None where the training runs do not decide."""
