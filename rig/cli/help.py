@@ -27,7 +27,7 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("campaigns", "import", "log", "replay"),
+    "Recordings": ("campaigns", "import", "log", "replay", "view"),
     "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
     "Papers": ("study",),
 }

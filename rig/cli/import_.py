@@ -61,9 +61,7 @@ def import_(
     preview: Annotated[
         bool, typer.Option("--preview", help="Show what would be imported; write no recording.")
     ] = False,
-    plots: Annotated[
-        Path | None, typer.Option(help="Plots of every channel: an .html or .png file.")
-    ] = None,
+    plots: Annotated[Path | None, typer.Option(help="Page of every channel (HTML).")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder of the recordings, one log a run.")
     ] = None,
@@ -163,13 +161,12 @@ def _write(recordings: "list[Recording]", out: Path) -> list[Path]:
 
 
 def _draw(recordings: "list[Recording]", plots: Path) -> None:
-    from rig.errors import UsageError
-    from rig.reports.table_plots import write_page, write_picture
+    from estimation.campaign import Campaign
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
+    from rig.reports.recordings import page
 
-    writers = {".html": write_page, ".png": write_picture}
-    if plots.suffix.lower() not in writers:
-        raise UsageError(f"{plots} is neither .html nor .png.", fix="Choose one of the endings.")
-    writers[plots.suffix.lower()](recordings, plots)
+    write_report(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
 
 
 def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:

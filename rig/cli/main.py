@@ -38,6 +38,7 @@ from rig.cli.reference import reference
 from rig.cli.replay import replay
 from rig.cli.stop import stop
 from rig.cli.study import study_app
+from rig.cli.view import view
 
 # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -59,6 +60,7 @@ app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
+app.command()(view)
 app.command()(grip)
 app.command()(fit)
 app.command()(adapt)

@@ -121,17 +121,10 @@ def _core(log: Path, config: Path | None, json: bool) -> int:
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
     """Return the named run, or the first valid one, and print its name."""
-    from rig.errors import DataError, UsageError
+    from rig.cli.view import chosen_runs
 
-    if not len(campaign):
-        raise DataError("The log holds no runs.", "There is nothing to show.")
-    if name is not None and name not in campaign.names:
-        raise UsageError(
-            f"The log has no run {name!r}.",
-            f"It has: {', '.join(campaign.names)}.",
-            f"Type --run {campaign.names[0]}",
-        )
-    runs = campaign.select([name]).runs if name else (campaign.evidence.runs or campaign.runs)
+    chosen = chosen_runs(campaign, [name] if name else [])
+    runs = chosen.runs if name else (chosen.evidence.runs or chosen.runs)
     recording = runs[0].recording()
     if not quiet:
         _tell(campaign, recording, chosen=name is not None)
