@@ -89,7 +89,7 @@ def diagnose(
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
         model_file.write_all(written_models(done), model_out)
-        written.append(f"Model: {model_out}")
+        written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
     if page_file is not None:
         write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
         written.append(f"Report: {page_file}")

@@ -28,7 +28,17 @@ GROUPS = {
         "grasper",
     ),
     "Recordings": ("campaigns", "import", "log", "replay", "view"),
-    "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
+    "Models": (
+        "fit",
+        "diagnose",
+        "model",
+        "diff",
+        "loop",
+        "effects",
+        "adapt",
+        "estimator",
+        "export",
+    ),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

@@ -93,7 +93,7 @@ def import_(
     if not recordings:
         raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
     found = look(recordings, said)
-    written = [] if preview or out is None else _write(recordings, out)
+    written = [] if preview or out is None else write_logs(recordings, out)
     if plots is not None:
         _draw(recordings, plots)
     if json:
@@ -142,7 +142,7 @@ def _rule(name: str, value: str) -> Any:
     return value
 
 
-def _write(recordings: "list[Recording]", out: Path) -> list[Path]:
+def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
     """Write the runs as logs, all or none."""
     from rig.errors import UsageError
     from rig.importers.derivatives import checked

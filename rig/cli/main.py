@@ -33,6 +33,7 @@ from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
 from rig.cli.machine import machine_app
+from rig.cli.model import model_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
@@ -64,6 +65,7 @@ app.command()(view)
 app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
+app.add_typer(model_app, name="model")
 app.command()(export)
 app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")

@@ -21,7 +21,10 @@ def replay(
     run: Annotated[
         str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="Model file of the live estimate.")] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
+    ] = None,
     speed: Annotated[
         float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
@@ -55,6 +58,7 @@ def replay(
     """
     if core:
         return _core(log, config, json_)
+    from rig.configuration.model_in_use import model_in_use
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
@@ -72,7 +76,10 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
-    estimators = _estimators(model, recording, any_instrument) if model else []
+    path = model or model_in_use(recording.rig)
+    if path is not None and path != model and not json_:
+        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
+    estimators = _estimators(path, recording, any_instrument) if path else []
     usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(
         title=f"rig replay {recording.name}",

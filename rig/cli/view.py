@@ -1,5 +1,6 @@
 """`rig view`: recordings as one page in a browser."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,7 +8,7 @@ import typer
 
 from rig.cli.machine_option import MachineOption
 from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -23,6 +24,10 @@ def view(
     ],
     run: Annotated[
         list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
     ] = None,
     machine: MachineOption = None,
     format_: Annotated[
@@ -51,7 +56,7 @@ def view(
 
     whole = open_recordings(path, machine, format_)
     say_left_out(path, whole)
-    campaign = chosen_runs(whole, run or [])
+    campaign = with_model(chosen_runs(whole, run or []), model)
     name = path.resolve().name
     target = out or Path(f"{name}.view.html")
     write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
@@ -83,3 +88,38 @@ def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
                 f"Type --run {campaign.names[0]}",
             )
     return campaign.select(names) if names else campaign
+
+
+def with_model(campaign: "Campaign", model: Path | None) -> "Campaign":
+    """Return a campaign whose recordings have a model's estimate.
+
+    Args:
+        campaign: The runs.
+        model: Model file; None for the model in use for each recording's rig, where there is one
+            and it can estimate that recording.
+
+    Raises:
+        EstimationError: The named model cannot estimate a recording.
+    """
+    from dataclasses import replace
+
+    from estimation.campaign import Campaign, Run
+    from estimation.errors import EstimationError
+    from estimation.recording import Recording
+    from rig.configuration.model_in_use import model_in_use
+    from rig.live.estimator import with_estimates
+
+    def load(run: Run) -> Recording:
+        recording = run.load()
+        path = model or model_in_use(recording.rig)
+        if path is None:
+            return recording
+        try:
+            return with_estimates(recording, path)
+        except EstimationError as error:
+            if model is not None:
+                raise
+            remarks().print(f"{run.name} is without an estimate of {path.name}: {error.what}")
+            return recording
+
+    return Campaign(tuple(replace(run, load=partial(load, run)) for run in campaign.runs))

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from estimation.channels import ESTIMATED
 from estimation.recording import Flag, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
@@ -16,8 +17,6 @@ HELP = "space pause  + faster  - slower  f skip 5 s  q quits"
 SKIP_S = 5.0
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 """A shorter wait is none; keys are read at least as often as the longer one."""
-ESTIMATED = "estimated_"
-"""A column so prefixed holds the estimate that was made while recording."""
 
 
 class EstimateStream(Protocol):

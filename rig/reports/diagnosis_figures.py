@@ -185,7 +185,9 @@ def _signals(run: RunTrace, scale: float, unit: str) -> list[Line]:
     names = {"measured": "measured", "before": "declared model", "after": "with the findings"}
     left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in SIDES}
     time_s = thinned(run.time_s)
-    lines = [line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)]
+    lines: list[Line] = [
+        line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)
+    ]
     for side in SIDES:
         values = thinned(measured - left[side])
         lines.append(line(time_s, values, names[side], {"role": side}, unit))

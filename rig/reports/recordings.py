@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.channels import unit_of
+from estimation.channels import ESTIMATED, unit_of
 from estimation.recording import FloatArray, Recording
-from rig.live.replay import ESTIMATED
 from rig.output.charts import Chart, axis, embedded, line, scripts, thinned, words
 from rig.output.provenance import Provenance
 from rig.output.render import render
