@@ -53,6 +53,7 @@ def diagnose(
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from estimation.files import check_output, write_text_atomic
+    from rig.diagnosis.durations import default_durations, measured, work_of
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
@@ -73,7 +74,8 @@ def diagnose(
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        with stages() as on_stage:
+        times, work = default_durations(), work_of(asked, quick)
+        with stages(times.expected(*work)) as shown, measured(shown) as (on_stage, seconds):
             done = run_diagnosis(
                 asked.campaign,
                 asked.models,
@@ -83,6 +85,7 @@ def diagnose(
                 quick=quick,
                 on_stage=on_stage,
             )
+    times.add(*work, seconds)
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []

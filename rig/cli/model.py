@@ -129,7 +129,9 @@ def _described(path: Path) -> str:
 
 def _name(settings: "Config") -> str:
     path = settings.model_path
-    return "no model" if path is None else path.name.removesuffix(path.suffix)
+    return (
+        "no model" if path is None else path.name.removesuffix(path.suffix).removesuffix(".model")
+    )
 
 
 def _by_name() -> dict[str, Path]:
