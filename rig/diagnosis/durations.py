@@ -49,6 +49,8 @@ class Durations:
 
     def add(self, kind: str, size: float, seconds: Mapping[str, float]) -> None:
         """Add the times of a diagnosis; a folder that cannot be written costs no diagnosis."""
+        if not size:  # recordings in memory
+            return
         line = json.dumps({"kind": kind, "size": size, "seconds": dict(seconds)})
         with suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -38,6 +38,8 @@ def test_the_time_left_follows_the_amount_of_data_and_shrinks(known):
 def test_a_stage_that_was_not_there_before_and_a_damaged_file_state_nothing(known):
     known.add("motor .mcap", 1e6, {"reading": 1.0})
     assert time_left(known.expected("motor .mcap", 1e6), "fitting the links", 0.0) == ""
+    known.add("motor .mcap", 0.0, {"reading": 1.0})  # recordings without files
+    assert known.expected("motor .mcap", 0.0) == {"reading": (0.0, 0.0)}
     known.path.write_text("no json\n")
     assert known.expected("motor .mcap", 1e6) == {}
 
