@@ -53,7 +53,8 @@ def replay(
 
     Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130. In a terminal, keys:
-    space pauses, + and - change the speed, f skips 5 s, q quits. With --core nothing is
+    space pauses, + and - change the speed, f skips 5 s, c shows the next channel, ? explains the
+    keys, q quits. With --core nothing is
     shown: the exit code is 1 when a sample is not the same, bit for bit.
     """
     if core:
@@ -62,10 +63,10 @@ def replay(
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
-    from rig.live.keys import pressed_keys
+    from rig.live.keys import DisplayKeys, in_a_line, in_a_list, pressed_keys
     from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
-    from rig.live.replay import HELP, Pace, replay_blocks
+    from rig.live.replay import OF_REPLAY, Pace, replay_blocks
     from rig.live.run import show
     from rig.live.watching import watched
     from rig.machines.recordings import open_recordings
@@ -90,14 +91,17 @@ def replay(
         json=json_,
     )
     models = [estimator.model for estimator in estimators if estimator.model is not None]
-    with pressed_keys() as keys:
+    with pressed_keys() as pressed:
+        keys = DisplayKeys(pressed) if pressed else None
         pace = Pace(speed or None, keys) if keys else None
         blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None, pace=pace))
         if estimators:
             blocks = with_model_status(blocks, estimators)
         if len(models) == 1:
             blocks = watched(blocks, models[0])
-        options = replace(options, footer=HELP if keys else options.footer)
+        if keys:
+            shown = in_a_line(OF_REPLAY), in_a_list(OF_REPLAY)
+            options = replace(options, footer=shown[0], help=shown[1], keys=keys)
         summary = show(blocks, options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
