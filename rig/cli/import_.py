@@ -170,7 +170,7 @@ def _draw(recordings: "list[Recording]", plots: Path) -> None:
 
 
 def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:
-    from rig.output.table import TextTable, to_rich
+    from rig.output.table import TextTable, listed, to_rich
 
     screen = results(json)
     runs = [
@@ -180,10 +180,7 @@ def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", j
             f"{run.duration_s:.4g}",
             f"{run.rate_hz:.6g}" if run.rate_hz else "-",
             str(run.flagged),
-            ", ".join(
-                f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}"
-                for k, v in run.conditions.items()
-            ),
+            listed(run.conditions),
         )
         for run in found.runs[:MOST_RUNS]
     ]

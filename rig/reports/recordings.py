@@ -11,7 +11,7 @@ from estimation.recording import FloatArray, Recording
 from rig.output.charts import Chart, axis, embedded, line, scripts, thinned, words
 from rig.output.provenance import Provenance
 from rig.output.render import render
-from rig.output.table import TextTable
+from rig.output.table import TextTable, listed
 from rig.reports.diagnosis_words import display
 
 NUMBERS = 400_000
@@ -113,10 +113,7 @@ def _row(run: Recording) -> list[str]:
         f"{run.duration_s:.4g}",
         f"{run.sample_rate_hz:.4g}" if len(run) > 1 else "",
         str(int((run.flags != 0).sum())),
-        ", ".join(
-            f"{name} = {value if isinstance(value, str) else format(value, 'g')}"
-            for name, value in run.conditions.items()
-        ),
+        listed(run.conditions),
         ", ".join(f"{mark.text} at {mark.time_s:g} s" for mark in run.marks),
         " ".join(filter(None, (run.notes, run.excluded and f"Left out: {run.excluded}"))),
     ]
