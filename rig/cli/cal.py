@@ -154,9 +154,9 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
     }
     shown = _in_words(a), _in_words(b)
     for name in dict.fromkeys((*shown[0], *shown[1])):
-        first, second = (one.get(name) for one in shown)
-        if first != second:
-            results(json).print(f"{name}: {first} -> {second}", markup=False)
+        before, after = (one.get(name) for one in shown)
+        if before != after:
+            results(json).print(f"{name}: {before} -> {after}", markup=False)
     if not changes:
         results(json).print("The two are the same record.")
     if json:
@@ -307,8 +307,8 @@ def _in_words(record: "CalibrationRecord") -> dict[str, Any]:
     from rig.calibrate.shown import parameter_texts
 
     known = {k: v for k, v in _flat(record).items() if not k.startswith("fit.")}
-    known["kind"] = f"{record.kind} ({record.fit.form})"
-    return known | parameter_texts(record) | {"residual rms": record.fit.residual_rms}
+    fit = {"form": record.fit.form, "residual rms": record.fit.residual_rms}
+    return known | parameter_texts(record) | fit
 
 
 def _flat(record: "CalibrationRecord") -> dict[str, Any]:

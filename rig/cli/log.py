@@ -36,9 +36,10 @@ def info(path: AnyRecording, json: JsonFlag = False) -> None:
     Of recordings of another format: a line for each run.
     """
     from rig.cli.log_runs import is_of_another_format, show_runs
+    from rig.log.check import logs_in
     from rig.log.reader import read_log
 
-    if is_of_another_format(path):
+    if is_of_another_format(path) or (path.is_dir() and not logs_in(path)):
         show_runs(path, json)
         return
     found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
