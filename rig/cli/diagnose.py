@@ -64,6 +64,7 @@ def diagnose(
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from estimation.files import check_output, write_text_atomic
+    from rig.diagnosis.durations import default_durations, measured, work_of
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
@@ -84,7 +85,8 @@ def diagnose(
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        with stages() as on_stage:
+        times, work = default_durations(), work_of(asked, quick)
+        with stages(times.expected(*work)) as shown, measured(shown) as (on_stage, seconds):
             done = run_diagnosis(
                 asked.campaign,
                 asked.models,
@@ -94,13 +96,14 @@ def diagnose(
                 quick=quick,
                 on_stage=on_stage,
             )
+    times.add(*work, seconds)
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
         model_file.write_all(written_models(done), model_out)
-        written.append(f"Model: {model_out}")
+        written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
     if page_file is not None:
         write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
