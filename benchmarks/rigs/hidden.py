@@ -48,7 +48,6 @@ torque against the jaw in front of its sensor, cable wound beyond a round pulley
 
 OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
 MOST = 2  # Most effects at once
-SHAPES = 4
 TABLE_POINTS = 2048
 
 
