@@ -7,10 +7,10 @@ import numpy as np
 
 from benchmarks.rigs import kernel
 from benchmarks.rigs.faults import Fault
-from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant
 from estimation.recording import FloatArray
-from rig.simulation.forms import POINTS, Random, Table, grid
+from rig.simulation.forms import POINTS, Random, grid
 
 TICK_S = 1e-3
 MARGIN = 0.15
