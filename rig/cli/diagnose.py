@@ -42,12 +42,23 @@ def diagnose(
     ledger: Annotated[
         Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
+    plan: Annotated[
+        bool,
+        typer.Option(
+            "--plan",
+            help="PATH is a protocol or recordings: which effects such runs can distinguish.",
+        ),
+    ] = False,
     skip_bad: SkipBad = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
+    if plan:
+        _plan(path, model, balance, machine, json_)
+        return
+
     import json
 
     from estimation import model_file
@@ -108,3 +119,24 @@ def diagnose(
         screen.print(line, markup=False)
     if json_:
         emit_json(done.diagnosis.to_json())
+
+
+def _plan(
+    path: Path, model: Path | None, balance: str | None, machine: Path | None, json_: bool
+) -> None:
+    """Show what runs of a protocol can distinguish."""
+    from rig.diagnosis.plan import plan_of, sentences
+    from rig.output.console import progress
+
+    with progress() as bar:
+        task = bar.add_task("effects")
+
+        def count(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        found = plan_of(path, model, balance, machine, count)
+    screen = results(json_)
+    for line in sentences(found):
+        screen.print(line, markup=False)
+    if json_:
+        emit_json(found.to_json())
