@@ -85,8 +85,10 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
         (places, old), (_, new) = sides[0], sides[1]
         clock = refit.recordings[run].time_s
         # a cause that no model file holds is no term of the equation: its channels are read here
-        filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
-        read = {channel: filtered[channel][places] for channel in wanted}
+        read = {}
+        if wanted:
+            filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
+            read = {channel: filtered[channel][places] for channel in wanted}
         time_s = clock[places] - clock[0]
         runs.append(RunTrace(run, time_s, measured, old - old.mean(), new - new.mean(), read))
     return EquationTraces(refit.model, tuple(runs))
