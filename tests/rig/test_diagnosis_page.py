@@ -216,3 +216,13 @@ def test_a_screen_reader_finds_the_result_the_charts_and_the_controls(opened):
         'button "SVG"',
     ):
         assert part in tree
+
+
+def test_an_equation_that_no_finding_changes_is_drawn_once(diagnosed):
+    whole, shown = diagnosed
+    same = replace(whole.errors["motor"], by_run_after=whole.errors["motor"].by_run_before)
+    written = page(replace(whole, findings=(), errors={"motor": same}), shown, Provenance.now(1))
+    charts = json.loads(re.search(r'id="charts">(.*?)</script>', written, re.DOTALL)[1])
+    drawn = {c["name"]: [*c["lines"], *next(iter(c["choices"].values()), [])] for c in charts}
+    for name in ("errors-motor", "time-motor"):
+        assert {line["meta"]["role"] for line in drawn[name]} <= {"before", "measured", "level"}
