@@ -79,7 +79,7 @@ def test_every_verdict_has_a_page_with_something_to_do(diagnosed, verdict):
     assert Page(written).open == []
     section = written[written.index("What to check</h2>") : written.index("Next experiment")]
     said = {"identified": "cogging", "one_of": "cogging", "nothing_missing": "Nothing"}
-    assert said.get(verdict, "ecord the next experiment") in section
+    assert said.get(verdict, "Find the part of the rig") in section
 
 
 def test_a_page_without_signals_still_has_the_errors(diagnosed):
