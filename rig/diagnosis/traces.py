@@ -98,7 +98,7 @@ def _channels(kept: Kept) -> tuple[str, ...]:
     """Return the channels of a cause's variables, time left out."""
     cause = kept.scored.candidate.cause
     if isinstance(cause, Function):
-        roles = [cause.place.roles[v][0] for v in cause.variables if v in cause.place.roles]
+        roles = list(cause.reads)
     else:
         roles = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
     return tuple(dict.fromkeys(c for c in roles if c != "time_s"))[:MOST]
