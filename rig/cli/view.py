@@ -53,6 +53,7 @@ def view(
     from rig.machines.recordings import open_recordings
     from rig.output.provenance import Provenance
     from rig.output.render import write_report
+    from rig.output.table import counted
     from rig.reports.recordings import page
 
     whole = open_recordings(path, machine, format_, skip_bad)
@@ -66,7 +67,7 @@ def view(
     if json:
         emit_json({"page": target, "runs": campaign.names})
         return
-    results(json).print(f"{len(campaign)} runs: {target}", soft_wrap=True)
+    results(json).print(f"{counted(len(campaign), 'run')}: {target}", soft_wrap=True)
     if not opened:
         results(json).print(f"Open it: {target.resolve().as_uri()}", soft_wrap=True)
 
