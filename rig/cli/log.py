@@ -99,7 +99,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 
 def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
-    """Return what is known about the logs at a path, and the files of a folder that are none."""
+    """Return the heads of the logs at a path, and the files of a folder that are no logs."""
     from rig.log.attempts import heads_of
     from rig.log.scan import NotALogError
 
