@@ -17,6 +17,9 @@ from estimation.derived import CAMPAIGN_TIME
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording
 
+SHOWN = 4
+"""Runs that the text of a campaign names."""
+
 
 class CampaignError(EstimationError):
     """Runs do not make a campaign, or a split of it is not possible."""
@@ -37,6 +40,9 @@ class Run:
     load: Callable[[], Recording]
     source: Path | None = None
     excluded: str | None = None
+
+    def __repr__(self) -> str:
+        return f"Run({self.name!r}{', excluded' if self.excluded else ''})"
 
     def recording(self) -> Recording:
         """Read the recording; the handle's reason of exclusion goes with it."""
@@ -106,6 +112,10 @@ class Campaign:
                 for r in recordings
             )
         )
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.names if len(self) <= SHOWN else (*self.names[:SHOWN], "..."))
+        return f"Campaign of {len(self)} runs: {names}"
 
     def __len__(self) -> int:
         return len(self.runs)

@@ -158,7 +158,9 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
         position = stop
     if not (skeleton.library or skeleton.chunks or skeleton.channels):
         raise NotALogError(
-            f"{path} is not an MCAP file.", "No record of that format was found in it."
+            f"{path} is not an MCAP file.",
+            "No record of that format was found in it.",
+            "Restore the file, or omit it (fit, diagnose, view: --skip-bad).",
         )
     _check_end(skeleton, buffer, position)
     return skeleton
