@@ -9,7 +9,7 @@ from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.places import Place, places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.changes.regression import Columns, declared_columns
-from estimation.fitting import OFFSET
+from estimation.fit_problem import OFFSET
 from estimation.recording import FloatArray
 
 
