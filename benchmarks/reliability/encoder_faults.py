@@ -25,6 +25,7 @@ TICK_FUNCTION = ctypes.CFUNCTYPE(
 )
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)
 PER_RAD = 4096 * 35 / math.tau, -8192 / math.tau, 4000 * 0.913 / math.tau
+AT_ZERO = 0.0, 0.0, 1.272 * 4000 / math.tau
 FAULT_TICK = 300
 BLOCK = 50
 
@@ -49,7 +50,10 @@ class SmallRig:
         tick = TICK_FUNCTION(tick_address)
         outputs = (ctypes.c_int32 * 2)()
         for k in range(ticks):
-            counts = [math.floor(self.angle_rad * per_rad) for per_rad in PER_RAD]
+            counts = [
+                math.floor(self.angle_rad * per_rad + zero)
+                for per_rad, zero in zip(PER_RAD, AT_ZERO, strict=True)
+            ]
             noise = self._noise.integers(-4, 5, 3)
             counts += [*noise[:2].tolist(), int(1000 * self.current_a) + int(noise[2]), 0]
             given = (ctypes.c_int32 * 7)(*self._fault(self._tick, counts))
@@ -76,6 +80,20 @@ def frozen(*columns: int, since: int = FAULT_TICK) -> Fault:
             if tick < since:
                 kept[column] = counts[column]
             counts[column] = kept[column]
+        return counts
+
+    return fault
+
+
+def losing(*columns: int, since: int = FAULT_TICK) -> Fault:
+    """Return the fault of encoders that lose every tenth count."""
+    kept: dict[int, int] = {}
+
+    def fault(tick: int, counts: list[int]) -> list[int]:
+        for column in columns:
+            if tick < since:
+                kept[column] = counts[column]
+            counts[column] = kept[column] + (counts[column] - kept[column]) * 9 // 10
         return counts
 
     return fault
@@ -131,7 +149,10 @@ FAULTS: dict[str, tuple[Fault, set[Trip]]] = {
         swapped(MOTOR, SPINDLE),
         {Trip.ENCODERS_DISAGREE, Trip.ENCODER_FROZEN},
     ),
-    "jaw and spindle swapped": (swapped(JAW, SPINDLE), {Trip.ENCODERS_DISAGREE, Trip.JAW_TRAVEL}),
+    "jaw and spindle swapped": (
+        swapped(JAW, SPINDLE),
+        {Trip.ENCODERS_DISAGREE, Trip.JAW_TRAVEL, Trip.FOLLOWING_ERROR},
+    ),
     "spindle jumps": (lost_edges, {Trip.ENCODER_JUMP}),
 }
 

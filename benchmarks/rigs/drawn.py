@@ -120,7 +120,7 @@ def ranges_of(plant: Plant, runs: Sequence[FloatArray], starts_s: Sequence[float
         "run_time": (0.0, duration),
         "campaign_time": (0.0, span),
         "dwell": (0.0, 1.0),
-        "heat": (0.0, float(np.mean((columns["current"]) ** 2))),
+        "heat": (0.0, max(float(np.mean(run[:, kernel.CURRENT] ** 2)) for run in runs)),
         "jump": (0.0, 1.0),
     }
     low = {name: float(np.percentile(x[::7], 0.5)) for name, x in columns.items()}

@@ -182,7 +182,8 @@ FIXED_LIMITS = (
 )
 """What a rig is built like: a board that holds such a number takes no other."""
 FREE_LIMITS = (
-    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "safe_state"),
+    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
+    "safe_state",
 )
 """What a host may choose on any board."""
 PING_DTYPE = layout(*SESSION_FIELDS, "token u8")

@@ -68,6 +68,10 @@ LIMIT_NAMES = (
     "max_jaw_jump",
     "torque_e3",
     "max_still_torque",
+    "max_still_change",
+    "max_still_rise",
+    "jaw_zero",
+    "max_beyond",
     *CHOICE_NAMES,
 )
 ARM_DTYPE = layout(
@@ -133,13 +137,20 @@ class Limits:
         jaw_per_turn: Counts of the jaw, signed, for the same turn.
         twist_e6: Counts the motor is ahead for 1e6 counts of proximal torque, signed.
         stretch_e6: Counts the jaw is ahead for 1e6 counts of distal torque, signed.
-        max_twist: Largest span of what motor and spindle differ by otherwise, motor counts.
-        max_stretch: The same of jaw and spindle, jaw counts.
+        max_twist: Largest span of what motor and spindle differ by otherwise and besides half of
+            that twist, motor counts.
+        max_stretch: The same of jaw and spindle, jaw counts; the jaw's may be 30 ms old.
         max_spindle_jump: Farthest the spindle's count may go in one tick.
         max_jaw_jump: Farthest the jaw's count may go in one tick.
         torque_e3: Proximal counts, signed, that 1000 counts of current make at rest; 0 where they
             are not compared.
-        max_still_torque: Largest difference of both while the motor stands still, proximal counts.
+        max_still_torque: Largest difference of both, besides half of what the current makes, while
+            no encoder counts, proximal counts.
+        max_still_change: Farthest the proximal torque may change meanwhile.
+        max_still_rise: Farthest that difference may rise meanwhile the way the motor turned last.
+        jaw_zero: Jaw count at spindle count 0 with no distal torque.
+        max_beyond: Farthest beyond its travel the spindle may be as the jaw shows it, spindle
+            counts.
         stall_ticks: How long it may be stalled.
         saturated_ticks: How long a torque or current count may be at the end of its range.
         stale_ticks: How long a torque or current count may stay the same.
@@ -187,6 +198,10 @@ class Limits:
     max_jaw_jump: int = TOP
     torque_e3: int = 0
     max_still_torque: int = TOP
+    max_still_change: int = TOP
+    max_still_rise: int = TOP
+    jaw_zero: int = 0
+    max_beyond: int = TOP
     stall_ticks: int = TOP
     saturated_ticks: int = TOP
     stale_ticks: int = TOP

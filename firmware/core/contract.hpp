@@ -187,6 +187,10 @@ struct ReferenceFields {
     std::int32_t max_jaw_jump = 0;
     std::int32_t torque_e3 = 0;
     std::int32_t max_still_torque = 0;
+    std::int32_t max_still_change = 0;
+    std::int32_t max_still_rise = 0;
+    std::int32_t jaw_zero = 0;
+    std::int32_t max_beyond = 0;
     ChoiceFields choice;
 
     // Gives every limit of both, and its sense, to `visit`, in the order of the wire.
@@ -215,6 +219,10 @@ struct ReferenceFields {
         visit(one.max_jaw_jump, other.max_jaw_jump, Sense::kMost);
         visit(one.torque_e3, other.torque_e3, Sense::kFixed);
         visit(one.max_still_torque, other.max_still_torque, Sense::kMost);
+        visit(one.max_still_change, other.max_still_change, Sense::kMost);
+        visit(one.max_still_rise, other.max_still_rise, Sense::kMost);
+        visit(one.jaw_zero, other.jaw_zero, Sense::kFree);
+        visit(one.max_beyond, other.max_beyond, Sense::kMost);
         ChoiceFields::each(one.choice, other.choice, visit);
     }
 };
@@ -263,8 +271,9 @@ constexpr char kContract[] =
     "max_current_error i4, current_ticks i4, frozen_current i4, frozen_motion i4, "
     "motor_per_turn i4, spindle_per_turn i4, jaw_per_turn i4, twist_e6 i4, stretch_e6 i4, "
     "max_twist i4, max_stretch i4, max_spindle_jump i4, max_jaw_jump i4, torque_e3 i4, "
-    "max_still_torque i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, dry_ticks "
-    "i4, watchdog_us i4, safe_state i4, hold_command_e4 i4, hold_ticks i4\n"
+    "max_still_torque i4, max_still_change i4, max_still_rise i4, jaw_zero i4, max_beyond "
+    "i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, dry_ticks i4, watchdog_us "
+    "i4, safe_state i4, hold_command_e4 i4, hold_ticks i4\n"
     "18 START: version u1, kind u1, sequence u2\n"
     "19 SETPOINTS: version u1, kind u1, sequence u2, session u4, 100 x (target i4, "
     "load_ma i2)\n"
@@ -285,7 +294,7 @@ constexpr char kContract[] =
     "6 WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST, 9 WRONG_SESSION, 10 OLD_SEQUENCE, "
     "11 TRIPPED, 12 WRONG_TRIP, 13 ALREADY_ARMED, 14 TOO_HOT, 15 BEYOND_BOARD, 16 "
     "TOO_FAST\n";
-constexpr std::size_t kArmSize = 216;  // behind the session
+constexpr std::size_t kArmSize = 232;  // behind the session
 constexpr std::size_t kSetpointSize = 6;
 constexpr std::size_t kMaxSetpoints = 100;
 constexpr std::int64_t kTickUs = 1000;

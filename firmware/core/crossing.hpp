@@ -9,6 +9,7 @@ namespace rig {
 
 constexpr std::int32_t kMissing = INT32_MIN;  // count of a sensor that gave nothing
 constexpr std::uint8_t kNoChannel = 255;
+constexpr std::int64_t kDoubt = 2;  // declared stiffness and torque constant may be wrong by one part in so many
 
 struct Crossing {
     Trip code = kNoTrip;

@@ -39,11 +39,6 @@ class LoopGuard {
 
     void begin_to_hold() { far_ticks_ = 0; }
 
-    // Whether the motor has not moved for a while; then its current is the torque it holds.
-    bool still() const { return still_ticks_ >= kRestTicks; }
-    // Mean of the current over some ticks, counts.
-    std::int64_t mean_current() const { return still_mean_ / kFine; }
-
     Crossing check(const LoopFields& limits, std::int64_t tick_us, std::int32_t followed,
                    std::int32_t motor, std::int32_t current, const LoopChannels& channels) {
         const std::int64_t step = std::int64_t{motor} - last_motor_;
@@ -65,7 +60,6 @@ class LoopGuard {
   private:
     static constexpr std::int64_t kFine = 256;       // parts of a count, for means of whole numbers
     static constexpr std::int64_t kStillTicks = 5;  // mean of the current, against its noise
-    static constexpr std::int64_t kRestTicks = 20;
 
     // A motor whose count stays while the current goes from one value to quite another.
     Crossing check_frozen(const LoopFields& limits, std::int64_t tick_us, std::int32_t motor,

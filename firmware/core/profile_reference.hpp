@@ -10,6 +10,7 @@
 #include "limits.hpp"
 #include "loop_guard.hpp"
 #include "motor_guard.hpp"
+#include "rest_guard.hpp"
 #include "sensor_guard.hpp"
 
 namespace rig {
@@ -86,9 +87,11 @@ class ReferenceProfile {
         limits_ = settings.limits;
         controller_.reset(settings.gains);
         twist_limits_ = {limits_.motor_per_turn, limits_.spindle_per_turn, limits_.twist_e6,
-                         limits_.max_twist};
+                         limits_.max_twist, 0, 1};
         stretch_limits_ = {limits_.jaw_per_turn, limits_.spindle_per_turn, limits_.stretch_e6,
-                           limits_.max_stretch};
+                           limits_.max_stretch, kJawLateTicks, kJawMeanTicks};
+        rest_limits_ = {limits_.torque_e3, limits_.twist_e6 < 0 ? -1 : 1, limits_.max_still_torque,
+                        limits_.max_still_change, limits_.max_still_rise};
     }
 
     const ChoiceFields& choice() const { return limits_.choice; }
@@ -146,7 +149,6 @@ class ReferenceProfile {
             motor_.prime(now.motor);
             loop_.prime(now.motor, now.current);
             last_ = now;
-            torque_mean_ = 256 * std::int64_t{now.proximal};
             sensors_.prime(converted);
         }
         const Crossing crossing = check_levels(now);
@@ -196,6 +198,8 @@ class ReferenceProfile {
 
   private:
     static constexpr std::uint8_t kLoadChannel = 6;
+    static constexpr std::int32_t kJawLateTicks = 30;
+    static constexpr std::int32_t kJawMeanTicks = 16;  // a period of the cable with the jaw's inertia
 
     static std::int32_t late(std::int32_t now, std::int32_t last, std::int64_t ticks) {
         return static_cast<std::int32_t>(now - (std::int64_t{now} - last) / ticks);
@@ -237,20 +241,26 @@ class ReferenceProfile {
         if (twist.code != kNoTrip) return twist;
         const Crossing stretch = stretch_.check(stretch_limits_, now.jaw, now.spindle, now.distal, 2);
         if (stretch.code != kNoTrip) return stretch;
+        const Crossing travel = check_travel_by_jaw(now);
+        if (travel.code != kNoTrip) return travel;
         const Crossing loop =
             loop_.check(limits_.loop, kTickUs, now.spindle, now.motor, now.current, {1, 0, 5});
-        return loop.code != kNoTrip ? loop : check_rest(now);
+        if (loop.code != kNoTrip) return loop;
+        return rest_.check(rest_limits_, kTickUs, {now.motor, now.spindle, now.jaw}, now.proximal,
+                           now.current);
     }
 
-    // A motor at rest holds the torque that its current makes, but for friction; one whose current is
-    // not found again as torque turns, whatever its encoder counts.
-    Crossing check_rest(const Inputs& now) {
-        torque_mean_ += (256 * std::int64_t{now.proximal} - torque_mean_) / 5;
-        if (limits_.torque_e3 == 0 || !loop_.still()) return {};
-        const std::int64_t made = loop_.mean_current() * limits_.torque_e3 / 1000;
-        const std::int64_t unfound = made - torque_mean_ / 256;
-        if (!exceeds(unfound, limits_.max_still_torque)) return {};
-        return {kEncoderFrozen, 0, unfound, limits_.max_still_torque, 0};
+    // Where the jaw is, the spindle cannot be far beyond its travel, whatever the motor and it count.
+    Crossing check_travel_by_jaw(const Inputs& now) const {
+        if (limits_.jaw_per_turn == 0 || limits_.max_beyond == INT32_MAX) return {};
+        const std::int64_t turned =
+            std::int64_t{now.jaw} - limits_.jaw_zero - twist_of(stretch_limits_, now.distal);
+        const std::int64_t spindle = turned * limits_.spindle_per_turn / limits_.jaw_per_turn;
+        const std::int64_t least = std::int64_t{limits_.min_spindle} - limits_.max_beyond;
+        const std::int64_t most = std::int64_t{limits_.max_spindle} + limits_.max_beyond;
+        if (spindle < least) return {kEncodersDisagree, 2, spindle, least, 0};
+        if (spindle > most) return {kEncodersDisagree, 2, spindle, most, 0};
+        return {};
     }
 
     static constexpr std::int32_t kFsrMax = 4095;
@@ -267,7 +277,8 @@ class ReferenceProfile {
     EncoderPair twist_;
     EncoderPair stretch_;
     Inputs last_;
-    std::int64_t torque_mean_ = 0;  // in parts of a count
+    RestLimits rest_limits_;
+    RestGuard rest_;
     SensorGuard<3> sensors_{3, INT16_MIN, INT16_MAX};
     bool primed_ = false;
 };

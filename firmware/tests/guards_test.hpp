@@ -72,14 +72,60 @@ inline const Guard kGuards[] = {
          l.max_twist = 8;
      },
      [](Inputs& i, int since, int b) { i.motor = since % 2 ? 4 + b : -4; }},
-    {rig::kEncodersDisagree, 2, 1,
+    // jaw and spindle: a mean over 16 ms; half of the stretch is in doubt, and the jaw may be 30 ms late
+    {rig::kEncodersDisagree, 2, 20,
      [](Limits& l) {
          l.jaw_per_turn = 20;
          l.spindle_per_turn = 10;
          l.stretch_e6 = 500000;
          l.max_stretch = 10;
      },
-     [](Inputs& i, int, int b) { i.distal = 60, i.jaw = 40 + b; }},
+     [](Inputs& i, int, int b) { i.distal = 60, i.jaw = 30 + 15 + 10 + 11 * b; }},
+    {rig::kEncodersDisagree, 2, 16,
+     [](Limits& l) {
+         l.jaw_per_turn = 10;
+         l.spindle_per_turn = 10;
+         l.stretch_e6 = 1000000;
+         l.max_stretch = 10;
+     },
+     [](Inputs& i, int, int b) { i.distal = -10, i.jaw = -10 - 5 - 10 - 11 * b; }},
+    {rig::kEncodersDisagree, 2, 15,
+     [](Limits& l) {
+         l.jaw_per_turn = 10;
+         l.spindle_per_turn = 10;
+         l.max_stretch = 0;
+     },
+     [](Inputs& i, int since, int b) { i.spindle = 16 + since, i.jaw = i.spindle + 30 + 20 * b; }},
+    {rig::kEncodersDisagree, 2, 1,
+     [](Limits& l) {
+         l.jaw_per_turn = 20;
+         l.spindle_per_turn = -10;
+         l.stretch_e6 = 500000;
+         l.jaw_zero = 7;
+         l.max_spindle = 40;
+         l.max_beyond = 8;
+     },
+     [](Inputs& i, int, int b) { i.distal = 60, i.jaw = 7 + 30 - 96 - 2 * b; }},
+    {rig::kEncodersDisagree, 2, 1,
+     [](Limits& l) {
+         l.jaw_per_turn = 20;
+         l.spindle_per_turn = -10;
+         l.min_spindle = -40;
+         l.max_beyond = 8;
+     },
+     [](Inputs& i, int, int b) { i.jaw = 96 + 2 * b; }},
+    {rig::kEncoderFrozen, 0, 1,
+     [](Limits& l) {
+         l.torque_e3 = 1000;
+         l.max_still_change = 20;
+     },
+     [](Inputs& i, int since, int b) { i.proximal = since == 0 ? 105 + 6 * b : since % 2; }},
+    {rig::kEncoderFrozen, 0, 1,
+     [](Limits& l) {
+         l.torque_e3 = -1000;
+         l.max_still_torque = 10;
+     },
+     [](Inputs& i, int since, int b) { i.current = since == 0 ? 100 + 5 * b : since % 2; }},
     {rig::kFollowingError, 1, 7,
      [](Limits& l) {
          l.loop.max_following = 60;
@@ -93,6 +139,33 @@ inline const Guard kGuards[] = {
      },
      [](Inputs& i, int, int b) { i.current = b == 0 ? 10 : 20; }},
 };
+
+// Ticks until a motor that turned this way and then counts no more is found dead, its current rising as given.
+inline int stands(int way, int rise) {
+    Profile::Settings settings = Profile::Settings::widest();
+    settings.limits.torque_e3 = 1000;
+    settings.limits.twist_e6 = 1;
+    settings.limits.max_still_rise = 30;
+    Profile profile;
+    profile.begin(settings);
+    for (int tick = 0; tick < 400; ++tick) {
+        Inputs inputs;
+        inputs.motor = 10 * way * (tick < 100 ? tick : 100);
+        inputs.current = tick < 100 ? 50 * way : 50 * way + rise;
+        const rig::Crossing crossing = profile.check(inputs);
+        if (crossing.code != rig::kNoTrip) return crossing.code == rig::kEncoderFrozen ? tick - 100 : -1;
+    }
+    return 0;
+}
+
+TEST_CASE("a current that rises the way the motor turned cannot leave it at rest, one that falls can") {
+    for (int way : {1, -1}) {
+        CHECK(stands(way, 33 * way) > 0);
+        CHECK(stands(way, 31 * way) == 0);
+        CHECK(stands(way, -90 * way) == 0);
+    }
+    CHECK(stands(0, 90) == 0);
+}
 
 inline Inputs quiet(int tick) {
     Inputs inputs;

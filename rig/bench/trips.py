@@ -78,8 +78,8 @@ WORDS: dict[Trip, tuple[str, str]] = {
     ),
     Trip.ENCODERS_DISAGREE: (
         "Two encoders on one drive train disagree by more than backlash and twist",
-        "Check the encoder cables and couplings; see [plausibility] twist_window_rad and"
-        " stretch_window_rad.",
+        "Check the encoder cables and couplings; see [plausibility] twist_window_rad,"
+        " stretch_window_rad and beyond_rad.",
     ),
     Trip.FOLLOWING_ERROR: (
         "The motion stayed too far behind its target",
@@ -95,8 +95,8 @@ WORDS: dict[Trip, tuple[str, str]] = {
         "Check its cable and shielding, then reference the rig again.",
     ),
     Trip.ENCODER_FROZEN: (
-        "The current changed and the motor's encoder did not move",
-        "Check the encoder's cable and supply; see [plausibility] frozen_current_a.",
+        "Current or torque changed and no encoder moved",
+        "Check the encoders' cables and supply; see [plausibility] frozen_current_a and still_...",
     ),
     Trip.QUEUE_RAN_DRY: (
         "The board was kept alive and given no further setpoint",

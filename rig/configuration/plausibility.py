@@ -17,7 +17,9 @@ class PlausibilitySection(BaseModel):
     """What is believed of the drive train; defaults are those of the reference rig.
 
     Each window is wider than what the shipped protocols need on simulated rigs whose parameters
-    vary by 15 % and that have one hidden effect (docs/decisions/0111).
+    vary by 15 % and that have one hidden effect (docs/decisions/0281). Stiffness and torque
+    constant are believed to a half: the board adds half of the twist, the stretch and the motor's
+    torque they give to each window.
 
     Attributes:
         following_rad: Farthest the followed encoder may be from its target.
@@ -31,8 +33,13 @@ class PlausibilitySection(BaseModel):
             encoder; half of the current limit if unset.
         frozen_motor_rad: Motor shaft angle within which it did not move.
         torque_constant_n_m_a: Torque at the spindle a motor current, at rest.
-        still_torque_n_m: Largest torque of a motor that does not move by its encoder which the
-            torque sensor does not find: its friction. Beyond it the encoder is dead.
+        still_torque_n_m: Largest torque of a motor at rest that the torque sensor does not find:
+            its friction. Beyond it the encoders are dead.
+        still_change_n_m: Farthest the proximal torque may change while no encoder counts: less than
+            what turns the motor against the gearhead's stiffness.
+        still_rise_n_m: Farthest the motor's torque may rise, while no encoder counts, above the
+            friction it overcame in its last motion.
+        beyond_rad: Farthest beyond its travel limit the spindle may be as the jaw's encoder shows.
         gear_ratio: Motor turns a turn of the spindle; 0 for no comparison.
         gear_stiffness_n_m_rad: Stiffness of the gearhead's twist, at the spindle.
         twist_window_rad: Largest span of what motor and spindle differ by besides that twist, at
@@ -57,13 +64,16 @@ class PlausibilitySection(BaseModel):
     frozen_current_a: Window | None = None
     frozen_motor_rad: Window = 0.008
     torque_constant_n_m_a: Window = 0.897
-    still_torque_n_m: Window = 0.15
+    still_torque_n_m: Window = 0.085
+    still_change_n_m: Window = 0.02
+    still_rise_n_m: Window = 0.032
+    beyond_rad: Window = 0.06
     gear_ratio: Ratio = 35.0
     gear_stiffness_n_m_rad: Window = 5.4
-    twist_window_rad: Window = 0.08
+    twist_window_rad: Window = 0.03
     jaw_ratio: Ratio = 0.913
     jaw_zero_rad: Number = 1.272
     cable_stiffness_n_m_rad: Window = 0.751
-    stretch_window_rad: Window = 0.3
+    stretch_window_rad: Window = 0.105
     spindle_jump_rad: Window = 0.1
     jaw_jump_rad: Window = 0.1

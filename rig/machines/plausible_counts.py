@@ -80,16 +80,23 @@ def pair_limits(believed: PlausibilitySection, calibrations: CalibrationSet) -> 
         made = believed.torque_constant_n_m_a * current.slope / proximal.slope
         limits["torque_e3"] = round(1e3 * made)
         limits["max_still_torque"] = round(abs(believed.still_torque_n_m / proximal.slope))
+        limits["max_still_change"] = round(abs(believed.still_change_n_m / proximal.slope))
+        limits["max_still_rise"] = round(abs(believed.still_rise_n_m / proximal.slope))
     if jaw is not None and distal is not None and believed.jaw_ratio:
         limits["jaw_per_turn"] = round(2 * math.pi * believed.jaw_ratio / jaw.slope)
         stretch = -distal.slope / believed.cable_stiffness_n_m_rad / jaw.slope
         limits["stretch_e6"] = round(1e6 * stretch)
         limits["max_stretch"] = round(abs(believed.stretch_window_rad / jaw.slope))
         limits["max_jaw_jump"] = round(abs(believed.jaw_jump_rad / jaw.slope))
+        limits["jaw_zero"] = round(believed.jaw_zero_rad / jaw.slope + jaw.zero_counts)
+        limits["max_beyond"] = round(abs(believed.beyond_rad / spindle.slope))
     return limits
 
 
-def jaw_ends_rad(believed: PlausibilitySection, spindle_limit_rad: float) -> tuple[float, float]:
-    """Return the jaw's ends that follow from the spindle's travel."""
-    reach = believed.jaw_ratio * spindle_limit_rad + believed.stretch_window_rad
+def jaw_ends_rad(
+    believed: PlausibilitySection, spindle_limit_rad: float, distal_limit_n_m: float
+) -> tuple[float, float]:
+    """Return the jaw's ends that follow from the spindle's travel and the cable's stretch."""
+    stretch_rad = distal_limit_n_m / believed.cable_stiffness_n_m_rad + believed.stretch_window_rad
+    reach = believed.jaw_ratio * spindle_limit_rad + stretch_rad
     return believed.jaw_zero_rad - reach, believed.jaw_zero_rad + reach

@@ -67,7 +67,9 @@ def board_limits(config: Config, calibrations: CalibrationSet, period_s: float =
     min_spindle, max_spindle = ends(
         "spindle_angle_rad", -limits.spindle_angle_rad, limits.spindle_angle_rad
     )
-    open_rad, closed_rad = jaw_ends_rad(config.plausibility, limits.spindle_angle_rad)
+    open_rad, closed_rad = jaw_ends_rad(
+        config.plausibility, limits.spindle_angle_rad, limits.distal_torque_n_m
+    )
     min_jaw, max_jaw = ends(
         "jaw_angle_rad",
         open_rad if safety.jaw_open_rad is None else safety.jaw_open_rad,

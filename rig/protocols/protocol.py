@@ -310,7 +310,7 @@ def load_protocol(name_or_path: str) -> Protocol:
         UsageError: The file is missing or not a protocol; the message names the wrong key.
     """
     path = Path(name_or_path)
-    if not path.exists() and path.suffix == "":
+    if not path.is_file() and path.suffix == "":
         path = SHIPPED / f"{name_or_path}.toml"
     if not path.is_file():
         shipped = ", ".join(sorted(p.stem for p in SHIPPED.glob("*.toml")))

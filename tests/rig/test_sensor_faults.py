@@ -11,16 +11,25 @@ from benchmarks.reliability.encoder_faults import (
     FAULTS,
     JAW,
     MOTOR,
+    PER_RAD,
     SPINDLE,
     TICK_FUNCTION,
     frozen,
+    losing,
     ride,
     sound,
 )
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import CoreGuard, FirmwareBoard
+from drivers.teensy.logic import Drive
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, Kind, Result, Trip
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
+from rig.protocols.motion import motion_of
+from rig.protocols.protocol import RunPlan, load_protocol
+from rig.simulation.bench import SimulatedBench
+from rig.simulation.hidden import draw
+from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, vary
+from rig.simulation.places import SPINDLE_ANGLE
 from tests.drivers.raw_host import RawHost
 
 pytestmark = pytest.mark.integration
@@ -52,6 +61,83 @@ def test_a_dead_encoder_near_the_end_of_travel_lets_the_spindle_hardly_beyond(
     rig, _, trip = ride(fault, start_rad=2.9, stop_rad=2.99, library=library)
     assert trip is not Trip.NONE
     assert np.abs(rig.angles).max() < 3.0 + BEYOND_RAD
+
+
+def test_two_encoders_that_lose_counts_alike_let_the_spindle_hardly_beyond(library: Path) -> None:
+    for start_rad in (1.7, 2.0, 2.3):
+        fault = losing(MOTOR, SPINDLE)
+        rig, _, _ = ride(fault, 8000, start_rad=start_rad, stop_rad=2.99, library=library)
+        assert np.abs(rig.angles).max() < 3.0 + BEYOND_RAD
+
+
+def counts_of(seed: int, plan: RunPlan) -> np.ndarray:
+    """Counts of a run of a drawn rig that nothing watches."""
+    motion = motion_of(plan, float(plan.target_angle_rad[0]))
+    target = np.round(motion.target_angle_rad * PER_RAD[SPINDLE]).astype(np.int32)
+    load_ma = np.round(1e3 * motion.load_command_a).astype(np.int32)
+    plant = vary(PlantParameters(), seed, 0.15)
+    bench = SimulatedBench(plant, effects=[draw(seed)], seed=seed, start_count=int(target[0]))
+    return bench.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
+
+
+@pytest.mark.parametrize("seed", [13, 17, 24, 26, 36])
+def test_a_rig_that_is_sound_but_not_as_declared_has_no_dead_encoder(
+    library: Path, seed: int
+) -> None:
+    """A winding that warms, viscous gears and a slow torque sensor."""
+    config = load_config(Path("reference"))
+    machine = machine_of(config)
+    limits = machine.board_limits(config, config.calibration_set())
+    plans = [*load_protocol("reference").plans()[8::10], *load_protocol("diagnosis").plans()]
+    for plan in plans:
+        guard = CoreGuard(machine.profile, machine.gains(config), limits, library)
+        rows = counts_of(seed, plan)[:, :6]
+        assert guard.first_crossing(np.ascontiguousarray(rows), np.ones(len(rows)))[1] == Trip.NONE
+
+
+@pytest.mark.parametrize("speed_rad_s", [0.05, 0.6])
+@pytest.mark.parametrize("sense", [-1, 1])
+def test_a_rig_at_rest_whose_encoders_are_dead_trips_before_it_breaks_away(
+    library: Path, speed_rad_s: float, sense: int
+) -> None:
+    """The gearhead is elastic: what the sensor finds has turned the motor."""
+    config = load_config(Path("reference"))
+    machine = machine_of(config)
+    limits = machine.board_limits(config, config.calibration_set())
+    bench = SimulatedBench(start_count=round(-0.9 * PER_RAD[SPINDLE]))
+    board = FirmwareBoard(DeadFrom(bench, 500), library=library)
+    host = RawHost(board, machine.profile, machine.gains(config))
+    host.command(Kind.START)
+    assert host.arm(limits) is Result.OK
+    angle_rad = -0.9 + sense * speed_rad_s * np.clip(np.arange(3000) * 1e-3 - 0.6, 0, None)
+    for block in np.split(np.round(angle_rad * PER_RAD[SPINDLE]).astype(np.int32), 60):
+        host.setpoints(block, [0] * 50)
+        host.run(50)
+    assert host.trip().code is Trip.ENCODER_FROZEN
+    assert abs(bench.state[SPINDLE_ANGLE] + 0.9) < BEYOND_RAD
+
+
+class DeadFrom:
+    """A simulated rig whose encoders count no more from a tick on."""
+
+    def __init__(self, bench: SimulatedBench, since: int) -> None:
+        self._bench, self._fault, self._tick = bench, frozen(MOTOR, SPINDLE, JAW, since=since), 0
+
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        board_tick = TICK_FUNCTION(tick_address)
+
+        def tick(_board: int, now_us: int, inputs: int, outputs: int) -> None:
+            counts = list((ctypes.c_int32 * 7).from_address(inputs))
+            given = (ctypes.c_int32 * 7)(*self._fault(self._tick, counts))
+            board_tick(board_address, now_us, given, outputs)
+            self._tick += 1
+
+        between = TICK_FUNCTION(tick)
+        address = ctypes.cast(between, ctypes.c_void_p).value
+        assert address
+        self._bench.advance_with_board(ticks, address, 0, tick_us)
 
 
 class SmallGrasper:
