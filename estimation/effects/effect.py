@@ -47,6 +47,20 @@ class Parameter:
         return np.geomspace(self.lower, self.upper, self.points)
 
 
+LOSS: Mapping[str, int] = {
+    "motor": -1,
+    "gearbox": -1,
+    "cable": 1,
+    "stretch": -1,
+    "grasp": -1,
+    "joint": 1,
+}
+"""Sides of `Effect.balances` on which friction takes from the motion."""
+
+READING: Mapping[str, int] = dict.fromkeys(LOSS, 1)
+"""Sides of what a sensor adds to the target that it measures."""
+
+
 class Effect(ABC):
     """One physical effect. The catalogue finds every subclass in a file of this package.
 
