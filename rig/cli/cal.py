@@ -154,9 +154,9 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
     }
     shown = _in_words(a), _in_words(b)
     for name in dict.fromkeys((*shown[0], *shown[1])):
-        first, second = (one.get(name) for one in shown)
-        if first != second:
-            results(json).print(f"{name}: {first} -> {second}", markup=False)
+        before, after = (one.get(name) for one in shown)
+        if before != after:
+            results(json).print(f"{name}: {before} -> {after}", markup=False)
     if not changes:
         results(json).print("The two are the same record.")
     if json:
