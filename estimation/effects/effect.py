@@ -55,10 +55,10 @@ LOSS: Mapping[str, int] = {
     "grasp": -1,
     "joint": 1,
 }
-"""Sides of `Effect.balances` on which friction takes from the motion."""
+"""Equations in which friction takes from the motion, with its side in each."""
 
 READING: Mapping[str, int] = dict.fromkeys(LOSS, 1)
-"""Sides of what a sensor adds to the target that it measures."""
+"""The same equations, with the side of what a sensor adds to the target it measures."""
 
 
 class Effect(ABC):
