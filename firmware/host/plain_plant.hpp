@@ -14,11 +14,11 @@ class PlainPlant {
   public:
     ReferenceProfile::Inputs sample() {
         ReferenceProfile::Inputs counts;
-        counts.motor = whole((angle_ + torque_ / kGearStiffness) * kMotorCounts);
+        counts.motor = whole(angle_ * kMotorCounts);
         counts.spindle = whole(-angle_ * kSpindleCounts);
-        counts.jaw = whole((kJawZero + kJawRatio * angle_ - kJawShare * torque_ / kCableStiffness) * kJawCounts);
+        counts.jaw = whole(angle_ * kJawCounts);
         counts.proximal = whole(torque_ / kTorquePerCount) + noise(9);
-        counts.distal = whole(-kJawShare * torque_ / kTorquePerCount) + noise(9);
+        counts.distal = whole(-0.8 * torque_ / kTorquePerCount) + noise(9);
         counts.current = whole(1000 * current_) + noise(9);
         counts.fsr = whole(torque_ > 0 ? 2000 * torque_ : 0);
         return counts;
@@ -33,7 +33,7 @@ class PlainPlant {
             speed_ += (kDriveTorque * current_ - friction - load) / kInertia * (1e-3 / kParts);
             angle_ += speed_ * (1e-3 / kParts);
         }
-        torque_ += (load + 0.3 * kCoulomb * std::tanh(speed_ / 0.02) - torque_) / kTorqueTicks;
+        torque_ = load + 0.3 * kCoulomb * std::tanh(speed_ / 0.02);
     }
 
   private:
@@ -41,12 +41,6 @@ class PlainPlant {
     static constexpr double kMotorCounts = 4096 * 35 / kTurn;
     static constexpr double kSpindleCounts = 8192 / kTurn;
     static constexpr double kJawCounts = 4000 / kTurn;
-    static constexpr double kJawZero = 1.272;  // rad, and the next three: what a rig of this make declares
-    static constexpr double kJawRatio = 0.913;
-    static constexpr double kGearStiffness = 5.4;
-    static constexpr double kCableStiffness = 0.751;
-    static constexpr double kJawShare = 0.8;  // of the torque, at the jaw
-    static constexpr double kTorqueTicks = 8;
     static constexpr double kTorquePerCount = 0.000039811;
     static constexpr double kFullScaleA = 2.06;
     static constexpr double kDriveTorque = 0.467;  // N m a A at the spindle
