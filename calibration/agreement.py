@@ -89,7 +89,7 @@ def agreements(recordings: Iterable[Recording]) -> list[Agreement]:
     runs = list(recordings)
     found = []
     for name, pair in VERIFIED.items():
-        fits = [fit for run in runs if (fit := _fitted(run, pair)) is not None]
+        fits = [fit for run in runs if (fit := fitted(run, pair)) is not None]
         if len(fits) >= LEAST_RUNS:
             found.append(_agreement(name, pair, np.array(fits)))
     if not found:
@@ -102,7 +102,7 @@ def agreements(recordings: Iterable[Recording]) -> list[Agreement]:
     return found
 
 
-def _fitted(run: Recording, pair: Pair) -> Sequence[float] | None:
+def fitted(run: Recording, pair: Pair) -> Sequence[float] | None:
     """Return scale, offset, travel and spread of one run; None where it cannot be fitted."""
     if pair.channel not in run or pair.reference not in run:
         return None

@@ -101,7 +101,9 @@ class CalibrationStore:
         if len(paths) != 1:
             names = ", ".join(path.stem for path in paths)
             raise NoRecordError(
-                f"{len(paths)} records begin with {start!r}.",
+                f"{len(paths)} records begin with {start!r}."
+                if paths
+                else f"No record begins with {start!r}.",
                 names or f"The store is {self.folder}.",
                 "Type `rig cal list` for the hashes.",
             )

@@ -32,6 +32,10 @@ UNIT_BY_SUFFIX: dict[str, str] = {
 }
 """Unit symbol of each name suffix; the longest suffix that matches wins."""
 
+ESTIMATED = "estimated_"
+"""A column so prefixed holds an estimate, made live, of the channel its name goes on with. It may
+lack values in samples that are valid."""
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:

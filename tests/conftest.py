@@ -4,6 +4,7 @@ import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # commands that are typed without a configuration are about the simulated rig in the tests
 os.environ["RIG_CONFIG"] = "simulated"
+# a person's own configurations, calibrations, models and logs of use are none of the tests'
+os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp(prefix="rig-tests-")
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="rig-tests-")
 
 import pytest
 from hypothesis import settings

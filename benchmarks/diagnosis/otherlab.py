@@ -30,14 +30,20 @@ def cases(path: Path) -> Iterator[Case]:
 
     A group is the first word of a case's name; of the clean ones, the second too.
     """
-    sys.path.insert(0, str(path))
-    listed, simulator, scorer = map(importlib.import_module, ("cases", "rigsim", "score"))
     groups: dict[tuple[str, ...], list[Any]] = {}
-    for one in listed.ALL:
+    for one in listed(path):
         words = one["name"].split("-")
         groups.setdefault(tuple(words[: 1 + (one["kind"] == "control")]), []).append(one)
+    simulator, scorer = map(importlib.import_module, ("rigsim", "score"))
     for turn in itertools.zip_longest(*groups.values()):
         yield from (_case(one, simulator, scorer) for one in turn if one is not None)
+
+
+def listed(path: Path) -> list[dict[str, Any]]:
+    """Return the cases as the simulator lists them."""
+    sys.path.insert(0, str(path))
+    found: list[dict[str, Any]] = importlib.import_module("cases").ALL
+    return found
 
 
 def _case(one: dict[str, Any], simulator: ModuleType, scorer: ModuleType) -> Case:

@@ -3,9 +3,11 @@
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
+from benchmarks.rigs.drives import wave
 from benchmarks.rigs.faults import Fault
+from benchmarks.rigs.hidden import Table
 from benchmarks.rigs.plant import Plant, over
-from rig.simulation.forms import POINTS, Random, Table, course, grid, power, wave
+from rig.simulation.forms import POINTS, Random, course, grid, power
 
 TURN = 2.0 * np.pi
 PLACES = {

@@ -7,10 +7,10 @@ import numpy as np
 
 from benchmarks.rigs import kernel
 from benchmarks.rigs.faults import Fault
-from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant
 from estimation.recording import FloatArray
-from rig.simulation.forms import POINTS, Random, Table, grid
+from rig.simulation.forms import POINTS, Random, grid
 
 TICK_S = 1e-3
 MARGIN = 0.15
@@ -120,7 +120,7 @@ def ranges_of(plant: Plant, runs: Sequence[FloatArray], starts_s: Sequence[float
         "run_time": (0.0, duration),
         "campaign_time": (0.0, span),
         "dwell": (0.0, 1.0),
-        "heat": (0.0, float(np.mean((columns["current"]) ** 2))),
+        "heat": (0.0, max(float(np.mean(run[:, kernel.CURRENT] ** 2)) for run in runs)),
         "jump": (0.0, 1.0),
     }
     low = {name: float(np.percentile(x[::7], 0.5)) for name, x in columns.items()}

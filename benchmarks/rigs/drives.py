@@ -4,12 +4,45 @@ import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
 from benchmarks.rigs.frictions import LOOPS, WORDS, level
-from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant, over
-from rig.simulation.forms import Random, Table, bank, bend, grid, knee, power, rising, wave
+from estimation.recording import FloatArray
+from rig.simulation.forms import Random, bank, bend, grid, power, rising
 
 TURN = 2.0 * np.pi
 BANK_OF_LAGS = 3
+
+
+def wave(random: Random, order: int, sidebands: bool) -> FloatArray:
+    """Return a wave over one turn: an order, some of its harmonics, and sidebands once a turn.
+
+    Args:
+        random: Source of the draw.
+        order: Whole periods a turn.
+        sidebands: Whether its amplitude is modulated once a turn.
+    """
+    turn = 2.0 * np.pi * np.linspace(0.0, 1.0, 2048)
+    total = np.sin(order * turn + random.uniform(0.0, 2.0 * np.pi))
+    for harmonic in (2, 3):
+        if random.random() < 0.5:
+            share = random.uniform(0.1, 0.4) / (harmonic - 1)
+            total += share * np.sin(harmonic * order * turn + random.uniform(0.0, 2.0 * np.pi))
+    if sidebands and order > 1:
+        depth = random.uniform(0.1, 0.5)
+        total *= 1.0 + depth * np.sin(turn + random.uniform(0.0, 2.0 * np.pi))
+    return np.asarray(total)
+
+
+def knee(random: Random, x: FloatArray) -> FloatArray:
+    """Return an odd form of slope 1 at 0 that levels off at about 1, of a random kind."""
+    power = random.uniform(1.0, 4.0)
+    kinds = (
+        np.tanh(x),
+        x / (1.0 + np.abs(x) ** power) ** (1.0 / power),
+        2.0 / np.pi * np.arctan(0.5 * np.pi * x),
+        np.clip(x, -1.0, 1.0),
+    )
+    return np.asarray(kinds[int(random.integers(len(kinds)))])
 
 
 def turn_table(random: Random, ranges: Ranges, shaft: str, most: int) -> Table:

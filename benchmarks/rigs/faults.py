@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.rigs.hidden import Table
 from benchmarks.rigs.sensors import lagged
 from estimation.recording import FloatArray
-from rig.simulation.forms import Table
 
 KINDS = ("function", "delay", "lag", "creep")
 

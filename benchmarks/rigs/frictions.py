@@ -5,13 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
-from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant, over
 from estimation.recording import FloatArray
 from rig.simulation.forms import (
     BANK,
     Random,
-    Table,
     bank,
     bend,
     course,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.recording import FloatArray
-from rig.simulation.forms import BANK, Table
+from rig.simulation.forms import BANK
 
 VARIABLES = (
     "one",
@@ -48,8 +48,34 @@ torque against the jaw in front of its sensor, cable wound beyond a round pulley
 
 OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
 MOST = 2  # Most effects at once
-SHAPES = 4
 TABLE_POINTS = 2048
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A function of one variable."""
+
+    variable: str  # Name of the variable
+    low: float  # First point of the grid
+    high: float  # Last point
+    values: FloatArray  # Shape (`POINTS`,)
+    # Whether it repeats itself beyond the range; its last value is then its first
+    periodic: bool = False
+
+    @property
+    def x(self) -> FloatArray:
+        """The grid, shape (`POINTS`,)."""
+        return np.linspace(self.low, self.high, len(self.values))
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return its values at places, the same shape."""
+        place = np.mod(x - self.low, self.high - self.low) + self.low if self.periodic else x
+        found: FloatArray = np.interp(place, self.x, self.values)
+        return found
+
+    def steepest(self) -> float:
+        """Return its largest slope, without sign."""
+        return float(np.max(np.abs(np.gradient(self.values, self.x))))
 
 
 @dataclass(frozen=True, eq=False)

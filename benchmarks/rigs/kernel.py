@@ -308,7 +308,7 @@ def _build(source: str) -> Callable[..., bool]:
                 q += dt * wq
                 wear = abs(ws) / rows.times[1]
                 x[V_DWELL] += dt * ((1.0 - x[V_DWELL]) / rows.times[0] - x[V_DWELL] * wear)
-                heat = (current / c.limit_a) ** 2
+                heat = current**2
                 x[V_HEAT] += dt / rows.times[2] * (heat - x[V_HEAT])
             if not (abs(wm) < 1e5 and abs(ws) < 1e4 and abs(wq) < 1e4):
                 return False

@@ -4,9 +4,9 @@ import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
 from benchmarks.rigs.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
-from benchmarks.rigs.hidden import Hidden
+from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant
-from rig.simulation.forms import Random, Table, falling, grid, smooth, spots
+from rig.simulation.forms import Random, falling, grid, smooth, spots
 
 UNKNOWN = "unknown"
 

@@ -61,7 +61,7 @@ class CurrentSession:
         check_change(torques, 0.02, "The torque")
         loads = np.array([float(m.recording.conditions["load_command_a"]) for m in measurements])
         check_levels(loads, 3, "The load")
-        torque = regress([_equation(run) for run in runs], least_runs=6)
+        torque = regress([equation(run) for run in runs], least_runs=6)
         gain, friction = torque.values[:2]
         if gain <= 0:
             raise BadDataError(
@@ -109,7 +109,7 @@ class CurrentSession:
         )
 
 
-def _equation(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def equation(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the columns of the torque's equation in a run, shape (n, 4), and the torque."""
     current, speed = run[CURRENT], run["spindle_velocity_rad_s"]
     columns = np.column_stack([current, -run["direction"], -speed, np.ones_like(current)])

@@ -18,7 +18,6 @@ from estimation.arm.excitation import (
     fitted,
     limits_of,
     numbers_of,
-    start,
 )
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
@@ -92,18 +91,3 @@ def improved(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
         options={"maxiter": max(1, evaluations // (raw.size + 2))},
     )
     return fitted(arm, found.x)
-
-
-def designed(arm: Arm, seeds: int, evaluations: int) -> Excitation:
-    """Return the excitation of the lowest condition number of several starts.
-
-    Args:
-        arm: The arm.
-        seeds: Number of starts.
-        evaluations: Condition numbers that each of the two searches may take of each start.
-    """
-    found = []
-    for seed in range(seeds):
-        sampled = by_active_set(arm, fitted(arm, start(arm, seed)), evaluations)
-        found.append(improved(arm, sampled, evaluations))
-    return min(found, key=lambda each: condition(arm, each))

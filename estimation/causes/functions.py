@@ -66,13 +66,27 @@ class Function:
         """Return the tensor product of the variables' bases in every equation it enters."""
         made = {}
         for entry in self.place.enters:
-            product = np.ones((len(run.grid), 1))
-            for variable, (low, high) in zip(self.variables, self.ranges, strict=True):
-                values = variable_of(run, self.place, variable, entry.equation, self.width)
-                own = _basis(variable, values, (low, high), self.knots)
-                product = (product[:, :, None] * own[:, None, :]).reshape(len(own), -1)
-            made[entry.equation] = entry.gain * product[run.used[entry.equation]]
+            used = run.used[entry.equation]
+            product = np.full((len(used), 1), entry.gain)
+            for variable, inside in zip(self.variables, self.ranges, strict=True):
+                own = self._basis(run, variable, inside, entry.equation)[used]
+                product = (product[:, :, None] * own[:, None, :]).reshape(len(used), -1)
+            made[entry.equation] = product
         return made
+
+    def _basis(
+        self, run: RunSignals, variable: str, inside: tuple[float, float], equation: str
+    ) -> FloatArray:
+        """Return a variable's hat functions on the run's grid, or one and the direction."""
+        values = variable_of(run, self.place, variable, equation, self.width)
+        if variable == "velocity_sign":
+            return np.column_stack([np.ones(len(values)), values])
+        channel = _channel(run, self.place, variable, equation)
+        key = ("hats", variable, channel, inside, self.knots)
+        found = run.memo.get(key)
+        if found is None:
+            found = run.memo[key] = _hats(values, inside, self.knots)
+        return found
 
 
 def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
@@ -131,12 +145,19 @@ def variable_of(
     """Return a variable's values on the run's grid, shape (n,)."""
     if variable == "time":
         return run.on_grid(CAMPAIGN_TIME)
-    name = signal(run, place.roles[ROLE_OF_VARIABLE.get(variable, variable)][0], equation)
+    name = _channel(run, place, variable, equation)
     key = (variable, name, width if variable == "velocity_sign" else 0.0)
     found = run.memo.get(key)
     if found is None:
         found = run.memo[key] = _worked_out(run, variable, name, width)
     return found
+
+
+def _channel(run: RunSignals, place: Place, variable: str, equation: str) -> str:
+    """Return the channel that a variable's values come from in an equation."""
+    if variable == "time":
+        return CAMPAIGN_TIME
+    return signal(run, place.roles[ROLE_OF_VARIABLE.get(variable, variable)][0], equation)
 
 
 def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
@@ -163,14 +184,10 @@ def _variable_range(
     return (low, high) if high > low else (low, low + 1.0)
 
 
-def _basis(
-    variable: str, values: FloatArray, inside: tuple[float, float], count: int
-) -> FloatArray:
-    if variable == "velocity_sign":
-        return np.column_stack([np.ones(len(values)), values])
-    knots = np.linspace(*inside, count)
-    clipped = np.clip(values, *inside)
-    return np.column_stack([np.interp(clipped, knots, row) for row in np.eye(count)])
+def _hats(values: FloatArray, inside: tuple[float, float], count: int) -> FloatArray:
+    """Return hat functions of values at knots that are spaced evenly, shape (n, count)."""
+    place = (np.clip(values, *inside) - inside[0]) * ((count - 1) / (inside[1] - inside[0]))
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(count))))
 
 
 @numba.njit(cache=True)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +14,33 @@ from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The score of one more cause in each test run.
+
+    Attributes:
+        by_run: Run to score, as if the cause acted in those that are open.
+        is_open: Runs in which the training runs do not decide whether it acts.
+    """
+
+    by_run: Mapping[str, float]
+    is_open: frozenset[str]
+
+    def log_ratio(self, per_score: float) -> float:
+        """Return the logarithm of the likelihood ratio of all runs.
+
+        In a run that is open it is that of the mean of acting and not acting.
+
+        Args:
+            per_score: Log likelihood ratio for one unit of score in one run.
+        """
+        total = 0.0
+        for name, gain in self.by_run.items():
+            ratio = per_score * gain
+            total += np.logaddexp(ratio, 0.0) - math.log(2.0) if name in self.is_open else ratio
+        return float(total)
 
 
 class HeldOut:
@@ -43,8 +71,8 @@ class HeldOut:
         """
         known = self._known(cause)
         is_open = [name for name, acts in known.items() if acts is None]
-        gains = self._gains(before, cause) if is_open else {}
-        acts = {name: gains[name] > 0.0 if x is None else x for name, x in known.items()}
+        found = self.gains(before, cause).by_run if is_open else {}
+        acts = {name: found[name] > 0.0 if x is None else x for name, x in known.items()}
         return acts, is_open
 
     def _known(self, candidate: Candidate) -> Mapping[str, bool | None]:
@@ -67,27 +95,16 @@ class HeldOut:
             out[name] = around.pop() if len(around) == 1 else None
         return out
 
-    def evidence(self, before: Sequence[Candidate], cause: Candidate) -> float:
-        """Return the e-value of one more cause on the test runs.
-
-        It is the product over the runs of the likelihood ratio of as many independent samples as a
-        run is worth; of an open run, the mean of this ratio and that of no cause.
-        """
-        known, total = self._known(cause), 0.0
-        for name, gain in self._gains(before, cause).items():
-            ratio = 0.5 * self.numbers.samples_a_run * gain
-            total += ratio if known[name] is not None else np.logaddexp(ratio, 0.0) - math.log(2.0)
-        return math.exp(min(total, 300.0))
-
-    def _gains(self, before: Sequence[Candidate], cause: Candidate) -> Mapping[str, float]:
-        """Return the score of a cause in each test run, as if it acted in those that are open."""
+    def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":
+        """Return the score of one more cause in each test run, next to the causes before it."""
         old, new = self._squared(before), self._squared([*before, cause])
         total = np.zeros(len(self.at))
         for p, samples in self.joint.samples.items():
             mean = [e[p] / samples[self.at] for e in (old, new)]
             total += self.joint.log_ratio(p, mean[0], mean[1])
         names = [self.layout.runs[k].name for k in self.at]
-        return dict(zip(names, total.tolist(), strict=True))
+        is_open = frozenset(name for name, acts in self._known(cause).items() if acts is None)
+        return Gains(dict(zip(names, total.tolist(), strict=True)), is_open)
 
     def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""

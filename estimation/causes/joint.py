@@ -92,7 +92,7 @@ class Joint:
             )[0]
             for name, e in layout.equations.items()
         }
-        self._noise = self._noise_products(noise)
+        self._white, self._noise = noise, self._noise_products(noise)
         self.error: Mapping[Part, float] = self._declared_error()
         self.declared = self.left_out(((),)).base[0]
         weights = self.weights
@@ -200,6 +200,34 @@ class Joint:
             base = np.einsum("fij,fj->fi", inverses, gram[:, :-1, -1])
             self._fits[key] = LeftOut(left, runs, fold, inverses, base)
         return self._fits[key]
+
+    def with_effect(self, laid: Laid, amplitudes: FloatArray) -> "Joint":
+        """Return the regression as if the base were true but for one effect.
+
+        Within runs the targets are those of the base, with the noise of the readings, and the
+        effect. Between runs they keep the residual.
+
+        Args:
+            laid: One cause.
+            amplitudes: How much of its columns is added, shape (k,).
+        """
+        made = object.__new__(Joint)
+        made.__dict__.update(self.__dict__)
+        base = self.left_out(((),)).base[0]
+        made.tables = {p: table.copy() for p, table in self.tables.items()}
+        for p, table in made.tables.items():
+            name, kind = p
+            if kind == "within":
+                usual = np.append(self.declared[[*self._equations_at[name]]], -1.0)
+                table[..., -1] = table[..., :-1] @ base[self.at[p]] - self._white[name] @ usual
+            columns = _columns(laid, p)
+            if columns is not None:
+                table[..., -1] += columns[:, 0] @ amplitudes
+        made.gram = made._products()
+        made.error = made._declared_error()
+        made.declared = made.whole(made.left_out(((),)).base[0])
+        made.__dict__.pop("largest_linear", None)
+        return made
 
     def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
         """Return the regression with a cause's columns, of a prior precision each, in its base.

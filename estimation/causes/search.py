@@ -21,7 +21,7 @@ from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.sources import RELATIVE, Bend
+from estimation.causes.sources import RELATIVE, Bend, Source
 from estimation.recording import FloatArray
 
 MOST_CAUSES = 3
@@ -220,7 +220,7 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             if replaces[k] or _sign_is_wrong(candidate, amplitudes):
                 continue
             gain = float(scores[k])
-            score = gain - _price(candidate, joint.numbers)
+            score = gain - _price(candidate, joint)
             by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
             out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
     return out
@@ -255,14 +255,18 @@ def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
     return float(np.sum(amplitudes[:count] / candidate.size[:count])) < 0.0
 
 
-def _price(candidate: Candidate, numbers: Numbers) -> float:
+def _price(candidate: Candidate, joint: Joint) -> float:
     """Return the price of what was chosen: the logarithm of how many choices there were.
 
     The prior probability of a cause is shared by all forms at all places, that of a form by the
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
-    of the runs by all choices of them.
+    of the runs by all choices of them. Each amplitude but the first costs what a parameter costs in
+    the Bayesian information criterion (Schwarz 1978).
     """
+    numbers = joint.numbers
     choices, cause = float(np.log(candidate.choices)), candidate.cause
+    samples = numbers.samples_a_run * len(joint.runs)
+    more = 0 if isinstance(cause, Function) else len(cause.parts) - 1
     changes = isinstance(cause, Function) and "time" in cause.variables
     rare = candidate.is_function + (changes or candidate.acts is not None)
     if candidate.acts is not None:
@@ -270,7 +274,10 @@ def _price(candidate: Candidate, numbers: Numbers) -> float:
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
         )
-    return numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices
+    amplitudes = more * float(np.log(samples)) / samples
+    return (
+        numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices + amplitudes
+    )
 
 
 def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
@@ -280,7 +287,40 @@ def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = groups_of(joint, [*bent, *_on_some_runs(joint, everything)])
-    return best_of_each([*best, *assessed(joint, more, folds)])
+    return _by_whole_form(joint, best_of_each([*best, *assessed(joint, more, folds)]), folds)
+
+
+def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:
+    """Return a ranking in which causes that show by their odd part compete by their whole form.
+
+    What follows the noise of a reading is found by its odd part alone. Which of several such causes
+    of one place it is, a delay or a lag, shows in the even part: given that one of them is there,
+    their noise favours neither.
+    """
+    groups: dict[object, list[Scored]] = {}
+    for one in ranked:
+        cause = one.candidate.cause
+        if not isinstance(cause, Function) and cause.odd:
+            groups.setdefault((cause.place.name, one.candidate.acts), []).append(one)
+    changed: dict[object, Scored | None] = {}
+    for group in groups.values():
+        if len(group) < 2 or group[0].score < 0.0:
+            continue
+        near = [c for s in group for c in (s.candidate, *_neighbours(s.candidate))]
+        whole = [replace(Claim(c.cause, c.acts, c.choices), cause=_whole(c.cause)) for c in near]
+        found = best_of_each(assessed(joint, groups_of(joint, whole), folds))
+        of_name = {one.candidate.name: one for one in found}
+        for one in group:
+            known = of_name.get(one.candidate.name)
+            changed[one.candidate.name] = known and replace(
+                one, score=group[0].score + known.score - found[0].score
+            )
+    out = [changed.get(one.candidate.name, one) for one in ranked]
+    return sorted((one for one in out if one is not None), key=lambda one: -one.score)
+
+
+def _whole(cause: Source | Function) -> Source | Function:
+    return cause if isinstance(cause, Function) else replace(cause, odd=False)
 
 
 def _bent(joint: Joint, one: Scored) -> Claim | None:
@@ -367,7 +407,7 @@ def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
 
     A run that shows little of a candidate is taken to have the size that all runs have.
     """
-    everywhere = _solved(cross.sum(axis=1), own.sum(axis=1))[:, None]
+    everywhere = solved(cross.sum(axis=1), own.sum(axis=1))[:, None]
     shown = np.einsum("crj,crjk,crk->cr", everywhere, own, everywhere)
     apart = (everywhere * cross).sum(axis=-1) - shown
     return np.asarray(apart / (shown + 0.1 * shown.mean(axis=1, keepdims=True) + 1e-300))
@@ -385,10 +425,10 @@ def _removed(
         base: Of the base's columns with them, shape (..., base, k).
     """
     beyond = own - base.swapaxes(-1, -2) @ inverse @ base
-    return np.asarray((cross * _solved(cross, beyond)).sum(axis=-1))
+    return np.asarray((cross * solved(cross, beyond)).sum(axis=-1))
 
 
-def _solved(cross: FloatArray, own: FloatArray) -> FloatArray:
+def solved(cross: FloatArray, own: FloatArray) -> FloatArray:
     """Return amplitudes from products (..., k) and (..., k, k)."""
     size = np.einsum("...kk->...", own)[..., None, None]
     steady = own + (1e-6 * size + 1e-300) * np.eye(own.shape[-1])

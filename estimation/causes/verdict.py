@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.causes.candidates import Candidate
@@ -19,7 +20,7 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Errors, Part
 from estimation.causes.refits import Refits
-from estimation.causes.search import Found, Scored, posterior, search
+from estimation.causes.search import Found, Scored, posterior, probabilities, search
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
@@ -31,6 +32,9 @@ SURE = 0.9
 
 IN_SET = 0.95
 """Probability that a set covers."""
+
+LEAST_SHARE = 0.001
+"""Probability from which a family is held against the test runs."""
 
 VARIABLE_OF_ROLE: Mapping[str, str] = {
     "speed": "velocity",
@@ -238,25 +242,63 @@ def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[
 
     The one with the least evidence goes first: two effects may need one another.
     """
-    left, notes = [], []
+    left, notes = list[Kept](), list[str]()
     for ranked in found.conditional:
         likely = family_probabilities(ranked, numbers)
         left.append(Kept(likely[0].best, likely, ranked))
     while left:
-        evidence = [
-            held_out.evidence(
-                [o.scored.candidate for o in left if o is not one], one.scored.candidate
-            )
+        tested = [
+            _tested(one, [o.scored.candidate for o in left if o is not one], held_out, numbers)
             for one in left
         ]
-        if min(evidence) >= numbers.kept_evidence:
-            break
-        cause = left.pop(evidence.index(min(evidence))).scored.candidate.cause
+        least = min(range(len(left)), key=lambda k: tested[k][1])
+        if tested[least][1] >= math.log(numbers.kept_evidence):
+            return [one for one, _ in tested], notes
+        cause = left.pop(least).scored.candidate.cause
         notes.append(
             f"{cause.family} ({cause.place.name}) was found in the training runs and not"
             " confirmed on the test runs."
         )
-    return left, notes
+    return [], notes
+
+
+def _tested(
+    one: Kept, others: Sequence[Candidate], held_out: HeldOut, numbers: Numbers
+) -> tuple[Kept, float]:
+    """Return a cause with probabilities from all runs, and the log e-value of the test runs.
+
+    The e-value is the mean over the families, by their probabilities on the training runs.
+    Each of these families then has the mean gain over all runs; the test runs add no family.
+    """
+    known = [p for p in one.likely if p.share >= LEAST_SHARE]
+    count, train = len(held_out.layout.runs), len(held_out.layout.runs) - len(held_out.at)
+    gains, logs = np.array([(p.best.gain, 0.0) for p in known]).T
+    for k, p in enumerate(known):
+        of_runs = held_out.gains(others, p.best.candidate)
+        logs[k] = of_runs.log_ratio(0.5 * numbers.samples_a_run)
+        rate = numbers.sharpness / count
+        gains[k] = (train * gains[k] + of_runs.log_ratio(rate) / rate) / count
+    shares = np.array([p.share for p in known])
+    total = float(np.logaddexp.reduce(np.log(shares / shares.sum()) + logs))
+    prices = np.array([p.best.gain - p.best.score for p in known])
+    weights = probabilities(gains - prices, gains, numbers.sharpness)
+    found = sorted(
+        (replace(p, share=float(w)) for p, w in zip(known, weights, strict=True)),
+        key=lambda p: -p.share,
+    )
+    return replace(one, scored=found[0].best, likely=found), total
+
+
+def _set_of(likely: Sequence[Probability]) -> list[str]:
+    """Return the families besides the first that a verdict lists."""
+    some, covered = sum(p.share for p in likely), likely[0].share
+    others: list[str] = []
+    for one in likely[1:]:
+        if covered >= (IN_SET if others else SURE) * some:
+            break
+        covered += one.share
+        others.append(one.family)
+    return others
 
 
 def _is_lower(before: Errors, after: Errors, numbers: Numbers) -> bool:
@@ -282,14 +324,7 @@ def _named(one: Kept, may_name: bool) -> Finding:
     """Return the claim of a cause, without its errors."""
     cause = one.scored.candidate.cause
     home = cause.place.home
-    lead, covered = one.likely[0], one.likely[0].share
-    some = sum(p.share for p in one.likely)
-    others: list[str] = []
-    for likely in one.likely[1:]:
-        if covered >= (IN_SET if others else SURE) * some:
-            break
-        covered += likely.share
-        others.append(likely.family)
+    lead, others = one.likely[0], _set_of(one.likely)
     unknown = isinstance(lead.best.candidate.cause, Function)
     if not may_name:
         verdict = "something_missing"

@@ -143,11 +143,6 @@ class Product(Effect):
         return product, (self.id,)
 
 
-def product_id(*forms: str) -> str:
-    """Return the id of a product of forms."""
-    return ".".join((UNKNOWN, *forms))
-
-
 @cache
 def product(name: str) -> Product | None:
     """Return the product of that id; None if the id is not of a product."""

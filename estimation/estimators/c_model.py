@@ -10,7 +10,6 @@ from estimation.effects.effect import Pointwise
 from estimation.errors import EstimationError
 from estimation.model import Model
 
-SAME_NAME = ("tanh", "exp", "expm1", "sin", "cos", "sqrt", "log1p")
 UNARY: Mapping[np.ufunc, str] = {
     np.negative: "(-{0})",
     np.absolute: "fabs({0})",

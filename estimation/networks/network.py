@@ -12,8 +12,6 @@ from estimation.errors import EstimationError
 from estimation.files import write_bytes_atomic
 from estimation.recording import FloatArray, read_only
 
-SCHEMA = "rig.network/1"
-
 
 class NetworkError(EstimationError):
     """A network's arrays, its inputs or its file do not fit together."""
@@ -132,24 +130,6 @@ def from_arrays(arrays: dict[str, np.ndarray]) -> Network:
         )
     except KeyError as error:
         raise NetworkError(f"The array {error} of a network is missing.") from error
-
-
-def save(network: Network, path: Path) -> None:
-    """Write a network as NPZ; an existing file is replaced in one step.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
-    write_arrays(path, SCHEMA, to_arrays(network))
-
-
-def load(path: Path) -> Network:
-    """Read a network; nothing in the file is executed.
-
-    Raises:
-        NetworkError: The file is missing, damaged, or no network.
-    """
-    return from_arrays(read_arrays(path, SCHEMA))
 
 
 def write_arrays(path: Path, schema: str, arrays: dict[str, np.ndarray]) -> None:

@@ -80,16 +80,22 @@ def with_unit(value: float, unit: str) -> str:
 
 def parameter_lines(result: Result | CalibrationRecord) -> list[str]:
     """Return a result's parameters with their units and standard deviations, a line each."""
-    deviations = [row[k] ** 0.5 for k, row in enumerate(result.fit.covariance)]
-    lines = []
-    for k, (name, value) in enumerate(result.fit.parameters.items()):
-        unit = parameter_unit(name, result)
-        spread = f" +- {with_unit(deviations[k], unit)}" if deviations else ""
-        lines.append(f"{name} {with_unit(value, unit)}{spread}")
+    lines = [f"{name} {text}" for name, text in parameter_texts(result).items()]
     if result.fit.residual_rms is not None:
         rms = with_unit(result.fit.residual_rms, _unit(result.channel))
         lines.append(f"residual {rms} rms")
     return lines
+
+
+def parameter_texts(result: Result | CalibrationRecord) -> dict[str, str]:
+    """Return the name of each parameter, and its value with unit and standard deviation."""
+    deviations = [row[k] ** 0.5 for k, row in enumerate(result.fit.covariance)]
+    texts = {}
+    for k, (name, value) in enumerate(result.fit.parameters.items()):
+        unit = parameter_unit(name, result)
+        spread = f" +- {with_unit(deviations[k], unit)}" if deviations else ""
+        texts[name] = f"{with_unit(value, unit)}{spread}"
+    return texts
 
 
 def parameter_unit(name: str, result: Result | CalibrationRecord) -> str:

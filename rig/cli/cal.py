@@ -90,6 +90,8 @@ def add(
 @cal_app.command("list")
 def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     """List every record, oldest first; the active ones are marked."""
+    from rig.calibrate.shown import parameter_texts
+
     kept = _store(store)
     active = {record.content_hash for record in kept.active().values()}
     records = kept.records()
@@ -99,7 +101,8 @@ def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
         mark = "*" if r.content_hash in active else " "
         whom = f", instrument {r.instrument}" if r.instrument else ""
         made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
-        screen.print(f"{mark} {r.content_hash}  {r.channel}  {made}", markup=False)
+        name, value = next(iter(parameter_texts(r).items()), ("", ""))
+        screen.print(f"{mark} {r.content_hash}  {r.channel}  {made}: {name} {value}", markup=False)
     screen.print(
         "* active"
         if records
@@ -127,7 +130,7 @@ def show(
     from rig.errors import UsageError
 
     found = _store(store).get(record)
-    for name, value in _flat(found).items():
+    for name, value in _in_words(found).items():
         results(json).print(f"{name}: {value}", markup=False)
     if figure is not None:
         if not found.figure_svg:
@@ -149,8 +152,11 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
         for name in sorted({*left, *right})
         if left.get(name) != right.get(name)
     }
-    for name, change in changes.items():
-        results(json).print(f"{name}: {change['first']} -> {change['second']}", markup=False)
+    shown = _in_words(a), _in_words(b)
+    for name in dict.fromkeys((*shown[0], *shown[1])):
+        before, after = (one.get(name) for one in shown)
+        if before != after:
+            results(json).print(f"{name}: {before} -> {after}", markup=False)
     if not changes:
         results(json).print("The two are the same record.")
     if json:
@@ -211,7 +217,8 @@ def check(
         word = "error" if v.is_error else "warning"
         results(json).print(f"{word}: {v.channel} {v.record}: {v.message} ({v.rule})", markup=False)
     bad = any(v.is_error for v in verdicts)
-    results(json).print(f"{len(active)} active, {len(verdicts)} remarks.")
+    fault = f"{len(verdicts)} objections, listed above" if verdicts else "nothing against them"
+    results(json).print(f"Active records: {len(active)}; {fault}.")
     if json:
         emit_json({"store": kept.folder, "ok": not bad, "verdicts": verdicts})
     return int(bad)
@@ -293,6 +300,15 @@ def _summary(record: "CalibrationRecord") -> dict[str, Any]:
         "operator": record.operator,
         "parameters": record.fit.parameters,
     }
+
+
+def _in_words(record: "CalibrationRecord") -> dict[str, Any]:
+    """Return a record for people: parameters with unit and spread, in place of a covariance."""
+    from rig.calibrate.shown import parameter_texts
+
+    known = {k: v for k, v in _flat(record).items() if not k.startswith("fit.")}
+    known["kind"] = f"{record.kind} ({record.fit.form})"
+    return known | parameter_texts(record) | {"residual rms": record.fit.residual_rms}
 
 
 def _flat(record: "CalibrationRecord") -> dict[str, Any]:

@@ -6,11 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from calibration.agreement import Agreement
+    from calibration.record import CalibrationRecord
+    from calibration.scales import Scale
+    from estimation.campaign import Run
     from rig.calibrate.zeros import ZeroMotion
 
 
@@ -24,13 +30,17 @@ def check(
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
     json: JsonFlag = False,
 ) -> int:
     """Verify the calibrations of sensors on recordings that exist; nothing moves.
 
-    Compares the spindle's encoder with the motor's: scale and offset, with the scatter over runs as
-    uncertainty. Of every sensor that is tared: how far its zero moved. Exit code 1 when one is off.
-    The scale of a torque or current sensor needs weights: rig calibrate.
+    Compares the spindle's encoder with the motor's (scale and offset), the torque sensors at both
+    ends with each other, and motor current and spindle torque with the rig's calibrated constant,
+    the scatter over runs as uncertainty. Of every sensor that is tared: how far its zero moved.
+    Exit code 1 when one is off. Friction bounds how closely torques compare; for more, weights are
+    needed: rig calibrate torque.
     """
     from calibration.agreement import NoPairError, agreements
     from rig.calibrate.zeros import zero_motions
@@ -49,14 +59,75 @@ def check(
         if not zeros:
             raise
         found = []
+    scales, unchecked = _scales(kept, _record(kept, config, sim))
+    lines = [line for one in found for line in lines_of(one)]
+    lines += [line for one in scales for line in scale_lines(one)]
+    lines += [*unchecked, *map(zero_line, zeros)]
     screen = results(json)
-    for line in (*(line for one in found for line in lines_of(one)), *map(zero_line, zeros)):
-        screen.print(line, markup=False)
+    for line in lines:
+        screen.print(line)
     wrong = [one.encoder for one in found if one.scale_is_wrong or one.offset_is_wrong]
+    wrong += [one.channel for one in scales if one.is_wrong]
     wrong += [one.channel for one in zeros if one.is_wrong]
     if json:
-        emit_json({"agreements": found, "zeros": zeros, "wrong": wrong})
+        emit_json({"agreements": found, "scales": scales, "zeros": zeros, "wrong": wrong})
     return 1 if wrong else 0
+
+
+def _record(runs: "Sequence[Run]", config: Path | None, sim: bool) -> "CalibrationRecord | None":
+    """Return the active calibration of the current for the recordings' instrument."""
+    from rig.configuration.chosen import choose_rig, default_config
+
+    if not runs or (config is None and not sim and default_config() is None):
+        return None
+    serial = runs[0].recording().instrument.serial
+    active = choose_rig(config, sim).default_store.active()
+    keys = [("current", "spindle_torque_n_m", instrument) for instrument in (serial, "")]
+    return next((active[key] for key in keys if key in active), None)
+
+
+def _scales(
+    runs: "Sequence[Run]", record: "CalibrationRecord | None"
+) -> "tuple[list[Scale], list[str]]":
+    """Return the scales that the runs allow to check, and why the others cannot be."""
+    from calibration.quality import BadDataError
+    from calibration.scales import current_scale, torque_scale
+
+    recordings = [run.recording() for run in runs]
+    found: list[Scale] = []
+    unchecked = []
+    checks: tuple[tuple[str, Callable[[], Scale]], ...] = (
+        ("the torque sensors' scale", lambda: torque_scale(recordings)),
+        ("motor current against torque", lambda: current_scale(recordings, record)),
+    )
+    for name, check in checks:
+        try:
+            found.append(check())
+        except BadDataError as error:
+            unchecked.append(f"not checked: {name}. {error.what}")
+    return found, unchecked
+
+
+def scale_lines(one: "Scale") -> list[str]:
+    """Return the scale of one sensor against another in words."""
+    word = "ALARM" if one.is_wrong else "noted" if one.expected is None else "good"
+    middle, half = (one.low + one.high) / 2, (one.high - one.low) / 2
+    head = f"{word}: {one.channel} against {one.reference}, {one.runs} runs:"
+    if not one.unit:  # a ratio of two torques
+        lines = [
+            f"{head} scale between {one.low:.3f} and {one.high:.3f} (95 %; friction may be any);"
+            f" 1 by {one.source}."
+        ]
+        help_ = (
+            "A torque sensor or the jaw's encoder is off: weights show which, rig calibrate torque"
+        )
+    else:
+        expected = "no calibrated constant: rig calibrate current"
+        if one.expected is not None:
+            expected = f"{one.expected:.3f} {one.unit} by {one.source}"
+        lines = [f"{head} {middle:.3f} +- {half:.3f} {one.unit} (95 %); {expected}."]
+        help_ = "Sensor of current, sensor of torque or gear changed: rig calibrate torque, current"
+    return [*lines, f"  {help_}"] if one.is_wrong else lines
 
 
 def zero_line(one: "ZeroMotion") -> str:

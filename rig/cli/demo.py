@@ -66,6 +66,8 @@ def _told(result: "Demo") -> list[str]:
         f"  rig diagnose {logs} --ledger {result.ledger}",
         "The model with the identified effect, as it runs:",
         f"  rig replay {logs} --model {result.model}",
+        "The recordings in a browser:",
+        f"  rig view {logs}",
         "To choose and record further experiments automatically, until the effect is unique:",
         "  rig loop --sim",
         "Open the page:",

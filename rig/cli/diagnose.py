@@ -42,17 +42,29 @@ def diagnose(
     ledger: Annotated[
         Path | None, typer.Option(help="Path of the held-out-data usage log.")
     ] = None,
+    plan: Annotated[
+        bool,
+        typer.Option(
+            "--plan",
+            help="PATH is a protocol or recordings: which effects such runs can distinguish.",
+        ),
+    ] = False,
     skip_bad: SkipBad = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
     ] = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
+    if plan:
+        _plan(path, model, balance, machine, json_)
+        return
+
     import json
 
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from estimation.files import check_output, write_text_atomic
+    from rig.diagnosis.durations import default_durations, measured, work_of
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
@@ -73,7 +85,8 @@ def diagnose(
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        with stages() as on_stage:
+        times, work = default_durations(), work_of(asked, quick)
+        with stages(times.expected(*work)) as shown, measured(shown) as (on_stage, seconds):
             done = run_diagnosis(
                 asked.campaign,
                 asked.models,
@@ -83,13 +96,14 @@ def diagnose(
                 quick=quick,
                 on_stage=on_stage,
             )
+    times.add(*work, seconds)
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []
     if model_out is not None:
         done = with_cost_of_causal_filters(done)
         model_file.write_all(written_models(done), model_out)
-        written.append(f"Model: {model_out}")
+        written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
     if page_file is not None:
         write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
@@ -105,3 +119,24 @@ def diagnose(
         screen.print(line, markup=False)
     if json_:
         emit_json(done.diagnosis.to_json())
+
+
+def _plan(
+    path: Path, model: Path | None, balance: str | None, machine: Path | None, json_: bool
+) -> None:
+    """Show what runs of a protocol can distinguish."""
+    from rig.diagnosis.plan import plan_of, sentences
+    from rig.output.console import progress
+
+    with progress() as bar:
+        task = bar.add_task("effects")
+
+        def count(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        found = plan_of(path, model, balance, machine, count)
+    screen = results(json_)
+    for line in sentences(found):
+        screen.print(line, markup=False)
+    if json_:
+        emit_json(found.to_json())

@@ -27,8 +27,18 @@ GROUPS = {
         "cal",
         "grasper",
     ),
-    "Recordings": ("campaigns", "import", "log", "replay"),
-    "Models": ("fit", "diagnose", "diff", "loop", "effects", "adapt", "estimator", "export"),
+    "Recordings": ("campaigns", "import", "log", "replay", "view"),
+    "Models": (
+        "fit",
+        "diagnose",
+        "model",
+        "diff",
+        "loop",
+        "effects",
+        "adapt",
+        "estimator",
+        "export",
+    ),
     "Papers": ("study",),
 }
 """Headings of the top list and the commands under each; others stand under `Commands`."""

@@ -61,9 +61,7 @@ def import_(
     preview: Annotated[
         bool, typer.Option("--preview", help="Show what would be imported; write no recording.")
     ] = False,
-    plots: Annotated[
-        Path | None, typer.Option(help="Plots of every channel: an .html or .png file.")
-    ] = None,
+    plots: Annotated[Path | None, typer.Option(help="Page of every channel (HTML).")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder of the recordings, one log a run.")
     ] = None,
@@ -95,7 +93,7 @@ def import_(
     if not recordings:
         raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
     found = look(recordings, said)
-    written = [] if preview or out is None else _write(recordings, out)
+    written = [] if preview or out is None else write_logs(recordings, out)
     if plots is not None:
         _draw(recordings, plots)
     if json:
@@ -144,7 +142,7 @@ def _rule(name: str, value: str) -> Any:
     return value
 
 
-def _write(recordings: "list[Recording]", out: Path) -> list[Path]:
+def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
     """Write the runs as logs, all or none."""
     from rig.errors import UsageError
     from rig.importers.derivatives import checked
@@ -163,17 +161,16 @@ def _write(recordings: "list[Recording]", out: Path) -> list[Path]:
 
 
 def _draw(recordings: "list[Recording]", plots: Path) -> None:
-    from rig.errors import UsageError
-    from rig.reports.table_plots import write_page, write_picture
+    from estimation.campaign import Campaign
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
+    from rig.reports.recordings import page
 
-    writers = {".html": write_page, ".png": write_picture}
-    if plots.suffix.lower() not in writers:
-        raise UsageError(f"{plots} is neither .html nor .png.", fix="Choose one of the endings.")
-    writers[plots.suffix.lower()](recordings, plots)
+    write_report(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
 
 
 def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:
-    from rig.output.table import TextTable, to_rich
+    from rig.output.table import TextTable, listed, to_rich
 
     screen = results(json)
     runs = [
@@ -183,10 +180,7 @@ def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", j
             f"{run.duration_s:.4g}",
             f"{run.rate_hz:.6g}" if run.rate_hz else "-",
             str(run.flagged),
-            ", ".join(
-                f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}"
-                for k, v in run.conditions.items()
-            ),
+            listed(run.conditions),
         )
         for run in found.runs[:MOST_RUNS]
     ]

@@ -59,14 +59,21 @@ def live(
     A simulated rig plays a default protocol; a real rig is never moved without
     --protocol. Ctrl-C quits, with the rig in its safe state and exit code 130. With --json, one
     object per line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m
-    marks it, s stops the rig, q quits.
+    marks it, s stops the rig, c shows the next channel, ? explains the keys, q quits.
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, estimators_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
-    from rig.live.keys import HELP, no_keys, pressed_keys
+    from rig.live.keys import (
+        OF_SESSION,
+        DisplayKeys,
+        in_a_line,
+        in_a_list,
+        no_keys,
+        pressed_keys,
+    )
     from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
     from rig.live.run import show
@@ -89,7 +96,8 @@ def live(
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     models = [estimator.model for estimator in estimators if estimator.model is not None]
     page = _page(host, web_port) if web else None
-    with pressed_keys() as keys:
+    with pressed_keys() as pressed:
+        keys = DisplayKeys(pressed) if pressed else None
         blocks = session_blocks(
             settings,
             lambda: open_logger(settings, pace=pace or None),
@@ -115,7 +123,9 @@ def live(
             plain=plain,
             json=json_,
             half_widths=HalfWidths(estimators),
-            footer=HELP if keys else "Ctrl-C quits",
+            footer=in_a_line(OF_SESSION) if keys else "Ctrl-C quits",
+            help=in_a_list(OF_SESSION),
+            keys=keys,
         )
         if page:
             from rig.live.web import shown_on

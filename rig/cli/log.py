@@ -186,13 +186,15 @@ def _described(log: "LogFile") -> dict[str, Any]:
 def _show_info(log: dict[str, Any]) -> None:
     from rich.table import Table
 
+    from rig.output.table import listed
+
     screen = results(json=False)
     run, end = log["run"], log["end"]
     screen.print(f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}")
     screen.print(f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
     if run is not None:
-        conditions = ", ".join(f"{name} = {value}" for name, value in run.conditions.items())
-        screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions or '-'}")
+        conditions = listed(run.conditions) or "-"
+        screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions}")
         screen.print(f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}")
         excluded = log["excluded"]
         screen.print(f"  excluded: {excluded}" if excluded else "  counts as evidence")

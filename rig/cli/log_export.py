@@ -9,6 +9,7 @@ from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
+    from estimation.campaign import Campaign
 
 
 def export(
@@ -16,7 +17,10 @@ def export(
         Path, typer.Argument(help="A log; or a folder, for one table of all its runs.")
     ],
     format_name: Annotated[
-        str, typer.Option("--format", help="csv or parquet; of a single log npz, too.")
+        str,
+        typer.Option(
+            "--format", help="csv or parquet; of a single log npz, too; mcap with --model."
+        ),
     ] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
@@ -32,21 +36,32 @@ def export(
         typer.Option(help="Apply this record of the store, by hash; may be repeated."),
     ] = None,
     store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Add the estimate of this model file as estimated_* columns."),
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Export a log, one file for each topic; or a campaign as one table.
 
     The table of a campaign (a folder or an archive of any format that is known) has a row a sample,
     with its run and conditions. Parquet holds units, instrument, calibrations and notes as
-    metadata; for a CSV they are written to NAME.csv.json.
+    metadata; for a CSV they are written to NAME.csv.json. With --model and --format mcap, logs with
+    the estimate next to the sensor are written into a folder, for Foxglove and PlotJuggler.
     """
+    from rig.cli.import_ import write_logs
     from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log
 
-    if path.is_dir() or not path.name.endswith((".mcap", ".part")):
+    if model or path.is_dir() or not path.name.endswith((".mcap", ".part")):
         if topic or calibration or record:
-            raise UsageError("--topic, --calibration and --record are of a single log.")
-        _export_campaign(path, format_name, out, force, json)
+            raise UsageError("--topic, --calibration and --record are of a single log as it is.")
+        campaign = _campaign(path, model)
+        if model and format_name == "mcap":
+            written = write_logs(list(campaign), out or Path(f"{path.resolve().name}.estimated"))
+            _said(written, campaign, json)
+            return
+        _export_campaign(path, campaign, format_name, out, force, json)
         return
     known = [item.value for item in ExportFormat]
     if format_name not in known:
@@ -65,13 +80,30 @@ def export(
             results(json).print(f"wrote {target}")
 
 
-def _export_campaign(
-    path: Path, format_name: str, out: Path | None, force: bool, json: bool
-) -> None:
-    """Write all runs at a path as one table."""
+def _campaign(path: Path, model: Path | None) -> "Campaign":
+    """Return the runs at a path that count, with the estimate of a model."""
     from rig.cli.left_out import say_left_out
-    from rig.errors import UsageError
+    from rig.cli.view import with_model
     from rig.importers.registry import open_campaign
+
+    campaign = open_campaign(path)
+    say_left_out(path, campaign)
+    return with_model(campaign.evidence, model) if model else campaign.evidence
+
+
+def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
+    if json:
+        emit_json({"written": written, "runs": campaign.names})
+    else:
+        where = written[0] if len(written) == 1 else written[0].parent
+        results(json).print(f"wrote {where}: {len(campaign)} runs")
+
+
+def _export_campaign(
+    path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
+) -> None:
+    """Write all runs as one table."""
+    from rig.errors import UsageError
     from rig.importers.tidy import TidyFormat, write_tidy
 
     known = [item.value for item in TidyFormat]
@@ -80,16 +112,10 @@ def _export_campaign(
             f"A campaign is not exported as {format_name!r}.",
             fix=f"Choose one of {', '.join(known)}.",
         )
-    campaign = open_campaign(path)
-    say_left_out(path, campaign)
     if out is not None and out.is_dir():
         out = out / f"{path.resolve().name}.{format_name}"
     target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
-    written = write_tidy(campaign, target, TidyFormat(format_name), force)
-    if json:
-        emit_json({"written": [written], "runs": campaign.evidence.names})
-    else:
-        results(json).print(f"wrote {written}: {len(campaign.evidence)} runs")
+    _said([write_tidy(campaign, target, TidyFormat(format_name), force)], campaign, json)
 
 
 def _other_calibrations(

@@ -22,6 +22,7 @@ def show_runs(path: Path, json: bool) -> None:
     """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
     from rig.cli.left_out import say_left_out
     from rig.importers.registry import open_campaign
+    from rig.output.table import listed
 
     campaign = open_campaign(path)
     say_left_out(path, campaign)
@@ -37,12 +38,11 @@ def show_runs(path: Path, json: bool) -> None:
     screen.print(f"{len(runs)} runs. Channels: {', '.join(channels)}.")
     width = max((len(run["name"]) for run in runs), default=0)
     for run in runs:
-        conditions = ", ".join(f"{name} = {value}" for name, value in run["conditions"].items())
         flagged = f"; flagged samples: {run['flagged']}" if run["flagged"] else ""
         excluded = f"; does not count: {run['excluded']}" if run["excluded"] else ""
         screen.print(
             f"{run['name']:{width}}  {run['duration_s']:.3f} s, {run['rate_hz']:.4g} Hz"
-            f"  {conditions}{flagged}{excluded}"
+            f"  {listed(run['conditions'])}{flagged}{excluded}"
         )
 
 

@@ -33,11 +33,13 @@ from rig.cli.live import live
 from rig.cli.log import log_app
 from rig.cli.loop import loop
 from rig.cli.machine import machine_app
+from rig.cli.model import model_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
 from rig.cli.stop import stop
 from rig.cli.study import study_app
+from rig.cli.view import view
 
 # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -59,9 +61,11 @@ app.command()(demo)
 app.command()(record)
 app.command()(live)
 app.command()(replay)
+app.command()(view)
 app.command()(grip)
 app.command()(fit)
 app.command()(adapt)
+app.add_typer(model_app, name="model")
 app.command()(export)
 app.add_typer(estimator_app, name="estimator")
 app.add_typer(calibrate_app, name="calibrate")

@@ -79,9 +79,8 @@ def record(
     screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
     recorded = _recorded(settings, todo, folder, notes, watch)
     bad = [result.name for result in recorded if result.drifted or not result.complete]
-    results(json).print(
-        f"{len(recorded)} runs recorded, {len(bad)} to look at. Next: rig log check {folder}"
-    )
+    wrong = f"drifted or not complete: {', '.join(bad)}" if bad else "all complete"
+    results(json).print(f"{len(recorded)} runs recorded, {wrong}. Next: rig log check {folder}")
     if json:
         found = {"folder": folder, "runs": recorded, "look_at": bad}
         emit_json(found if watch is None else {**found, "models": watch.to_json()})

@@ -21,7 +21,10 @@ def replay(
     run: Annotated[
         str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="Model file of the live estimate.")] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
+    ] = None,
     speed: Annotated[
         float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
@@ -50,18 +53,20 @@ def replay(
 
     Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130. In a terminal, keys:
-    space pauses, + and - change the speed, f skips 5 s, q quits. With --core nothing is
+    space pauses, + and - change the speed, f skips 5 s, c shows the next channel, ? explains the
+    keys, q quits. With --core nothing is
     shown: the exit code is 1 when a sample is not the same, bit for bit.
     """
     if core:
         return _core(log, config, json_)
+    from rig.configuration.model_in_use import model_in_use
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
-    from rig.live.keys import pressed_keys
+    from rig.live.keys import DisplayKeys, in_a_line, in_a_list, pressed_keys
     from rig.live.model_status import with_model_status
     from rig.live.options import ShowOptions
-    from rig.live.replay import HELP, Pace, replay_blocks
+    from rig.live.replay import OF_REPLAY, Pace, replay_blocks
     from rig.live.run import show
     from rig.live.watching import watched
     from rig.machines.recordings import open_recordings
@@ -72,7 +77,10 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
-    estimators = _estimators(model, recording, any_instrument) if model else []
+    path = model or model_in_use(recording.rig)
+    if path is not None and path != model and not json_:
+        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
+    estimators = _estimators(path, recording, any_instrument) if path else []
     usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(
         title=f"rig replay {recording.name}",
@@ -83,14 +91,17 @@ def replay(
         json=json_,
     )
     models = [estimator.model for estimator in estimators if estimator.model is not None]
-    with pressed_keys() as keys:
+    with pressed_keys() as pressed:
+        keys = DisplayKeys(pressed) if pressed else None
         pace = Pace(speed or None, keys) if keys else None
         blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None, pace=pace))
         if estimators:
             blocks = with_model_status(blocks, estimators)
         if len(models) == 1:
             blocks = watched(blocks, models[0])
-        options = replace(options, footer=HELP if keys else options.footer)
+        if keys:
+            shown = in_a_line(OF_REPLAY), in_a_list(OF_REPLAY)
+            options = replace(options, footer=shown[0], help=shown[1], keys=keys)
         summary = show(blocks, options, results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
@@ -121,17 +132,10 @@ def _core(log: Path, config: Path | None, json: bool) -> int:
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
     """Return the named run, or the first valid one, and print its name."""
-    from rig.errors import DataError, UsageError
+    from rig.cli.view import chosen_runs
 
-    if not len(campaign):
-        raise DataError("The log holds no runs.", "There is nothing to show.")
-    if name is not None and name not in campaign.names:
-        raise UsageError(
-            f"The log has no run {name!r}.",
-            f"It has: {', '.join(campaign.names)}.",
-            f"Type --run {campaign.names[0]}",
-        )
-    runs = campaign.select([name]).runs if name else (campaign.evidence.runs or campaign.runs)
+    chosen = chosen_runs(campaign, [name] if name else [])
+    runs = chosen.runs if name else (chosen.evidence.runs or chosen.runs)
     recording = runs[0].recording()
     if not quiet:
         _tell(campaign, recording, chosen=name is not None)

@@ -218,10 +218,10 @@ def zhao(
             f"There is no prototype {prototype!r}.", f"Known: {', '.join(PROTOTYPES)}."
         )
     steps = (3 + seeds) * len(FAMILIES) + seeds  # three diagnoses a family, and haptics
-    with resumable(state, "zhao", steps, "graspers") as (kept, step):
-        study = run_study(prototype, seeds, spread, kept, workers=workers, on_step=step)
+    with resumable(state, "zhao", steps, workers, "graspers") as keeper:
+        study = run_study(prototype, seeds, spread, keeper)
         added = study.lacking[OWN, "grasp"].terms
-        haptics = haptics_of(prototype, seeds, spread, added, kept, workers=workers, on_step=step)
+        haptics = haptics_of(prototype, seeds, spread, added, keeper)
     drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
     def markdown() -> str:

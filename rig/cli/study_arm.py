@@ -14,6 +14,7 @@ from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
     from rig.output.table import TextTable
+    from rig.studies.seeds import Keeper
 
 arm_studies = typer.Typer(rich_markup_mode=None)
 
@@ -61,18 +62,20 @@ def _show(
 
 @contextmanager
 def resumable(
-    state: Path | None, study: str, total: int, what: str = "arms"
-) -> Iterator[tuple[Path, Callable[[], None]]]:
+    state: Path | None, study: str, total: int, workers: int, what: str = "arms"
+) -> Iterator["Keeper"]:
     """Show how much of a study is done; after an interruption, print how to resume.
 
     Yields:
-        Where the study keeps what is done, and what to call after each step.
+        What keeps what the study has done.
     """
+    from rig.studies.seeds import Keeper
+
     kept = state or Path.home() / ".cache" / "rig" / study
     try:
         with progress() as bar:
             task = bar.add_task(what, total=total)
-            yield kept, lambda: bar.advance(task)
+            yield Keeper(kept, workers, lambda: bar.advance(task))
     except KeyboardInterrupt:
         sys.stderr.write(f"Finished parts are kept in {kept}: the same command resumes.\n")
         raise
@@ -155,8 +158,8 @@ def wrench(
     from rig.studies.pique import wrench_page as shown
     from rig.studies.pique.wrench import run_wrench_study
 
-    with resumable(state, "wrench", seeds * len(FAMILIES)) as (kept, on_arm):
-        study = run_wrench_study(seeds, kept, workers, on_arm)
+    with resumable(state, "wrench", seeds * len(FAMILIES), workers) as keeper:
+        study = run_wrench_study(seeds, keeper)
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.NOTES]
     page = partial(shown.markdown, study)
@@ -177,8 +180,8 @@ def delsol(
     from rig.studies.delsol import page as shown
     from rig.studies.delsol.study import run_delsol
 
-    with resumable(state, "delsol", seeds * len(FAMILIES)) as (kept, on_arm):
-        study = run_delsol(seeds, kept, workers, on_arm)
+    with resumable(state, "delsol", seeds * len(FAMILIES), workers) as keeper:
+        study = run_delsol(seeds, keeper)
     drawn = shown.write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), shown.NOTE]
     page = partial(shown.markdown, study)
@@ -200,8 +203,8 @@ def zhang(
     from rig.studies.zhang.figures import write_figures
     from rig.studies.zhang.study import run_zhang
 
-    with resumable(state, "zhang", seeds * len(FAMILIES)) as (kept, on_arm):
-        study = run_zhang(seeds, kept, workers, on_arm)
+    with resumable(state, "zhang", seeds * len(FAMILIES), workers) as keeper:
+        study = run_zhang(seeds, keeper)
     drawn = write_figures(figures, study) if figures is not None else []
     lines = [shown.lead(study), *shown.notes(study)]
     page = partial(shown.markdown, study)

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 from rig.configuration.config import SIMULATED, Config, load_config
+from rig.configuration.model_in_use import own_folder
 from rig.errors import UsageError
 
 ENVIRONMENT = "RIG_CONFIG"
@@ -18,12 +19,6 @@ ONE_OF = (
     "or name it with --config. --sim asks for the simulated rig."
 )
 """What to do where no rig is configured."""
-
-
-def own_folder() -> Path:
-    """Return the folder of a person's configurations, `~/.config/rig`."""
-    base = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "rig"
 
 
 def default_config() -> Path | None:

@@ -26,6 +26,7 @@ from rig.configuration.machine_settings import (
     ReferenceLimits,
     settings_of,
 )
+from rig.configuration.model_in_use import model_in_use
 from rig.configuration.plausibility import PlausibilitySection
 from rig.configuration.sections import (
     ControllerSection,
@@ -52,7 +53,8 @@ class Config(Section):
     Attributes:
         name: Name of the rig, written into each log.
         lever_arm_m: Lever arm from the jaw's axis to its tip, for the force that is shown.
-        model: Fitted model of `rig live`: a file, or a shipped one by name.
+        model: Fitted model of `rig live`: a file, or a shipped one by name; `rig model use` goes
+            before it.
         calibration: Calibration set: a TOML file, or a shipped one by name.
         calibration_store: Folder of the store whose active records go before that set's lines, or
             `default` for the store that `rig cal` uses; no store if none.
@@ -129,11 +131,13 @@ class Config(Section):
 
     @property
     def model_path(self) -> Path | None:
-        """The fitted model `rig live` estimates with: a file, or a shipped one by name."""
+        """The fitted model `rig live` estimates with: the one in use, else the configured one."""
+        if chosen := model_in_use(self.name):
+            return chosen
         if self.model is None:
             return None
-        path = Path(self.model)
-        return path if path.suffix == ".toml" else SHIPPED / f"{self.model}.model.toml"
+        shipped = SHIPPED / f"{self.model}.model.toml"
+        return shipped if shipped.is_file() else Path(self.model)
 
     @property
     def store(self) -> CalibrationStore | None:

@@ -23,12 +23,16 @@ class LedgerError(DataError):
     """The ledger cannot be read or written."""
 
 
-def default_ledger() -> Path:
-    """Return the access log: in `RIG_STATE_DIR`, else in the user's state folder."""
+def state_folder() -> Path:
+    """Return `$RIG_STATE_DIR`, else `rig` in the user's state folder."""
     if own := os.environ.get("RIG_STATE_DIR"):
-        return Path(own) / "looks.jsonl"
-    state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
-    return Path(state) / "rig" / "looks.jsonl"
+        return Path(own)
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "rig"
+
+
+def default_ledger() -> Path:
+    """Return the access log, in the state folder."""
+    return state_folder() / "looks.jsonl"
 
 
 @dataclass(frozen=True)

@@ -85,8 +85,10 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
         (places, old), (_, new) = sides[0], sides[1]
         clock = refit.recordings[run].time_s
         # a cause that no model file holds is no term of the equation: its channels are read here
-        filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
-        read = {channel: filtered[channel][places] for channel in wanted}
+        read = {}
+        if wanted:
+            filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
+            read = {channel: filtered[channel][places] for channel in wanted}
         time_s = clock[places] - clock[0]
         runs.append(RunTrace(run, time_s, measured, old - old.mean(), new - new.mean(), read))
     return EquationTraces(refit.model, tuple(runs))
@@ -96,7 +98,7 @@ def _channels(kept: Kept) -> tuple[str, ...]:
     """Return the channels of a cause's variables, time left out."""
     cause = kept.scored.candidate.cause
     if isinstance(cause, Function):
-        roles = [cause.place.roles[v][0] for v in cause.variables if v in cause.place.roles]
+        roles = list(cause.reads)
     else:
         roles = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
     return tuple(dict.fromkeys(c for c in roles if c != "time_s"))[:MOST]

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.recording import FloatArray
 from rig.grasper.coupling import Coupling, GrasperError, Limits
 from rig.grasper.wrist import CablePath, Planetary
 
@@ -81,46 +80,6 @@ def planetary_grasper(
         _jaw_per_motor(drive, path.d3_m),
         limits,
     )
-
-
-def coupled_grasper(
-    wrist_pulley_m: float,
-    jaw_pulley_m: float,
-    drive: Drive = PAPER_DRIVE,
-    limits: Limits | None = None,
-) -> Coupling:
-    """Return a grasper whose jaw cables run over the yaw joint's pulley, as on an EndoWrist.
-
-    A yaw of theta turns both jaws by -theta times the ratio of the pulleys (the paper's Figure 2),
-    until their motors make up for it.
-
-    Args:
-        wrist_pulley_m: Diameter of the pulley at the yaw joint.
-        jaw_pulley_m: Diameter of the jaws' pulleys.
-        drive: Gearheads and drums.
-        limits: Limits of yaw, pitch and grasp.
-    """
-    if not (min(wrist_pulley_m, jaw_pulley_m) > 0):
-        raise GrasperError("A pulley's diameter is greater than zero.")
-    yaw = 1.0 / (drive.gearhead_ratio * drive.carrier_pulley_over_drum)
-    jaw_per_yaw = -wrist_pulley_m / jaw_pulley_m
-    jaw = _jaw_per_motor(drive, jaw_pulley_m)
-    return _grasper("coupled grasper", yaw, jaw_per_yaw * yaw, jaw, limits)
-
-
-def jaw_angles(joint_rad: FloatArray) -> FloatArray:
-    """Return the angles of jaw 1 and jaw 2, shape (..., 2), from yaw, pitch, grasp, (..., 3)."""
-    pitch, grasp = joint_rad[..., 1], joint_rad[..., 2]
-    return np.stack([pitch + grasp / 2, pitch - grasp / 2], axis=-1)
-
-
-def jaw_torques(joint_n_m: FloatArray) -> FloatArray:
-    """Return the torques on jaw 1 and jaw 2, shape (..., 2), from those on the joints, (..., 3).
-
-    By the same power on both sides: pitch torque is their sum, grasp torque half their difference.
-    """
-    pitch, grasp = joint_n_m[..., 1], joint_n_m[..., 2]
-    return np.stack([pitch / 2 + grasp, pitch / 2 - grasp], axis=-1)
 
 
 def _check_cables_stay_on(path: CablePath, planetary: Planetary, yaw_rad: float) -> None:

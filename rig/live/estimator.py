@@ -1,17 +1,20 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import model_file
+from estimation.channels import ESTIMATED
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator, BankStepper
+from estimation.estimators.instrument import require_own
 from estimation.estimators.network import NetworkEstimator, NetworkStepper
 from estimation.model import Model
-from estimation.recording import MissingChannelError
+from estimation.recording import MissingChannelError, Recording
 from estimation.signals import reference
 from estimation.stream import Stream
 from rig.live.block import FloatArray
@@ -106,6 +109,21 @@ def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
     if path.suffix == ".npz":
         return [ModelEstimator(path, sample_rate_hz)]
     return [ModelEstimator(path, sample_rate_hz, m.balance) for m in models_in_use(path)]
+
+
+def with_estimates(recording: Recording, path: Path) -> Recording:
+    """Return a recording with what a file's estimators would have shown live, as `estimated_*`.
+
+    Raises:
+        EstimationError: As for `estimators_of`; a channel is missing; the recording is of another
+            instrument than the estimator.
+    """
+    estimated = {}
+    for estimator in estimators_of(path, recording.sample_rate_hz):
+        require_own(estimator.instrument, recording)
+        name = f"{ESTIMATED}{estimator.target_channel}"
+        estimated[name] = estimator.push(recording.columns, recording.time_s)
+    return replace(recording, columns={**recording.columns, **estimated})
 
 
 def models_in_use(path: Path) -> list[Model]:

@@ -2,11 +2,24 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 
 TARE, MARK, RECORD, STOP, LEAVE = "t", "m", "r", "s", "q"
-HELP = "t tare  m mark  r record  s stop  q quits"
+CHANNEL, HELP = "c", "?"
+OF_DISPLAY = {
+    CHANNEL: ("channel", "shows the next channel of the rig in large digits and as trace"),
+    HELP: ("help", "shows or hides this list"),
+}
+OF_SESSION = {
+    TARE: ("tare", "takes the sensors' zeros; at standstill and not while recording"),
+    MARK: ("mark", "marks the newest sample of the recording"),
+    RECORD: ("record", "starts or stops a recording"),
+    STOP: ("stop", "disarms the rig, waits for the board's confirmation, and goes on watching"),
+    **OF_DISPLAY,
+    LEAVE: ("quits", "ends the display; the rig is disarmed"),
+}
+"""Key to its word and what it does."""
 
 Keys = Callable[[], str]
 """Gives the keys pressed since it was last asked; empty when there are none."""
@@ -15,6 +28,38 @@ Keys = Callable[[], str]
 def no_keys() -> str:
     """Return that nothing was pressed."""
     return ""
+
+
+def in_a_line(keys: Mapping[str, tuple[str, str]]) -> str:
+    """Return keys with their words."""
+    return "  ".join(f"{key} {word}" for key, (word, _) in keys.items())
+
+
+def in_a_list(keys: Mapping[str, tuple[str, str]]) -> str:
+    """Return keys with what they do, a line each."""
+    return "\n".join(f"{key:>5}  {does}" for key, (_, does) in keys.items())
+
+
+class DisplayKeys:
+    """Keys, of which those of the display alone are kept back: the channel shown, and the help.
+
+    Args:
+        keys: All keys pressed.
+    """
+
+    def __init__(self, keys: Keys) -> None:
+        self._keys = keys
+        self.chosen = 0
+        """How often another channel was asked for."""
+        self.helps = False
+        """Whether the help is shown."""
+
+    def __call__(self) -> str:
+        """Return the keys that are not the display's."""
+        pressed = self._keys()
+        self.chosen += pressed.count(CHANNEL)
+        self.helps ^= pressed.count(HELP) % 2 == 1
+        return "".join(key for key in pressed if key not in OF_DISPLAY)
 
 
 @contextmanager

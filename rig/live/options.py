@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rig.errors import UsageError
+from rig.live.keys import DisplayKeys
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,8 @@ class ShowOptions:
         json: One JSON object a line on stdout, nothing for people.
         half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
         footer: Available keys.
+        help: What the keys do, a line each.
+        keys: Keys of the display; None without.
     """
 
     title: str
@@ -28,6 +31,8 @@ class ShowOptions:
     json: bool = False
     half_widths: Mapping[str, float] = field(default_factory=dict)
     footer: str = "Ctrl-C quits"
+    help: str = ""
+    keys: DisplayKeys | None = None
 
     def __post_init__(self) -> None:
         """Check the lever arm.

@@ -7,17 +7,24 @@ from typing import Protocol
 
 import numpy as np
 
+from estimation.channels import ESTIMATED
 from estimation.recording import Flag, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
-from rig.live.keys import LEAVE, Keys, no_keys
+from rig.live.keys import LEAVE, OF_DISPLAY, Keys, no_keys
 
-HELP = "space pause  + faster  - slower  f skip 5 s  q quits"
+OF_REPLAY = {
+    "space": ("pause", "pauses, or goes on"),
+    "+": ("faster", "doubles the speed"),
+    "-": ("slower", "halves the speed"),
+    "f": ("skip 5 s", "skips 5 s"),
+    **OF_DISPLAY,
+    LEAVE: ("quits", "ends the replay"),
+}
+"""Key to its word and what it does."""
 SKIP_S = 5.0
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 """A shorter wait is none; keys are read at least as often as the longer one."""
-ESTIMATED = "estimated_"
-"""A column so prefixed holds the estimate that was made while recording."""
 
 
 class EstimateStream(Protocol):

@@ -42,7 +42,7 @@ def show(
         first = next(blocks)
         options = replace(options, channels=tuple(first.columns)[:MOST_SHOWN])
         blocks = chain([first], blocks)
-    state = LiveState(options.channels)
+    state = LiveState(options.channels, all_columns=options.keys is not None)
     writer = choose_writer(options, console, clock)
     ended = "finished"
     with ExitStack() as stack:

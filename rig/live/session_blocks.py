@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.transport import Transport
-from estimation.channels import unit_of
+from estimation.channels import ESTIMATED, unit_of
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
@@ -48,12 +48,14 @@ def session_blocks(
             session.settle()
             session.take_zeros(ZERO_S)
         calibrations = CalibrationStatus(config, session.calibrations.name)
-        with closing(_Hand(session, keys, folder)) as hand:
+        named = dict.fromkeys(f"{ESTIMATED}{one.target_channel}" for one in estimators)
+        with closing(_Hand(session, keys, LiveRecorder(session, folder, further=[*named]))) as hand:
             for reading in _readings(session, plans, hand):
-                hand.obey(reading)
+                block = _block(session, reading, estimators)
+                estimated = {f"{ESTIMATED}{name}": v for name, v in block.estimates.items()}
+                hand.obey(replace(reading, columns={**reading.columns, **estimated}))
                 if hand.leaves:
                     return
-                block = _block(session, reading, estimators)
                 said = (*block.devices, calibrations.of(reading), *hand.status())
                 yield replace(block, devices=said)
 
@@ -61,10 +63,10 @@ def session_blocks(
 class _Hand:
     """Actions of the keys in a session: tare, mark, record, stop, quit."""
 
-    def __init__(self, session: Session, keys: Keys, folder: Path) -> None:
+    def __init__(self, session: Session, keys: Keys, recorder: LiveRecorder) -> None:
         self._session = session
         self._keys = keys
-        self._recorder = LiveRecorder(session, folder)
+        self._recorder = recorder
         self._said = ""
         self.leaves = False
         self.stopped = False

@@ -126,13 +126,15 @@ class Summary:
 class LiveState:
     """Accumulates blocks. Flagged samples count as received but give no value."""
 
-    def __init__(self, channels: tuple[str, ...]) -> None:
+    def __init__(self, channels: tuple[str, ...], all_columns: bool = False) -> None:
         """Start with nothing seen.
 
         Args:
             channels: The quantities to watch, the main one first.
+            all_columns: Watch all other columns of the first block, too.
         """
         self.channels = channels
+        self._takes_all = all_columns
         self._window = Window(FIRST_CHANNEL + 3 * len(channels), TRACE_S, BIN_S)
         self._time_s: float | None = None
         self._last: SampleBlock | None = None
@@ -158,6 +160,10 @@ class LiveState:
         self._silent = self._silent + 1 if len(block) == 0 else 0
         if self._silent:
             return
+        if self._takes_all:
+            self._takes_all = False
+            self.channels = tuple(dict.fromkeys((*self.channels, *block.columns)))
+            self._window = Window(FIRST_CHANNEL + 3 * len(self.channels), TRACE_S, BIN_S)
         self._estimated, self._sensed = frozenset(block.estimates), frozenset(block.columns)
         first_s, last_s = float(block.time_s[0]), float(block.time_s[-1])
         if self._time_s is not None and first_s <= self._time_s:

@@ -43,7 +43,7 @@ class View:
         snapshot: Content of the display.
         title: Title: a session's or a recording's name.
         lever_m: Lever arm from the jaw's axis to its tip, m.
-        footer: Available keys.
+        footer: Available keys, in one line or more.
         half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
     """
 
@@ -73,9 +73,10 @@ class View:
             seen = words.flagged(snapshot.flagged)
             above.append(_styled(f"▲ flagged in {TRACE_S:g} s: {seen}", "warning"))
         below = [_device(device) for device in snapshot.devices]
-        room = max(height - len(above) - len(below) - 1 - LEAST_TRACES, 1)
+        footer = [_styled(line, "quiet") for line in self.footer.splitlines()]
+        room = max(height - len(above) - len(below) - len(footer) - LEAST_TRACES, 1)
         below += list(_limits(snapshot.limits, width, room))
-        below.append(_styled(self.footer, "quiet"))
+        below += footer
         free = height - len(above) - len(below)
         return [*above, *_traces(main, width, free), *below]
 
@@ -157,7 +158,7 @@ def _traces(reading: Reading, width: int, free: int) -> Iterator[Text]:
     factor, unit, _ = words.in_shown_unit(reading.unit)
     traces = {"estimate": reading.estimate_trace * factor, "sensor": reading.sensor_trace * factor}
     shown = {name: trace for name, trace in traces.items() if not np.all(np.isnan(trace))}
-    height = min(free - 1, 12) // max(len(shown), 1)
+    height = (free - 1) // max(len(shown), 1)
     if not shown or height < 1:
         return
     scale = round_scale(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from typing import Protocol
 
 from rich.console import Console
@@ -12,7 +13,7 @@ from rich.segment import Segment
 from estimation.channels import unit_of
 from rig.live.options import ShowOptions
 from rig.live.plain import json_frame, plain_line
-from rig.live.state import Snapshot, Summary
+from rig.live.state import Reading, Snapshot, Summary
 from rig.live.text import summary_lines
 from rig.live.view import View
 from rig.output.console import emit_json
@@ -152,8 +153,17 @@ class DisplayWriter:
                 self._console.control(END_FRAME)
 
     def _view(self, snapshot: Snapshot) -> View:
-        options = self._options
-        return View(snapshot, options.title, options.lever_m, options.footer, options.half_widths)
+        options, keys, footer = self._options, self._options.keys, self._options.footer
+        if keys is not None:
+            snapshot = replace(snapshot, readings=self._chosen(snapshot.readings, keys.chosen))
+            footer = options.help if keys.helps else footer
+        return View(snapshot, options.title, options.lever_m, footer, options.half_widths)
+
+    def _chosen(self, readings: tuple[Reading, ...], chosen: int) -> tuple[Reading, ...]:
+        """Return the chosen channel and the usual ones."""
+        main = readings[chosen % len(readings)]
+        usual = readings[: len(self._options.channels)]
+        return (main, *(reading for reading in usual if reading is not main))
 
 
 def _say(console: Console, line: str) -> None:

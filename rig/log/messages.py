@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.channels import ESTIMATED
 from rig.errors import DataError
 from rig.log.schema import CDR_HEADER, MESSAGE_OPCODE, Stream
 
@@ -68,7 +69,7 @@ def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
     names = [field.name for field in stream.fields]
     bad = np.zeros(payload.size, bool)
     for field in stream.fields:
-        if field.dtype.startswith("float"):
+        if field.dtype.startswith("float") and not field.name.startswith(ESTIMATED):
             bad |= ~np.isfinite(payload[field.name])
     if "flags" in names:
         bad &= payload["flags"] == 0

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from estimation.channels import ending_of, unit_of
 from estimation.recording import FloatArray
 from rig.output.table import TextTable
 
@@ -19,8 +20,8 @@ POINTS = 1200
 """Most points a line is drawn with."""
 
 Line = Mapping[str, Any]
-"""A trace of Plotly. Its `meta` has the `role` (`before`, `after`, `measured`, `level`), which sets
-its colour, and the `run` it belongs to, if one."""
+"""A trace of Plotly. Its `meta` has the `role` (`before`, `after`, `measured`, `level`,
+`channel0` to `channel5`), which sets its colour, and the `run` it belongs to, if one."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +49,46 @@ class Chart:
     table: TextTable | None = None
 
 
-def numbers(values: FloatArray, digits: int = 4) -> list[float | None]:
+def numbers(values: FloatArray, digits: int = 5) -> list[float | None]:
     """Return values for a chart, rounded to significant digits; None where not finite."""
     finite = np.isfinite(values)
     return [float(f"{v:.{digits}g}") if ok else None for v, ok in zip(values, finite, strict=True)]
 
 
-def thinned(values: FloatArray) -> FloatArray:
-    """Return every n-th value, so that at most `POINTS` are left."""
-    return values[:: max(1, -(-len(values) // POINTS))]
+def thinned(values: FloatArray, points: int = POINTS) -> FloatArray:
+    """Return every n-th value, so that at most `points` are left."""
+    return values[:: max(1, -(-len(values) // points))]
+
+
+def words(channel: str) -> tuple[str, str]:
+    """Return a channel's name without its unit's suffix, and that unit."""
+    return channel.removesuffix(f"_{ending_of(channel)}").replace("_", " "), unit_of(channel)
+
+
+def axis(title: str, unit: str) -> dict[str, Any]:
+    """Return an axis of a variable, for a layout."""
+    return {
+        "title": {"text": title},
+        "zeroline": False,
+        "unifiedhovertitle": {"text": f"%{{x:.4g}} {unit}"},
+    }
+
+
+def line(
+    x: FloatArray, y: FloatArray, name: str, meta: Line, unit: str, *, legend: bool = True
+) -> dict[str, Any]:
+    """Return a line; without an entry in the legend it has no text on hover either."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": numbers(x, 6),
+        "y": numbers(y),
+        "name": name,
+        "meta": meta,
+        "showlegend": legend,
+        "hoverinfo": "all" if legend else "skip",
+        "hovertemplate": f"%{{y:.3g}} {unit}" if legend else None,
+    }
 
 
 def embedded(charts: Sequence[Chart]) -> Markup:

@@ -17,12 +17,15 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress, Task
 
     from rig.output.table import TextTable
 
 PIPE_WIDTH = 240
 """Columns of a table without a window to limit it."""
+
+IN_MINUTES_S = 90.0
+"""From here on a time is stated in minutes."""
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 """The `--json` option every verb has."""
@@ -75,17 +78,55 @@ def progress() -> "Progress":
     )
 
 
+def time_left(expected: Mapping[str, tuple[float, float]], stage: str, elapsed_s: float) -> str:
+    """Return the time that is left in words; empty where it is not known.
+
+    Args:
+        expected: Shortest and longest time of each stage, s, in order.
+        stage: The one at work.
+        elapsed_s: Time since it began.
+    """
+    if stage not in expected:
+        return ""
+    if elapsed_s > expected[stage][1]:
+        return "longer than before"
+    later = list(expected).index(stage) + 1
+    ends = [
+        max(0.0, expected[stage][k] - elapsed_s)
+        + sum(times[k] for times in list(expected.values())[later:])
+        for k in (0, 1)
+    ]
+    size, unit = (1.0, "s") if ends[1] < IN_MINUTES_S else (60.0, "min")
+    low, high = (f"{end / size:.0f}" for end in ends)
+    return f"about {high} {unit} left" if low == high else f"{low} to {high} {unit} left"
+
+
 @contextmanager
-def stages() -> "Iterator[Callable[[str], None]]":
-    """Yield what is called with each stage that begins; a terminal shows how long each takes."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+def stages(
+    expected: Mapping[str, tuple[float, float]] | None = None,
+) -> "Iterator[Callable[[str], None]]":
+    """Yield what is called with each stage that begins; a terminal shows how long each takes.
+
+    Args:
+        expected: Shortest and longest time of each stage, s, in order, as far as they are known.
+    """
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.text import Text
+
+    class Left(ProgressColumn):
+        """The time left, next to the stage at work."""
+
+        def render(self, task: "Task") -> Text:
+            if task.finished or task.elapsed is None:
+                return Text("")
+            return Text(time_left(expected or {}, task.description, task.elapsed))
 
     screen = remarks()
     if not screen.is_terminal:
         yield lambda what: screen.print(f"{what} ...")
         return
     columns = SpinnerColumn(finished_text="-"), TextColumn("{task.description}", markup=False)
-    with Progress(*columns, TimeElapsedColumn(), console=screen) as shown:
+    with Progress(*columns, TimeElapsedColumn(), Left(), console=screen) as shown:
 
         def begin(what: str) -> None:
             for task in shown.tasks:

@@ -1,6 +1,6 @@
 """One table, shown in a terminal, in Markdown and in HTML."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,14 @@ class TextTable:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+
+
+def listed(values: Mapping[str, float | str]) -> str:
+    """Return names with their values, such as conditions, in a line."""
+    return ", ".join(
+        f"{name} = {value if isinstance(value, str) else format(value, 'g')}"
+        for name, value in values.items()
+    )
 
 
 def to_markdown(table: TextTable) -> str:

@@ -8,10 +8,11 @@ closing-positive.
 import itertools
 import json
 import tomllib
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ SHIPPED = Path(__file__).parent
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+
+_Motion = tuple[str, NDArray[np.float64], dict[str, float]]
+"""Name of a motion, its spindle angle and its conditions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,65 +65,72 @@ class _Table(BaseModel):
     jaw_starts_rad: list[Number] = Field(default=[-1.0471975511965976], min_length=1)
     repeats: int = Field(default=1, ge=1)
 
+    def plans(self) -> Iterator[RunPlan]:
+        """Yield one plan for every combination and repeat."""
+        for _, start in itertools.product(range(self.repeats), self.jaw_starts_rad):
+            yield from self._from(start)
 
-class SineRuns(_Table):
+    @abstractmethod
+    def _from(self, start_rad: float) -> Iterator[RunPlan]:
+        """Yield one plan for every combination that begins at an angle."""
+
+
+class _LoadedTable(_Table):
+    """Each motion at each of some constant loads."""
+
+    loads_a: list[Number] = Field(min_length=1)
+
+    def _from(self, start_rad: float) -> Iterator[RunPlan]:
+        for kind, angle, more in self._motions(start_rad):
+            for load in self.loads_a:
+                yield _constant_load(kind, angle, load, start_rad, **more)
+
+    @abstractmethod
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        """Yield the motions that begin at an angle."""
+
+
+class SineRuns(_LoadedTable):
     """Sinusoidal grasps over frequency x load x jaw start."""
 
     kind: Literal["sine"]
     frequencies_hz: list[Positive] = Field(min_length=1)
-    loads_a: list[Number] = Field(min_length=1)
     amplitude_rad: Positive = 0.5235987755982988
     duration_s: Positive = 20.0
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        grid = itertools.product(
-            range(self.repeats), self.jaw_starts_rad, self.frequencies_hz, self.loads_a
-        )
-        for _, start, frequency, load in grid:
-            angle = trajectory.sine(self.duration_s, start, self.amplitude_rad, frequency)
-            yield _constant_load(
-                f"sine-{frequency:g}Hz", angle, load, start, frequency_hz=frequency
-            )
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        for frequency in self.frequencies_hz:
+            angle = trajectory.sine(self.duration_s, start_rad, self.amplitude_rad, frequency)
+            yield f"sine-{frequency:g}Hz", angle, {"frequency_hz": frequency}
 
 
-class FourierRuns(_Table):
+class FourierRuns(_LoadedTable):
     """A finite Fourier series of spindle angle at each load."""
 
     kind: Literal["fourier"]
     base_frequency_hz: Positive
     cosine_rad: list[Number] = Field(min_length=1)
     sine_rad: list[Number] = Field(min_length=1)
-    loads_a: list[Number] = Field(min_length=1)
     duration_s: Positive = 20.0
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
-        for _, start, load in grid:
-            angle = trajectory.fourier(
-                self.duration_s, start, self.base_frequency_hz, self.cosine_rad, self.sine_rad
-            )
-            yield _constant_load("fourier", angle, load, start, frequency_hz=self.base_frequency_hz)
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        base = self.base_frequency_hz
+        angle = trajectory.fourier(self.duration_s, start_rad, base, self.cosine_rad, self.sine_rad)
+        yield "fourier", angle, {"frequency_hz": base}
 
 
-class SpeedStaircaseRuns(_Table):
+class SpeedStaircaseRuns(_LoadedTable):
     """Closing and opening at constant speeds, one after the other, at each load."""
 
     kind: Literal["speed_staircase"]
     speeds_rad_s: list[Positive] = Field(min_length=1)
     travel_rad: Positive = 0.9
     pause_s: Positive = 0.5
-    loads_a: list[Number] = Field(min_length=1)
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
-        for _, start, load in grid:
-            angle = trajectory.speed_staircase(
-                start, self.travel_rad, self.speeds_rad_s, self.pause_s
-            )
-            yield _constant_load("speeds", angle, load, start)
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        speeds = self.speeds_rad_s
+        angle = trajectory.speed_staircase(start_rad, self.travel_rad, speeds, self.pause_s)
+        yield "speeds", angle, {}
 
 
 class LoadStaircaseRuns(_Table):
@@ -132,36 +143,29 @@ class LoadStaircaseRuns(_Table):
     frequencies_hz: list[Positive] = Field(min_length=1)
     amplitude_rad: Positive = 0.5235987755982988
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
+    def _from(self, start_rad: float) -> Iterator[RunPlan]:
         load = trajectory.steps(self.loads_a, self.hold_s, self.ramp_s)
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.frequencies_hz)
-        for _, start, frequency in grid:
-            duration_s = load.size / trajectory.SAMPLE_RATE_HZ
-            angle = trajectory.sine(duration_s, start, self.amplitude_rad, frequency)
+        duration_s = load.size / trajectory.SAMPLE_RATE_HZ
+        for frequency in self.frequencies_hz:
+            angle = trajectory.sine(duration_s, start_rad, self.amplitude_rad, frequency)
             conditions: dict[str, float | str] = {
                 "trajectory": "loads",
-                "jaw_start_rad": start,
+                "jaw_start_rad": start_rad,
                 "frequency_hz": frequency,
             }
             yield RunPlan(f"loads-{frequency:g}Hz", angle, load, conditions)
 
 
-class StepHoldRuns(_Table):
+class StepHoldRuns(_LoadedTable):
     """The spindle steps from level to level and holds each, at each load."""
 
     kind: Literal["step_hold"]
     levels_rad: list[Number] = Field(min_length=2)
     hold_s: Positive = 3.0
     ramp_s: Positive = 0.2
-    loads_a: list[Number] = Field(min_length=1)
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        rise = trajectory.steps(self.levels_rad, self.hold_s, self.ramp_s)
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
-        for _, start, load in grid:
-            yield _constant_load("hold", start + rise, load, start)
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        yield "hold", start_rad + trajectory.steps(self.levels_rad, self.hold_s, self.ramp_s), {}
 
 
 class RestRuns(_Table):
@@ -170,65 +174,41 @@ class RestRuns(_Table):
     kind: Literal["rest"]
     duration_s: Positive = 10.0
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every repeat and start."""
-        for _, start in itertools.product(range(self.repeats), self.jaw_starts_rad):
-            angle = np.full(round(self.duration_s * trajectory.SAMPLE_RATE_HZ), start)
-            yield _constant_load("rest", angle, 0.0, start)
+    def _from(self, start_rad: float) -> Iterator[RunPlan]:
+        angle = np.full(round(self.duration_s * trajectory.SAMPLE_RATE_HZ), start_rad)
+        yield _constant_load("rest", angle, 0.0, start_rad)
 
 
-class ChirpRuns(_Table):
+class ChirpRuns(_LoadedTable):
     """Small grasps that become faster and faster, at each load."""
 
     kind: Literal["chirp"]
     low_hz: Positive
     high_hz: Positive
-    loads_a: list[Number] = Field(min_length=1)
     amplitude_rad: Positive = 0.05
     duration_s: Positive = 12.0
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
-        for _, start, load in grid:
-            angle = trajectory.chirp(
-                self.duration_s, start, self.amplitude_rad, self.low_hz, self.high_hz
-            )
-            yield _constant_load("chirp", angle, load, start)
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        angle = trajectory.chirp(
+            self.duration_s, start_rad, self.amplitude_rad, self.low_hz, self.high_hz
+        )
+        yield "chirp", angle, {}
 
 
-class DwellRuns(_Table):
+class DwellRuns(_LoadedTable):
     """Moves to and fro after rests of different length, at each load."""
 
     kind: Literal["dwell"]
     dwells_s: list[Positive] = Field(min_length=2)
     travel_rad: Positive = 0.4
     move_s: Positive = 0.8
-    loads_a: list[Number] = Field(min_length=1)
 
-    def plans(self) -> Iterator[RunPlan]:
-        """Yield one plan for every combination and repeat."""
-        grid = itertools.product(range(self.repeats), self.jaw_starts_rad, self.loads_a)
-        for _, start, load in grid:
-            angle = trajectory.dwells(start, self.travel_rad, self.move_s, self.dwells_s)
-            yield _constant_load("dwell", angle, load, start)
+    def _motions(self, start_rad: float) -> Iterator[_Motion]:
+        angle = trajectory.dwells(start_rad, self.travel_rad, self.move_s, self.dwells_s)
+        yield "dwell", angle, {}
 
 
-TABLES: tuple[type[BaseModel], ...] = (
-    SineRuns,
-    FourierRuns,
-    SpeedStaircaseRuns,
-    LoadStaircaseRuns,
-    StepHoldRuns,
-    ChirpRuns,
-    DwellRuns,
-    RestRuns,
-    JointHoldRuns,
-    JointSineRuns,
-)
-"""Every kind of `[[runs]]` table."""
-
-RunTable = Annotated[
+AnyTable = (
     SineRuns
     | FourierRuns
     | SpeedStaircaseRuns
@@ -238,9 +218,12 @@ RunTable = Annotated[
     | DwellRuns
     | RestRuns
     | JointHoldRuns
-    | JointSineRuns,
-    Field(discriminator="kind"),
-]
+    | JointSineRuns
+)
+RunTable = Annotated[AnyTable, Field(discriminator="kind")]
+
+TABLES: tuple[type[BaseModel], ...] = get_args(AnyTable)
+"""Every kind of `[[runs]]` table."""
 
 
 class Protocol(BaseModel):
@@ -327,7 +310,7 @@ def load_protocol(name_or_path: str) -> Protocol:
         UsageError: The file is missing or not a protocol; the message names the wrong key.
     """
     path = Path(name_or_path)
-    if not path.exists() and path.suffix == "":
+    if not path.is_file() and path.suffix == "":
         path = SHIPPED / f"{name_or_path}.toml"
     if not path.is_file():
         shipped = ", ".join(sorted(p.stem for p in SHIPPED.glob("*.toml")))

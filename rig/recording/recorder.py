@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -23,12 +24,16 @@ class LiveRecorder:
         session: The session.
         folder: Folder of the logs.
         kind: What is recorded; a log is named after it.
+        further: Columns that readings have in addition to those of the session.
     """
 
-    def __init__(self, session: Session, folder: Path, kind: str = "live") -> None:
+    def __init__(
+        self, session: Session, folder: Path, kind: str = "live", further: Sequence[str] = ()
+    ) -> None:
         self._session = session
         self._folder = folder
         self._kind = kind
+        self._further = tuple(further)
         self._log: LogWriter | None = None
         self._path: Path | None = None
         self._raw = session.raw
@@ -81,7 +86,7 @@ class LiveRecorder:
             Attached("config.json", "application/json", settings),
             Attached("calibrations.json", "application/json", lines),
         ]
-        lines_of = tuple(session.calibrations.channels)
+        lines_of = (*session.calibrations.channels, *self._further)
         streams = [sample_stream(lines_of, self._raw.rate_hz), self._raw]
         streams += [FLIGHT_STREAM] if session.flight else []
         self._log = LogWriter(self._path, info, streams, attachments=attached)

@@ -1,16 +1,14 @@
 """Charts of a diagnosis: residual over each finding's variable, signals, errors by run."""
 
 import math
-from typing import Any
 
 import numpy as np
 
-from estimation.channels import UNIT_BY_SUFFIX, unit_of
 from estimation.diagnosis.result import Diagnosis, Error, Finding
 from estimation.recording import FloatArray
 from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
 from rig.output.binning import binned
-from rig.output.charts import Chart, Line, numbers, thinned
+from rig.output.charts import Chart, Line, axis, line, numbers, thinned, words
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display
 
@@ -35,16 +33,9 @@ def charts(diagnosis: Diagnosis, traces: Traces) -> list[Chart]:
     return drawn
 
 
-def _words(channel: str) -> tuple[str, str]:
-    """Return a channel's name without its unit's suffix, and that unit."""
-    parts = channel.split("_")
-    stem = next(k for k in range(1, len(parts)) if "_".join(parts[k:]) in UNIT_BY_SUFFIX)
-    return " ".join(parts[:stem]), unit_of(channel)
-
-
 def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -> Chart:
     """Draw the residual of the held-out test runs over one channel, before and after."""
-    label, x_unit = _words(channel)
+    label, x_unit = words(channel)
     runs = shown.runs
     periodic = "order" in finding.parameters
     scale, unit = display(shown.model.unit)
@@ -59,7 +50,7 @@ def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -
         for run, place, value in zip(runs, places, values, strict=True):
             own_x, own_mean, _, _ = binned(place, value, BINS)
             meta = {"role": side, "run": run.run}
-            lines.append(_line(own_x, own_mean, f"{side}, {run.run}", meta, unit, legend=False))
+            lines.append(line(own_x, own_mean, f"{side}, {run.run}", meta, unit, legend=False))
         height[side] = float(mean.max() - mean.min()) if len(mean) else 0.0
         for place, one, below, above in zip(x, mean, low, high, strict=True):
             row = rows.setdefault(float(f"{place:.3g}"), [f"{place:.3g}"])
@@ -77,7 +68,7 @@ def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -
     columns = [f"{label}, {x_unit}", "before", "90 %", "after", "90 %"]
     full = [row for row in rows.values() if len(row) == len(columns)]
     layout = {
-        "xaxis": _axis(f"{label}{of_turn}, {x_unit}", x_unit),
+        "xaxis": axis(f"{label}{of_turn}, {x_unit}", x_unit),
         "yaxis": {"title": {"text": f"residual, {unit}"}},
     }
     table = TextTable(f"{title}, {unit}", columns, full)
@@ -91,40 +82,16 @@ def _within_a_turn(values: FloatArray, periodic: bool) -> FloatArray:
     return values
 
 
-def _axis(title: str, unit: str) -> dict[str, Any]:
-    return {
-        "title": {"text": title},
-        "zeroline": False,
-        "unifiedhovertitle": {"text": f"%{{x:.4g}} {unit}"},
-    }
-
-
-def _line(
-    x: FloatArray, y: FloatArray, name: str, meta: Line, unit: str, *, legend: bool = True
-) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": numbers(x),
-        "y": numbers(y),
-        "name": name,
-        "meta": meta,
-        "showlegend": legend,
-        "hoverinfo": "all" if legend else "skip",
-        "hovertemplate": f"%{{y:.3g}} {unit}" if legend else None,
-    }
-
-
 def _with_band(
     x: FloatArray, values: tuple[FloatArray, FloatArray, FloatArray], side: str, unit: str
 ) -> list[Line]:
     """Return a mean with a band, the band first so that it lies behind."""
     mean, low, high = values
     band = {"role": side, "band": True}
-    lower = _line(x, low, f"{side}, 5 %", band, unit, legend=False)
-    upper = _line(x, high, f"{side}, 95 %", band, unit, legend=False)
+    lower = line(x, low, f"{side}, 5 %", band, unit, legend=False)
+    upper = line(x, high, f"{side}, 95 %", band, unit, legend=False)
     name = {"before": "declared model", "after": "with the findings"}[side]
-    return [lower, {**upper, "fill": "tonexty"}, _line(x, mean, name, {"role": side}, unit)]
+    return [lower, {**upper, "fill": "tonexty"}, line(x, mean, name, {"role": side}, unit)]
 
 
 def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
@@ -188,12 +155,12 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
 def _over_time(name: str, shown: EquationTraces) -> Chart:
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
     scale, unit = display(shown.model.unit)
-    label, _ = _words(shown.model.target)
+    label, _ = words(shown.model.target)
     runs = sorted(shown.runs, key=_error_after)
     middle = runs.pop(len(runs) // 2)
     choices = {run.run: _signals(run, scale, unit) for run in (middle, *runs)}
     layout = {
-        "xaxis": {**_axis("time, s", "s"), "anchor": "y2"},
+        "xaxis": {**axis("time, s", "s"), "anchor": "y2"},
         "yaxis": {"title": {"text": f"{label}, {unit}"}, "domain": [0.42, 1]},
         "yaxis2": {"title": {"text": f"residual, {unit}"}, "domain": [0, 0.36]},
         "hoversubplots": "axis",
@@ -218,11 +185,14 @@ def _signals(run: RunTrace, scale: float, unit: str) -> list[Line]:
     names = {"measured": "measured", "before": "declared model", "after": "with the findings"}
     left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in SIDES}
     time_s = thinned(run.time_s)
-    lines = [_line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)]
+    lines: list[Line] = [
+        line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)
+    ]
     for side in SIDES:
         values = thinned(measured - left[side])
-        lines.append(_line(time_s, values, names[side], {"role": side}, unit))
+        lines.append(line(time_s, values, names[side], {"role": side}, unit))
     for side in SIDES:
-        line = _line(time_s, thinned(left[side]), f"residual, {names[side]}", {"role": side}, unit)
-        lines.append({**line, "yaxis": "y2", "showlegend": False})
-    return [{**line, "x": numbers(time_s, 6)} for line in lines]
+        residual = thinned(left[side])
+        one = line(time_s, residual, f"residual, {names[side]}", {"role": side}, unit)
+        lines.append({**one, "yaxis": "y2", "showlegend": False})
+    return lines

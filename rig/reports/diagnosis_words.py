@@ -57,7 +57,9 @@ def _claim(finding: Finding) -> str:
         others = ", ".join(finding.alternatives) or "another effect"
         return f"{_named(finding)}; also possible: {others}; these runs cannot distinguish them"
     if finding.verdict == "depends_on":
-        return f"unmodelled effect of unknown form; it depends on {words}"
+        others = ", ".join(finding.alternatives)
+        also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
+        return f"unmodelled effect of unknown form; it depends on {words}{also}"
     return "the model is incomplete, and the cause cannot be identified from these runs"
 
 

@@ -13,6 +13,7 @@ from rig.output import figures
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable
+from rig.reports.diagnosis_words import display
 
 LIMITS = (
     "Screening only: smooth functions of one variable at a time, fitted on the other runs, each"
@@ -66,7 +67,7 @@ def parameter_table(model: Model) -> TextTable:
     evidence = model.evidence
     note = ""
     if evidence is not None:
-        scale, unit = _display(model.unit)
+        scale, unit = display(model.unit)
         note = (
             f"Fitted on {len(evidence.runs)} runs, {evidence.samples:,} samples. RMSE"
             f" {scale * evidence.rmse:.3g} {unit} with each run's mean removed,"
@@ -78,7 +79,7 @@ def parameter_table(model: Model) -> TextTable:
 
 def held_out_sentence(model: Model, error: HeldOutError) -> str:
     """Return the error on runs not fitted on in words."""
-    scale, unit = _display(model.unit)
+    scale, unit = display(model.unit)
     return (
         f"{model.target} on {error.runs} runs not fitted on: RMSE {scale * error.rmse:.3g} {unit}"
         f" with each run's mean removed, {scale * error.rmse_with_means:.3g} {unit} with means."
@@ -91,7 +92,7 @@ def _spread(known: Estimate) -> str:
 
 def structure_table(structures: Sequence[Structure]) -> TextTable:
     """Return the ranked structures of a residual."""
-    scale, unit = _display(structures[0].unit)
+    scale, unit = display(structures[0].unit)
     rows = [
         [
             s.variable.replace("_", " "),
@@ -106,17 +107,13 @@ def structure_table(structures: Sequence[Structure]) -> TextTable:
     return TextTable("What the residual goes with", columns, rows)
 
 
-def _display(unit: str) -> tuple[float, str]:
-    return (1e3, "mN m") if unit == "N m" else (1.0, unit)
-
-
 def _figures(
     model: Model,
     campaign: Campaign,
     structures: Sequence[Structure],
     parts: Sequence[RunResidual],
 ) -> list[tuple[str, Markup]]:
-    scale, unit = _display(model.unit)
+    scale, unit = display(model.unit)
     drawn = []
     ordered = sorted(parts, key=lambda part: float(np.std(part.values)))
     name = ordered[len(ordered) // 2].run.name

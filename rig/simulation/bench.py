@@ -23,6 +23,7 @@ from rig.simulation import (
     hidden,
     hidden_cable,
     hidden_drive,
+    hidden_kinds,
     hidden_sensors,
     noise,
     parameters,
@@ -51,9 +52,9 @@ def _fingerprint() -> str:
     for module in (
         control,
         reference_board,
-        hidden,
         hidden_cable,
         hidden_drive,
+        hidden_kinds,
         hidden_sensors,
         noise,
         parameters,

@@ -5,7 +5,6 @@ and beyond its ends it stays at its last value.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,33 +16,6 @@ BANK = 40  # Most elements side by side of an operator with memory
 
 Random = np.random.Generator
 Form = Callable[[FloatArray], FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """A function of one variable."""
-
-    variable: str  # Name of the variable
-    low: float  # First point of the grid
-    high: float  # Last point
-    values: FloatArray  # Shape (`POINTS`,)
-    # Whether it repeats itself beyond the range; its last value is then its first
-    periodic: bool = False
-
-    @property
-    def x(self) -> FloatArray:
-        """The grid, shape (`POINTS`,)."""
-        return np.linspace(self.low, self.high, len(self.values))
-
-    def at(self, x: FloatArray) -> FloatArray:
-        """Return its values at places, the same shape."""
-        place = np.mod(x - self.low, self.high - self.low) + self.low if self.periodic else x
-        found: FloatArray = np.interp(place, self.x, self.values)
-        return found
-
-    def steepest(self) -> float:
-        """Return its largest slope, without sign."""
-        return float(np.max(np.abs(np.gradient(self.values, self.x))))
 
 
 def grid() -> FloatArray:
@@ -99,18 +71,6 @@ def falling(random: Random, x: FloatArray) -> FloatArray:
     return np.asarray(form / form[0])
 
 
-def knee(random: Random, x: FloatArray) -> FloatArray:
-    """Return an odd form of slope 1 at 0 that levels off at about 1, of a random kind."""
-    power = random.uniform(1.0, 4.0)
-    kinds = (
-        np.tanh(x),
-        x / (1.0 + np.abs(x) ** power) ** (1.0 / power),
-        2.0 / np.pi * np.arctan(0.5 * np.pi * x),
-        np.clip(x, -1.0, 1.0),
-    )
-    return np.asarray(kinds[int(random.integers(len(kinds)))])
-
-
 def spots(random: Random, most: int = 2, narrow: float = 0.04, wide: float = 0.12) -> FloatArray:
     """Return one or a few local features on the unit grid: bumps of random shapes and places."""
     x, total = grid(), np.zeros(POINTS)
@@ -121,26 +81,6 @@ def spots(random: Random, most: int = 2, narrow: float = 0.04, wide: float = 0.1
         shapes = (np.exp(-0.5 * d**power), 1.0 / (1.0 + d**2) ** power, np.clip(1 - d / 2, 0, None))
         total += random.uniform(0.5, 1.0) * shapes[int(random.integers(len(shapes)))]
     return np.asarray(total / total.max())
-
-
-def wave(random: Random, order: int, sidebands: bool) -> FloatArray:
-    """Return a wave over one turn: an order, some of its harmonics, and sidebands once a turn.
-
-    Args:
-        random: Source of the draw.
-        order: Whole periods a turn.
-        sidebands: Whether its amplitude is modulated once a turn.
-    """
-    turn = 2.0 * np.pi * np.linspace(0.0, 1.0, 2048)
-    total = np.sin(order * turn + random.uniform(0.0, 2.0 * np.pi))
-    for harmonic in (2, 3):
-        if random.random() < 0.5:
-            share = random.uniform(0.1, 0.4) / (harmonic - 1)
-            total += share * np.sin(harmonic * order * turn + random.uniform(0.0, 2.0 * np.pi))
-    if sidebands and order > 1:
-        depth = random.uniform(0.1, 0.5)
-        total *= 1.0 + depth * np.sin(turn + random.uniform(0.0, 2.0 * np.pi))
-    return np.asarray(total)
 
 
 def course(random: Random, x: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 Each effect is a compiled function (`hidden_drive`, `hidden_cable`, `hidden_sensors`) of the plant's
 own quantities and one row of a table, kept here: a strength and up to two numbers that shape it.
-Strength 0 does not change the plant at all: the effect is not evaluated. Strength 1
+Strength 0 does not change the plant at all. Strength 1
 is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are
 a quarter to three quarters of the residual variance of a linear equation of motor current; effects
 of cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
@@ -20,62 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import UsageError
-from rig.simulation.hidden_kinds import KINDS
-
-STRENGTH, FIRST, SECOND = range(3)
-"""Columns of the table the compiled code reads."""
-
-Row = Sequence[float]
-"""One row of the table; the compiled code passes a row of the array."""
-
-(
-    MOTOR_RIPPLE,
-    GEAR_LOAD_FRICTION,
-    GEAR_STRIBECK,
-    GEAR_BACKLASH,
-    GEAR_ECCENTRICITY,
-    TORQUE_CONSTANT_SAG,
-    CURRENT_SENSOR_BEND,
-    CABLE_POSITION_FRICTION,
-    CABLE_PRESLIDING,
-    CABLE_CREEP,
-    JAW_SPRING,
-    END_STOP_SPRING,
-    MOTOR_ASYMMETRY,
-    MOTOR_DRAG,
-    CURRENT_RIPPLE,
-    WINDING_HEAT,
-    TORQUE_LAG,
-    GEAR_STIFFENING,
-    GEAR_TWO_STATE,
-    GEAR_ANGLE_VISCOUS,
-    CABLE_GROWING_FRICTION,
-    CABLE_LOAD_NOTCH,
-    FRICTION_STEP,
-    CABLE_HYSTERESIS,
-    SPINDLE_RIPPLE,
-    ECCENTRIC_PULLEY,
-    JAW_MASS,
-    JAW_DETENT,
-    PROXIMAL_BEND,
-    PROXIMAL_CREEP,
-    PROXIMAL_LAG,
-    DISTAL_DRIFT,
-    DISTAL_CROSSTALK,
-    JAW_DELAY,
-    JAW_ENCODER_WAVE,
-    MOTOR_VISCOUS_ASYMMETRY,
-    GEAR_LOAD_VISCOUS,
-    GREASE_WARMUP,
-    GEAR_WEAR,
-    CABLE_STIFF,
-    CABLE_DWELL,
-    CABLE_CAPSTAN,
-    WRIST_CAPSTAN,
-    WRIST_PULL,
-    WRIST_PINCH,
-    JAW_WEIGHT,
-) = range(len(KINDS))
+from rig.simulation.hidden_kinds import KINDS, STRENGTH
 
 NAMES: tuple[str, ...] = tuple(kind.name for kind in KINDS)
 
@@ -120,6 +65,8 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
             named twice, or a shape has too many numbers.
     """
     rows = np.zeros((len(KINDS), 3))
+    for row, kind in zip(rows, KINDS, strict=True):  # read at strength 0 too, to no effect
+        row[1 : 1 + len(kind.shapes)] = [shape.middle for shape in kind.shapes]
     for effect in effects:
         if effect.name not in NAMES:
             raise UnknownHiddenEffectError(
@@ -132,15 +79,14 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
                 f"Hidden effect {effect.name!r} has strength {effect.strength}.",
                 "A strength is a finite number, 0 or more.",
             )
-        if rows[place].any():
+        if rows[place, STRENGTH]:
             raise UnknownHiddenEffectError(f"Hidden effect {effect.name!r} is named twice.")
         if len(effect.shape) > len(shapes):
             raise UnknownHiddenEffectError(
                 f"Hidden effect {effect.name!r} is shaped by {len(effect.shape)} numbers.",
                 f"It takes: {', '.join(shape.name for shape in shapes)}.",
             )
-        values = [*effect.shape, *(shape.middle for shape in shapes[len(effect.shape) :])]
-        rows[place] = [effect.strength, *values, *[0.0] * (2 - len(values))]
+        rows[place, : 1 + len(effect.shape)] = [effect.strength, *effect.shape]
     return rows
 
 

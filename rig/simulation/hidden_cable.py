@@ -6,42 +6,27 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation.hidden import (
-    CABLE_CAPSTAN,
-    CABLE_DWELL,
-    CABLE_GROWING_FRICTION,
-    CABLE_LOAD_NOTCH,
-    CABLE_POSITION_FRICTION,
-    CABLE_STIFF,
-    END_STOP_SPRING,
-    FIRST,
-    FRICTION_STEP,
-    JAW_DETENT,
-    JAW_SPRING,
-    JAW_WEIGHT,
-    SECOND,
-    STRENGTH,
-    WRIST_CAPSTAN,
-    WRIST_PINCH,
-    Row,
-)
+from rig.simulation import hidden_kinds as kinds
+from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
 
 SPINDLE_FRICTIONS = np.array(
     [
-        CABLE_POSITION_FRICTION,
-        CABLE_GROWING_FRICTION,
-        CABLE_LOAD_NOTCH,
-        FRICTION_STEP,
-        CABLE_STIFF,
-        CABLE_DWELL,
-        CABLE_CAPSTAN,
-        WRIST_CAPSTAN,
-        WRIST_PINCH,
+        kinds.CABLE_POSITION_FRICTION,
+        kinds.CABLE_GROWING_FRICTION,
+        kinds.CABLE_LOAD_NOTCH,
+        kinds.FRICTION_STEP,
+        kinds.CABLE_STIFF,
+        kinds.CABLE_DWELL,
+        kinds.CABLE_CAPSTAN,
+        kinds.WRIST_CAPSTAN,
+        kinds.WRIST_PINCH,
     ]
 )
 """Effects that `spindle_friction_n_m` sums up."""
 
-JAW_TORQUES = np.array([JAW_SPRING, END_STOP_SPRING, JAW_DETENT, JAW_WEIGHT])
+JAW_TORQUES = np.array(
+    [kinds.JAW_SPRING, kinds.END_STOP_SPRING, kinds.JAW_DETENT, kinds.JAW_WEIGHT]
+)
 """Effects that `jaw_torque_n_m` sums up."""
 
 
@@ -65,22 +50,15 @@ def spindle_friction_n_m(
         age_s: State of the contact that ages.
     """
     extra = 0.0
-    if effects[CABLE_POSITION_FRICTION, STRENGTH] != 0.0:
-        extra += cable_position_friction_n_m(effects[CABLE_POSITION_FRICTION], spindle_angle)
-    if effects[CABLE_GROWING_FRICTION, STRENGTH] != 0.0:
-        extra += cable_growing_friction_n_m(effects[CABLE_GROWING_FRICTION], spindle_angle)
-    if effects[CABLE_LOAD_NOTCH, STRENGTH] != 0.0:
-        extra += cable_load_notch_n_m(effects[CABLE_LOAD_NOTCH], spindle_angle, cable_torque)
-    if effects[FRICTION_STEP, STRENGTH] != 0.0:
-        extra += friction_step_n_m(effects[FRICTION_STEP], clock_s)
-    if effects[CABLE_STIFF, STRENGTH] != 0.0:
-        extra += effects[CABLE_STIFF, STRENGTH] * 20e-3
-    if effects[CABLE_DWELL, STRENGTH] != 0.0:
-        extra += cable_dwell_n_m(effects[CABLE_DWELL], age_s)
-    if effects[CABLE_CAPSTAN, STRENGTH] != 0.0:
-        row = effects[CABLE_CAPSTAN]
-        extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
-    return extra
+    extra += cable_position_friction_n_m(effects[kinds.CABLE_POSITION_FRICTION], spindle_angle)
+    extra += cable_growing_friction_n_m(effects[kinds.CABLE_GROWING_FRICTION], spindle_angle)
+    extra += cable_load_notch_n_m(effects[kinds.CABLE_LOAD_NOTCH], spindle_angle, cable_torque)
+    extra += friction_step_n_m(effects[kinds.FRICTION_STEP], clock_s)
+    extra += effects[kinds.CABLE_STIFF, STRENGTH] * 20e-3
+    extra += cable_dwell_n_m(effects[kinds.CABLE_DWELL], age_s)
+    row = effects[kinds.CABLE_CAPSTAN]
+    extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
+    return float(extra)
 
 
 @numba.njit()
@@ -96,12 +74,10 @@ def wrist_friction_n_m(
         wrist_angle: Pitch of the wrist, rad.
     """
     extra = 0.0
-    if effects[WRIST_CAPSTAN, STRENGTH] != 0.0:
-        row = effects[WRIST_CAPSTAN]
-        wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)
-        extra += wrapped_n_m(wrap, cable_torque, spindle_speed)
-    if effects[WRIST_PINCH, STRENGTH] != 0.0:
-        extra += wrist_pinch_n_m(effects[WRIST_PINCH], wrist_angle)
+    row = effects[kinds.WRIST_CAPSTAN]
+    wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)
+    extra += wrapped_n_m(wrap, cable_torque, spindle_speed)
+    extra += wrist_pinch_n_m(effects[kinds.WRIST_PINCH], wrist_angle)
     return extra
 
 
@@ -109,14 +85,10 @@ def wrist_friction_n_m(
 def jaw_torque_n_m(effects: NDArray[np.float64], jaw_angle: float) -> float:
     """Return the hidden torque that opposes closing at the jaw."""
     extra = 0.0
-    if effects[JAW_SPRING, STRENGTH] != 0.0:
-        extra += jaw_spring_n_m(effects[JAW_SPRING], jaw_angle)
-    if effects[END_STOP_SPRING, STRENGTH] != 0.0:
-        extra += end_stop_spring_n_m(effects[END_STOP_SPRING], jaw_angle)
-    if effects[JAW_DETENT, STRENGTH] != 0.0:
-        extra += jaw_detent_n_m(effects[JAW_DETENT], jaw_angle)
-    if effects[JAW_WEIGHT, STRENGTH] != 0.0:
-        extra += jaw_weight_n_m(effects[JAW_WEIGHT], jaw_angle)
+    extra += jaw_spring_n_m(effects[kinds.JAW_SPRING], jaw_angle)
+    extra += end_stop_spring_n_m(effects[kinds.END_STOP_SPRING], jaw_angle)
+    extra += jaw_detent_n_m(effects[kinds.JAW_DETENT], jaw_angle)
+    extra += jaw_weight_n_m(effects[kinds.JAW_WEIGHT], jaw_angle)
     return extra
 
 

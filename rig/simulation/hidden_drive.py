@@ -6,35 +6,21 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation.hidden import (
-    FIRST,
-    GEAR_ANGLE_VISCOUS,
-    GEAR_LOAD_FRICTION,
-    GEAR_LOAD_VISCOUS,
-    GEAR_STRIBECK,
-    GEAR_TWO_STATE,
-    GEAR_WEAR,
-    GREASE_WARMUP,
-    MOTOR_ASYMMETRY,
-    MOTOR_DRAG,
-    MOTOR_VISCOUS_ASYMMETRY,
-    SECOND,
-    STRENGTH,
-    Row,
-)
+from rig.simulation import hidden_kinds as kinds
+from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
 
 MOTOR_FRICTIONS = np.array(
     [
-        GEAR_LOAD_FRICTION,
-        GEAR_STRIBECK,
-        MOTOR_ASYMMETRY,
-        MOTOR_DRAG,
-        GEAR_TWO_STATE,
-        GEAR_ANGLE_VISCOUS,
-        MOTOR_VISCOUS_ASYMMETRY,
-        GEAR_LOAD_VISCOUS,
-        GREASE_WARMUP,
-        GEAR_WEAR,
+        kinds.GEAR_LOAD_FRICTION,
+        kinds.GEAR_STRIBECK,
+        kinds.MOTOR_ASYMMETRY,
+        kinds.MOTOR_DRAG,
+        kinds.GEAR_TWO_STATE,
+        kinds.GEAR_ANGLE_VISCOUS,
+        kinds.MOTOR_VISCOUS_ASYMMETRY,
+        kinds.GEAR_LOAD_VISCOUS,
+        kinds.GREASE_WARMUP,
+        kinds.GEAR_WEAR,
     ]
 )
 """Effects that `motor_friction_n_m` sums up."""
@@ -58,23 +44,15 @@ def motor_friction_n_m(
         clock_s: Time since the bench was started.
     """
     extra = 0.0
-    if effects[GEAR_STRIBECK, STRENGTH] != 0.0:
-        extra += gear_stribeck_n_m(effects[GEAR_STRIBECK], speed)
-    if effects[MOTOR_ASYMMETRY, STRENGTH] != 0.0:
-        extra += motor_asymmetry_n_m(effects[MOTOR_ASYMMETRY], speed)
-    if effects[MOTOR_DRAG, STRENGTH] != 0.0:
-        extra += motor_drag_n_m(effects[MOTOR_DRAG], speed)
-    if effects[GEAR_TWO_STATE, STRENGTH] != 0.0:
-        extra += effects[GEAR_TWO_STATE, STRENGTH] * 0.35e-3 * state
-    if effects[GEAR_ANGLE_VISCOUS, STRENGTH] != 0.0:
-        extra += gear_angle_viscous_n_m(effects[GEAR_ANGLE_VISCOUS], speed, spindle_angle)
-    if effects[MOTOR_VISCOUS_ASYMMETRY, STRENGTH] != 0.0:
-        extra += motor_viscous_asymmetry_n_m(effects[MOTOR_VISCOUS_ASYMMETRY], speed)
-    if effects[GREASE_WARMUP, STRENGTH] != 0.0:
-        extra += grease_warmup_n_m(effects[GREASE_WARMUP], clock_s)
-    if effects[GEAR_WEAR, STRENGTH] != 0.0:
-        extra += effects[GEAR_WEAR, STRENGTH] * 0.3e-3
-    return extra
+    extra += gear_stribeck_n_m(effects[kinds.GEAR_STRIBECK], speed)
+    extra += motor_asymmetry_n_m(effects[kinds.MOTOR_ASYMMETRY], speed)
+    extra += motor_drag_n_m(effects[kinds.MOTOR_DRAG], speed)
+    extra += effects[kinds.GEAR_TWO_STATE, STRENGTH] * 0.35e-3 * state
+    extra += gear_angle_viscous_n_m(effects[kinds.GEAR_ANGLE_VISCOUS], speed, spindle_angle)
+    extra += motor_viscous_asymmetry_n_m(effects[kinds.MOTOR_VISCOUS_ASYMMETRY], speed)
+    extra += grease_warmup_n_m(effects[kinds.GREASE_WARMUP], clock_s)
+    extra += effects[kinds.GEAR_WEAR, STRENGTH] * 0.3e-3
+    return float(extra)
 
 
 @numba.njit()
@@ -83,10 +61,8 @@ def gear_friction_n_m(
 ) -> float:
     """Return the hidden friction that grows with the torque in the gear, at the spindle."""
     extra = 0.0
-    if effects[GEAR_LOAD_FRICTION, STRENGTH] != 0.0:
-        extra += gear_load_friction_n_m(effects[GEAR_LOAD_FRICTION], twist_torque)
-    if effects[GEAR_LOAD_VISCOUS, STRENGTH] != 0.0:
-        extra += gear_load_viscous_n_m(effects[GEAR_LOAD_VISCOUS], motor_speed, twist_torque)
+    extra += gear_load_friction_n_m(effects[kinds.GEAR_LOAD_FRICTION], twist_torque)
+    extra += gear_load_viscous_n_m(effects[kinds.GEAR_LOAD_VISCOUS], motor_speed, twist_torque)
     return extra
 
 

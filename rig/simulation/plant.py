@@ -25,7 +25,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden, hidden_cable, hidden_drive
+from rig.simulation import hidden_cable, hidden_drive
+from rig.simulation import hidden_kinds as kinds
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.places import (
     AGE,
@@ -163,32 +164,16 @@ def step_tick(
     gear = 1.0 / p.gear_ratio
     jaw_friction = p.jaw_friction_n_m + p.load_friction_n_m
     load_share = p.load_friction_n_m / jaw_friction if jaw_friction > 0.0 else 0.0
-    strength = effects[:, hidden.STRENGTH]
-    ripple = strength[hidden.MOTOR_RIPPLE] != 0.0
-    current_ripple = strength[hidden.CURRENT_RIPPLE] != 0.0
-    sag = strength[hidden.TORQUE_CONSTANT_SAG] != 0.0
-    heated = strength[hidden.WINDING_HEAT] != 0.0
-    late = strength[hidden.TORQUE_LAG] != 0.0
-    backlash = strength[hidden.GEAR_BACKLASH] != 0.0
-    eccentric = strength[hidden.GEAR_ECCENTRICITY] != 0.0
-    stiffening = strength[hidden.GEAR_STIFFENING] != 0.0
-    two_state = strength[hidden.GEAR_TWO_STATE] != 0.0
+    strength = effects[:, kinds.STRENGTH]
     motor_friction = _any(strength, hidden_drive.MOTOR_FRICTIONS)
     spindle_friction = _any(strength, hidden_cable.SPINDLE_FRICTIONS)
-    presliding = strength[hidden.CABLE_PRESLIDING] != 0.0
-    spindle_ripple = strength[hidden.SPINDLE_RIPPLE] != 0.0
-    pulley = strength[hidden.ECCENTRIC_PULLEY] != 0.0
-    creep = strength[hidden.CABLE_CREEP] != 0.0
-    hysteresis = strength[hidden.CABLE_HYSTERESIS] != 0.0
-    dwell = strength[hidden.CABLE_DWELL] != 0.0
-    pull = strength[hidden.WRIST_PULL] != 0.0
     jaw_effect = _any(strength, hidden_cable.JAW_TORQUES)
     lag_gain = 1.0
-    if late:
-        row = effects[hidden.TORQUE_LAG]
-        lag_gain = min(2.0 * dt / (row[hidden.STRENGTH] * row[hidden.FIRST]), 1.0)
-    if strength[hidden.JAW_MASS] != 0.0:
-        mass = hidden_cable.jaw_mass_kg_m2(effects[hidden.JAW_MASS])
+    if strength[kinds.TORQUE_LAG] != 0.0:
+        row = effects[kinds.TORQUE_LAG]
+        lag_gain = min(2.0 * dt / (row[kinds.STRENGTH] * row[kinds.FIRST]), 1.0)
+    if strength[kinds.JAW_MASS] != 0.0:
+        mass = hidden_cable.jaw_mass_kg_m2(effects[kinds.JAW_MASS])
         dt_jaw = dt / (p.jaw_inertia_kg_m2 + mass)
 
     motor, motor_speed = state[MOTOR_ANGLE], state[MOTOR_SPEED]
@@ -207,72 +192,72 @@ def step_tick(
         current += current_gain * (target - current)
         load_current += load_gain * (load_target_a - load_current)
         torque_current = current
-        if late:
+        if strength[kinds.TORQUE_LAG] != 0.0:
             lag_first += lag_gain * (current - lag_first)
             lag_second += lag_gain * (lag_first - lag_second)
             torque_current = lag_second
         motor_torque = p.torque_constant_n_m_a * torque_current
-        if heated:
-            row = effects[hidden.WINDING_HEAT]
+        if strength[kinds.WINDING_HEAT] != 0.0:
+            row = effects[kinds.WINDING_HEAT]
             heat += dt * hidden_drive.winding_heat_rate(row, heat, current)
             motor_torque *= hidden_drive.winding_heat_ratio(row, heat)
-        if current_ripple:
-            motor_torque *= hidden_drive.current_ripple_ratio(effects[hidden.CURRENT_RIPPLE], motor)
-        if sag:
+        if strength[kinds.CURRENT_RIPPLE] != 0.0:
+            motor_torque *= hidden_drive.current_ripple_ratio(effects[kinds.CURRENT_RIPPLE], motor)
+        if strength[kinds.TORQUE_CONSTANT_SAG] != 0.0:
             motor_torque *= hidden_drive.torque_constant_sag_ratio(
-                effects[hidden.TORQUE_CONSTANT_SAG], current
+                effects[kinds.TORQUE_CONSTANT_SAG], current
             )
-        if ripple:
-            motor_torque += hidden_drive.motor_ripple_n_m(effects[hidden.MOTOR_RIPPLE], motor)
+        if strength[kinds.MOTOR_RIPPLE] != 0.0:
+            motor_torque += hidden_drive.motor_ripple_n_m(effects[kinds.MOTOR_RIPPLE], motor)
 
         twist = gear * motor - spindle
         twist_rate = gear * motor_speed - spindle_speed
         spindle_per_twist = 1.0
-        if eccentric:
-            row = effects[hidden.GEAR_ECCENTRICITY]
+        if strength[kinds.GEAR_ECCENTRICITY] != 0.0:
+            row = effects[kinds.GEAR_ECCENTRICITY]
             slope = hidden_drive.gear_eccentricity_slope(row, spindle)
             twist += hidden_drive.gear_eccentricity_rad(row, spindle)
             twist_rate += slope * spindle_speed
             spindle_per_twist -= slope
-        if backlash:
+        if strength[kinds.GEAR_BACKLASH] != 0.0:
             twist_torque = hidden_drive.gear_backlash_n_m(
-                effects[hidden.GEAR_BACKLASH], twist, twist_rate, p.gear_stiffness_n_m_rad
+                effects[kinds.GEAR_BACKLASH], twist, twist_rate, p.gear_stiffness_n_m_rad
             )
         else:
             twist_torque = p.gear_stiffness_n_m_rad * twist
-        if stiffening:
+        if strength[kinds.GEAR_STIFFENING] != 0.0:
             twist_torque *= hidden_drive.gear_stiffening_ratio(
-                effects[hidden.GEAR_STIFFENING], twist
+                effects[kinds.GEAR_STIFFENING], twist
             )
         twist_torque += p.gear_damping_n_m_s_rad * twist_rate
 
         stretch = p.cable_ratio * spindle + p.jaw_zero_rad - jaw
         stretch_rate = p.cable_ratio * spindle_speed - jaw_speed
         lever = p.cable_ratio
-        if pulley:
-            row = effects[hidden.ECCENTRIC_PULLEY]
+        if strength[kinds.ECCENTRIC_PULLEY] != 0.0:
+            row = effects[kinds.ECCENTRIC_PULLEY]
             slope = hidden_cable.eccentric_pulley_slope(row, spindle)
             stretch += hidden_cable.eccentric_pulley_rad(row, spindle)
             stretch_rate += slope * spindle_speed
             lever += slope
-        if pull:
-            row = effects[hidden.WRIST_PULL]
+        if strength[kinds.WRIST_PULL] != 0.0:
+            row = effects[kinds.WRIST_PULL]
             stretch += hidden_cable.wrist_pull_rad(row, wrist)
             stretch_rate += hidden_cable.wrist_pull_slope(row, wrist) * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
-        if creep:
-            row = effects[hidden.CABLE_CREEP]
+        if strength[kinds.CABLE_CREEP] != 0.0:
+            row = effects[kinds.CABLE_CREEP]
             cable += hidden_cable.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
             strain += dt * (stretch_rate - hidden_cable.cable_creep_rate(row, strain))
-        if hysteresis:
-            row = effects[hidden.CABLE_HYSTERESIS]
+        if strength[kinds.CABLE_HYSTERESIS] != 0.0:
+            row = effects[kinds.CABLE_HYSTERESIS]
             cable += hidden_cable.cable_hysteresis_n_m(row, bend)
             bend += dt * hidden_cable.cable_hysteresis_rate(row, bend, stretch_rate)
 
         motor_limit = p.motor_friction_n_m
         if motor_friction:
-            if two_state:
-                row = effects[hidden.GEAR_TWO_STATE]
+            if strength[kinds.GEAR_TWO_STATE] != 0.0:
+                row = effects[kinds.GEAR_TWO_STATE]
                 rubbing = hidden_drive.gear_two_state(row, rubbing, motor_speed)
             motor_limit += hidden_drive.motor_friction_n_m(
                 effects, motor_speed, spindle, rubbing, clock
@@ -293,18 +278,18 @@ def step_tick(
             - p.spindle_viscous_n_m_s_rad * spindle_speed
         )
         if spindle_friction:
-            if dwell:
-                row = effects[hidden.CABLE_DWELL]
+            if strength[kinds.CABLE_DWELL] != 0.0:
+                row = effects[kinds.CABLE_DWELL]
                 age += dt * hidden_cable.cable_dwell_rate(row, age, spindle_speed)
             spindle_limit += hidden_cable.spindle_friction_n_m(
                 effects, spindle, spindle_speed, cable, clock, age
             )
             spindle_limit += hidden_cable.wrist_friction_n_m(effects, spindle_speed, cable, wrist)
-        if spindle_ripple:
-            row = effects[hidden.SPINDLE_RIPPLE]
+        if strength[kinds.SPINDLE_RIPPLE] != 0.0:
+            row = effects[kinds.SPINDLE_RIPPLE]
             spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)
-        if presliding:
-            row = effects[hidden.CABLE_PRESLIDING]
+        if strength[kinds.CABLE_PRESLIDING] != 0.0:
+            row = effects[kinds.CABLE_PRESLIDING]
             spindle_torque -= hidden_cable.cable_presliding_n_m(row, bristle)
             bristle += dt * hidden_cable.cable_presliding_rate(row, bristle, spindle_speed)
         spindle_speed += dt_spindle * spindle_torque

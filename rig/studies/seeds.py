@@ -8,58 +8,69 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
+
+from pydantic import TypeAdapter
 
 from estimation.files import write_text_atomic
 
 T = TypeVar("T")
 
 
+@dataclass(frozen=True)
+class Keeper:
+    """Where the outcomes of a study are kept, and how they are made.
+
+    Attributes:
+        state: Folder where outcomes are kept.
+        workers: Processes; each does one seed at a time.
+        on_seed: Called after each seed, also after one that was kept.
+    """
+
+    state: Path
+    workers: int = 1
+    on_seed: Callable[[], None] = lambda: None
+
+
 def kept_outcomes(
+    kind: type[T],
     one_seed: Callable[[int], T],
-    read: Callable[[Any], T],
     seeds: int,
-    state: Path,
     schema: str,
-    *,
-    workers: int = 1,
+    keeper: Keeper,
     start: Callable[[], None] | None = None,
-    on_seed: Callable[[], None] = lambda: None,
 ) -> list[T]:
     """Do seeds from 0 that are not kept yet, and return the outcomes of all in order.
 
     Args:
-        one_seed: Does one seed; returns a dataclass of what JSON can hold.
-        read: Makes that outcome of its JSON again; raises where it is damaged.
+        kind: Type of an outcome: what JSON can hold, in tuples, dictionaries and dataclasses.
+        one_seed: Does one seed.
         seeds: Number of seeds.
-        state: Folder where outcomes are kept.
         schema: Name of the study's layout.
-        workers: Processes; each does one seed at a time.
+        keeper: Where outcomes are kept, and in how many processes they are made.
         start: Called first in each process; None with one worker works in this one.
-        on_seed: Called after each seed, also after one that was kept.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    source = source_digest(schema)
-    places = {seed: state / f"{source}-{seed}.json" for seed in range(seeds)}
+    source, json_of = source_digest(schema), TypeAdapter(kind)
+    places = {seed: keeper.state / f"{source}-{seed}.json" for seed in range(seeds)}
     outcomes: dict[int, T] = {}
     for seed, place in places.items():
         try:
-            outcomes[seed] = read(json.loads(place.read_text()))
-        except (OSError, ValueError, KeyError, AttributeError, TypeError):
+            outcomes[seed] = json_of.validate_python(json.loads(place.read_text()))
+        except (OSError, ValueError):
             place.unlink(missing_ok=True)  # damaged: it is made again
             continue
-        on_seed()
+        keeper.on_seed()
     missing = [seed for seed in places if seed not in outcomes]
-    for seed, outcome in _done(one_seed, missing, workers, start):
-        held: Any = outcome
-        write_text_atomic(places[seed], json.dumps(asdict(held)))
+    for seed, outcome in _done(one_seed, missing, keeper.workers, start):
+        write_text_atomic(places[seed], json.dumps(json_of.dump_python(outcome)))
         outcomes[seed] = outcome
-        on_seed()
+        keeper.on_seed()
     return [outcomes[seed] for seed in range(seeds)]
 
 

@@ -61,7 +61,7 @@ def test_a_record_is_found_by_the_beginning_of_its_hash(store):
     assert store.add(line_record()) == digest
     assert len(store.records()) == 1
     other = "0" if digest[0] != "0" else "1"
-    with pytest.raises(StoreError, match="0 records"):
+    with pytest.raises(StoreError, match="No record"):
         store.get(other)
 
 

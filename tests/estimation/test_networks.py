@@ -10,6 +10,8 @@ from estimation.networks.network import Network, NetworkError
 
 IN, OUT = ("spindle_angle_rad", "motor_current_a"), ("proximal_torque_n_m", "jaw_angle_rad")
 
+LAYOUT = "rig.network/1"
+
 
 def make(nodes: int = 4, wide: int = 2, outputs: int = 2, seed: int = 0) -> Network:
     draw = np.random.default_rng(seed)
@@ -46,8 +48,8 @@ def test_inputs_outside_the_range_are_flagged_and_nan_stays_nan():
 def test_a_file_gives_the_same_network_back(tmp_path):
     network = make()
     path = tmp_path / "deep" / "network.npz"
-    net.save(network, path)
-    again = net.load(path)
+    net.write_arrays(path, LAYOUT, net.to_arrays(network))
+    again = net.from_arrays(net.read_arrays(path, LAYOUT))
     rows = np.random.default_rng(1).uniform(-1, 1, (50, 2))
     np.testing.assert_array_equal(again(rows), network(rows))
     assert (again.inputs, again.outputs) == (network.inputs, network.outputs)
@@ -56,17 +58,17 @@ def test_a_file_gives_the_same_network_back(tmp_path):
 def test_a_damaged_foreign_or_pickled_file_is_refused(tmp_path):
     path = tmp_path / "network.npz"
     with pytest.raises(NetworkError, match="cannot be read"):
-        net.load(path)
-    net.save(make(), path)
+        net.read_arrays(path, LAYOUT)
+    net.write_arrays(path, LAYOUT, net.to_arrays(make()))
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(NetworkError, match="cannot be read"):
-        net.load(path)
-    np.savez(path, schema=np.array(net.SCHEMA), hidden=np.array([{}], dtype=object))
+        net.read_arrays(path, LAYOUT)
+    np.savez(path, schema=np.array(LAYOUT), hidden=np.array([{}], dtype=object))
     with pytest.raises(NetworkError, match="cannot be read"):
-        net.load(path)
+        net.read_arrays(path, LAYOUT)
     np.savez(path, hidden=np.zeros(3))
     with pytest.raises(NetworkError, match="layout none"):
-        net.load(path)
+        net.read_arrays(path, LAYOUT)
     arrays = net.to_arrays(make())
     del arrays["hidden"]
     with pytest.raises(NetworkError, match="'hidden' of a network is missing"):

@@ -1,9 +1,11 @@
 """`rig cal`: from a certificate to the calibration of a session."""
 
 import json
+import re
 
 import pytest
 
+from calibration.store import CalibrationStore
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED, load_config
 
@@ -73,7 +75,7 @@ def test_a_foreign_sensor_is_refused_by_check_and_by_the_session(rig, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
-def test_diff_names_what_changed(rig, tmp_path):
+def test_diff_names_what_changed(rig, tmp_path, capsys):
     hashes = []
     for slope in ("4.0e-5", "4.1e-5"):
         words = (certificate(tmp_path, slope), "--operator", "Ada", "--made-at")
@@ -82,6 +84,22 @@ def test_diff_names_what_changed(rig, tmp_path):
     _, told = rig("cal", "diff", *hashes)
     assert told["changes"]["fit.parameters.slope"] == {"first": 4.0e-5, "second": 4.1e-5}
     assert set(told["changes"]) == {"hash", "fit.parameters.slope", "raw"}
+    assert main(["cal", "diff", *hashes]) == 0
+    assert "slope: 40 uN m a count -> 41 uN m a count" in capsys.readouterr().out
+    assert main(["cal", "list"]) == 0
+    assert "slope 40 uN m a count" in capsys.readouterr().out
+
+
+def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, capsys):
+    folders = ["--out", str(tmp_path / "raw"), "--store", str(tmp_path / "store")]
+    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", *folders]) == 0
+    (digest,) = (r.content_hash for r in CalibrationStore(tmp_path / "store").records()
+                 if r.channel == "spindle_torque_n_m")  # fmt: skip
+    capsys.readouterr()
+    assert main(["cal", "show", digest]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", said)
+    assert "covariance" not in said
 
 
 def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):

@@ -179,6 +179,14 @@ def test_runs_whose_clock_jumps_are_left_out_and_named(monkeypatch, tmp_path, ca
     assert any("jumps by 0.401 s at 0.699 s" in note for note in found["notes"])
 
 
+def test_a_diagnosis_without_a_finding_has_a_page(monkeypatch, tmp_path):
+    clean = Campaign.of(runs(lambda angle, speed, load: 0.0 * angle, count=9, seconds=5.0))
+    monkeypatch.setattr(subject, "open_campaign", lambda *_: clean)
+    found = run(tmp_path, "--report", str(tmp_path / "report"), "--balance", "motor", "--quick")
+    assert found["findings"] == []
+    assert "No unmodelled effect" in (tmp_path / "report/diagnosis.html").read_text()
+
+
 def test_when_every_clock_jumps_nothing_is_decided(monkeypatch, tmp_path, capsys):
     spoilt = [jumping(r) for r in runs(spring, count=6, seconds=2.0)]
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(spoilt))

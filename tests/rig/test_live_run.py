@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from rich.console import Console
 
 from rig.errors import SafetyTripError
 from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.keys import DisplayKeys
 from rig.live.options import ShowOptions
 from rig.live.run import show
 
@@ -148,3 +150,51 @@ def test_silence_is_shown_in_the_clock_of_the_person(capsys):
     assert frames[-1]["channels"][GRIP]["sensor"] is None
     assert frames[-1]["channels"][GRIP]["sensor_missing"] == "no samples arriving"
     assert frames[-1]["devices"][0]["state"] == "stale"
+
+
+def drawn_after(presses, footer="c channel", help_="c: shows the next channel"):
+    """Return the last frame of a display on which keys were pressed, one a block."""
+    script = iter(presses)
+    keys = DisplayKeys(lambda: next(script, ""))
+
+    def with_current():
+        for block in blocks(len(presses) + 4):
+            keys()
+            columns = {**block.columns, "motor_current_a": np.full(50, 0.25)}
+            yield replace(block, columns=columns)
+
+    console = people(terminal=True)
+    options = ShowOptions("run", footer=footer, help=help_, keys=keys)
+    summary = show(with_current(), options, console, steady_clock())
+    assert summary.channel == GRIP
+    return console.file.getvalue().split("\x1b[?2026h")[-1]
+
+
+def test_a_key_chooses_the_channel_in_large_digits_and_comes_back_to_the_first():
+    assert "Measured current of the drive motor, sensor" in drawn_after(["c"])
+    assert "0.250 A" in drawn_after(["c"])
+    assert "Grip torque, estimate" in drawn_after(["c"])  # in a line of its own
+    assert "Measured current" not in drawn_after(["cc"])
+
+
+def test_a_key_shows_the_help_and_hides_it():
+    assert "shows the next channel" in drawn_after(["?"])
+    assert "shows the next channel" not in drawn_after(["?", "?"])
+
+
+def test_keys_of_the_display_do_not_reach_the_rig():
+    keys = DisplayKeys(iter(["tc?m"]).__next__)
+    assert keys() == "tm"
+    assert (keys.chosen, keys.helps) == (1, True)
+
+
+def test_a_tall_terminal_is_used():
+    console = Console(
+        file=io.StringIO(),
+        width=160,
+        height=50,
+        force_terminal=True,
+        _environ={"TERM": "xterm-256color"},
+    )
+    show(blocks(40), ShowOptions("run"), console, steady_clock())
+    assert console.file.getvalue().split("\x1b[?2026h")[-1].count("\n") > 40

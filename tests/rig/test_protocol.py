@@ -73,3 +73,9 @@ def test_a_wrong_file_is_refused_with_the_key(tmp_path, text, message):
 def test_an_unknown_protocol_lists_the_shipped_ones():
     with pytest.raises(UsageError, match="quick, reference, still, thorough"):
         load_protocol("referense")
+
+
+def test_a_folder_of_a_shipped_protocols_name_does_not_hide_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "quick").mkdir()  # as `rig record -p quick -o quick` makes it
+    assert load_protocol("quick").name == "quick"

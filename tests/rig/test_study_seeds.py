@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 
 pytestmark = pytest.mark.integration
 
@@ -26,14 +26,8 @@ def square(seed: int) -> Square:
 def run(state: Path, seeds: int, schema: str = "squares/1") -> tuple[list[int], int]:
     made.clear()
     told: list[None] = []
-    found = kept_outcomes(
-        square,
-        lambda held: Square(int(held["value"])),
-        seeds,
-        state,
-        schema,
-        on_seed=lambda: told.append(None),
-    )
+    keeper = Keeper(state, on_seed=lambda: told.append(None))
+    found = kept_outcomes(Square, square, seeds, schema, keeper)
     assert len(told) == seeds
     return [each.value for each in found], len(made)
 

@@ -11,6 +11,7 @@ from estimation.networks.training import Settings, has_torch
 from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import draw_arm
 from rig.cli.study import study_app
+from rig.studies.seeds import Keeper
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
@@ -109,7 +110,7 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     assert "| M+C on M: paper | lost | lost | 6.11 | lost | lost | lost |" in out.read_text()
     assert (tmp_path / "zhang-grasp.svg").exists()
     monkeypatch.setattr("rig.studies.seeds._done", nothing_left)
-    again = run_zhang(1, state)
+    again = run_zhang(1, Keeper(state))
     assert {cell: list(numbers) for cell, numbers in again.outcomes[0].items()} == cells
     assert set(PAPER) <= {cell.rsplit(" | ", 1)[0] for cell in cells}
 

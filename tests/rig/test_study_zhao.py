@@ -14,6 +14,7 @@ from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES, OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis
+from rig.studies.seeds import Keeper
 from rig.studies.zhao import study as zhao
 from rig.studies.zhao.haptics import run_haptics
 from rig.studies.zhao.methods import Lacking, axes_of, lacking
@@ -125,9 +126,9 @@ def test_what_was_measured_is_kept_and_not_measured_again(tmp_path, monkeypatch,
         zhao, "measure", lambda dof, axes, seed, *_: seen.append(seed) or replace(cell, seed=seed)
     )
     every = len(DOFS) * len(FAMILIES)
-    first = zhao.run_study("third", 1, 0.1, tmp_path)
+    first = zhao.run_study("third", 1, 0.1, Keeper(tmp_path))
     assert seen == [0] * every
-    again = zhao.run_study("third", 2, 0.1, tmp_path)
+    again = zhao.run_study("third", 2, 0.1, Keeper(tmp_path))
     assert seen[every:] == [1] * every
     assert again.cells["yaw"][: len(FAMILIES)] == first.cells["yaw"]
     assert again.lacking == first.lacking
@@ -147,7 +148,7 @@ def test_every_family_is_in_the_report(mean_grasper):
 
 
 def test_haptics_are_right_also_with_friction_not_declared():
-    answers = run_haptics("third", 0.1, (bearing("grasp"),), 5).answers
+    answers = run_haptics("third", 0.1, (bearing("grasp"),), 5)
     assert [answer.method for answer in answers][-1] == "ours, friction not declared"
     for answer in answers:
         assert answer.order_is_right

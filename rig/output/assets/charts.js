@@ -5,8 +5,10 @@
   const charts = JSON.parse(document.getElementById("charts").textContent);
   const scheme = matchMedia("(prefers-color-scheme: dark)");
   const schemes = {
-    light: { ink: "#1c1e21", grid: "#d5d8dc", before: "#c4500b", after: "#0b6fb3", measured: "#5f6670", level: "#5f6670" },
-    dark: { ink: "#e6e8eb", grid: "#43484f", before: "#ff9950", after: "#5cb8f5", measured: "#aab2bd", level: "#aab2bd" },
+    light: { ink: "#1c1e21", grid: "#d5d8dc", before: "#c4500b", after: "#0b6fb3", measured: "#5f6670", level: "#5f6670",
+      channel0: "#3a6f37", channel1: "#c4500b", channel2: "#7a3fa0", channel3: "#8a6d00", channel4: "#b3194b", channel5: "#5f6670" },
+    dark: { ink: "#e6e8eb", grid: "#43484f", before: "#ff9950", after: "#5cb8f5", measured: "#aab2bd", level: "#aab2bd",
+      channel0: "#86c67c", channel1: "#ff9950", channel2: "#c79be8", channel3: "#d9b93a", channel4: "#ff7f9f", channel5: "#aab2bd" },
   };
   const places = { before: "dot", after: "solid", measured: "solid", level: "dash" };
   let printing = false;

@@ -14,7 +14,6 @@ from estimation.arm.closed_chain import (
     ClosedChain,
     closed_jacobians,
     closed_regressor,
-    parameter_names,
 )
 from estimation.arm.motion import Motion
 from estimation.arm.periodic import periodic_motion
@@ -153,6 +152,3 @@ def hose_drag(motion: Motion, stiffness: float) -> FloatArray:
     turn = motion.position[:, 0]
     drag: FloatArray = stiffness * turn * (1 + turn**2)
     return drag
-
-
-NAMES = parameter_names(HYDRAULIC)

@@ -7,10 +7,7 @@ method fits the same points with the effects that the diagnosis identified on fu
 same arm.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +30,7 @@ from rig.studies.delsol.hydraulic_arm import (
     measured_torque,
 )
 from rig.studies.families import arm_of
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 
 SCHEMA = "rig.study.delsol/4"
 
@@ -103,38 +100,21 @@ class Seed:
     named: tuple[Named, ...]
 
 
-def run_delsol(
-    seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
-) -> DelSolStudy:
+def run_delsol(seeds: int, keeper: Keeper) -> DelSolStudy:
     """Do the study on arms of every family of hidden friction.
 
     Args:
         seeds: Arms of each family, from seed 0.
-        state: Folder where the outcome of each arm is kept.
-        workers: Processes; each does one arm.
-        on_seed: Called after each arm, also after one that was kept.
+        keeper: Keeps the outcome of each arm.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    done = kept_outcomes(
-        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA, workers=workers, on_seed=on_seed
-    )
+    done = kept_outcomes(Seed, one_arm, seeds * len(FAMILIES), SCHEMA, keeper)
     methods = (PAPER, DISCARDED, OURS)
     by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in methods}
     named = tuple(seed.named for seed in done)
     return DelSolStudy(SCHEMA, seeds, by_method, named, Provenance.now(0))
-
-
-def _read(held: Any) -> Seed:
-    outcomes = {
-        method: Outcome(**{**each, "residual_n_m": tuple(each["residual_n_m"])})
-        for method, each in held["outcomes"].items()
-    }
-    named = (
-        Named(**{**each, "alternatives": tuple(each["alternatives"])}) for each in held["named"]
-    )
-    return Seed(outcomes, tuple(named))
 
 
 def one_arm(number: int) -> Seed:

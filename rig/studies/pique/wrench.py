@@ -7,11 +7,9 @@ weighed by their errors; then the same with a window of past samples in place of
 filter.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -50,7 +48,7 @@ from rig.arm.simulated import (
 from rig.arm.within import chosen_within
 from rig.output.provenance import Provenance
 from rig.studies.families import arm_of
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 
 SCHEMA = "rig.study.pique.wrench/3"
 
@@ -121,32 +119,18 @@ class WrenchStudy:
         return np.array([arm.errors[table][method] for arm in own])
 
 
-def run_wrench_study(
-    seeds: int, state: Path, workers: int = 1, on_seed: Callable[[], None] = lambda: None
-) -> WrenchStudy:
+def run_wrench_study(seeds: int, keeper: Keeper) -> WrenchStudy:
     """Do the study on arms of every family of hidden torque.
 
     Args:
         seeds: Arms of each family, from seed 0.
-        state: Folder where the outcome of each arm is kept.
-        workers: Processes at once.
-        on_seed: Called after each arm, also after one that was kept.
+        keeper: Keeps the outcome of each arm.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    arms = kept_outcomes(
-        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA, workers=workers, on_seed=on_seed
-    )
+    arms = kept_outcomes(Arm, one_arm, seeds * len(FAMILIES), SCHEMA, keeper)
     return WrenchStudy(SCHEMA, seeds, tuple(arms), Provenance.now(0))
-
-
-def _read(held: Any) -> Arm:
-    errors = {
-        table: {method: tuple(error) for method, error in methods.items()}
-        for table, methods in held["errors"].items()
-    }
-    return Arm(held["family"], errors, tuple(held["effects"]))
 
 
 def one_arm(number: int) -> Arm:

@@ -1,10 +1,7 @@
 """Zhang et al. 2022 on simulated seven-joint arms: all seeds, kept as they are done."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +10,7 @@ from estimation.networks.training import require_torch
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
 from rig.output.provenance import Provenance
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.zhang.free import NETWORKS, Cells
 from rig.studies.zhang.seed import Outcome, one_arm
 
@@ -107,19 +104,12 @@ def worst_axes(contact: FloatArray) -> tuple[float, float, float]:
     return float(contact[:3].max()), float(contact[3:6].max()), float(contact[6])
 
 
-def run_zhang(
-    seeds: int,
-    state: Path,
-    workers: int = 1,
-    on_seed: Callable[[], None] = lambda: None,
-) -> ZhangStudy:
+def run_zhang(seeds: int, keeper: Keeper) -> ZhangStudy:
     """Do the study on arms of every family of hidden torque.
 
     Args:
         seeds: Arms of each family, from seed 0.
-        state: Folder where the outcome of each arm is kept.
-        workers: Processes; each does one arm on one core.
-        on_seed: Called after each arm, also after one that was kept.
+        keeper: Keeps the outcome of each arm, and makes each on one core.
 
     Raises:
         MissingExtraError: torch or Pinocchio is missing.
@@ -127,10 +117,8 @@ def run_zhang(
     """
     require_torch()
     pinocchio()
-    outcomes = kept_outcomes(
-        one_arm, _read, seeds * len(FAMILIES), state, SCHEMA,
-        workers=workers, start=_one_thread, on_seed=on_seed,
-    )  # fmt: skip
+    arms = seeds * len(FAMILIES)
+    outcomes = kept_outcomes(Outcome, one_arm, arms, SCHEMA, keeper, start=_one_thread)
     found = Counter(name for outcome in outcomes for name in outcome.effects)
     return ZhangStudy(
         schema=SCHEMA,
@@ -140,14 +128,6 @@ def run_zhang(
         effects=dict(found.most_common()),
         provenance=Provenance.now(0),
     )
-
-
-def _read(held: Any) -> Outcome:
-    cells, traces = (
-        {name: tuple(numbers) for name, numbers in held[part].items()}
-        for part in ("cells", "traces")
-    )
-    return Outcome(cells, traces, tuple(held["effects"]))
 
 
 def _one_thread() -> None:

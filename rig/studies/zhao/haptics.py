@@ -9,8 +9,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -21,7 +19,7 @@ from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import FILTER, CurrentForce
 from rig.grasper.inputs import hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.zhao.methods import Axes, axes_of, fitted, record
 
 MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
@@ -85,22 +83,8 @@ class Answer:
     place_confidence: float
 
 
-@dataclass(frozen=True)
-class Answers:
-    """The results of the methods on one grasper, in the order of `run_haptics`."""
-
-    answers: tuple[Answer, ...]
-
-
 def haptics_of(
-    prototype: str,
-    seeds: int,
-    spread: float,
-    added: Sequence[Term],
-    state: Path,
-    *,
-    workers: int = 1,
-    on_step: Callable[[], None] = lambda: None,
+    prototype: str, seeds: int, spread: float, added: Sequence[Term], keeper: Keeper
 ) -> list[tuple[Answer, ...]]:
     """Return the answers on graspers of one make, one tuple a seed, in their order.
 
@@ -109,18 +93,16 @@ def haptics_of(
         seeds: Number of graspers, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
         added: Effects that ours adds to the declared model.
-        state: Folder where each is kept as it is done.
-        workers: Processes at once.
-        on_step: Called after each grasper.
+        keeper: Keeps each grasper.
     """
-    done = kept_outcomes(
-        partial(run_haptics, prototype, spread, tuple(added)), _read, seeds, state,
-        f"{SCHEMA} {prototype} {spread:g}", workers=workers, on_seed=on_step,
-    )  # fmt: skip
-    return [each.answers for each in done]
+    one = partial(run_haptics, prototype, spread, tuple(added))
+    name = f"{SCHEMA} {prototype} {spread:g}"
+    return kept_outcomes(tuple[Answer, ...], one, seeds, name, keeper)
 
 
-def run_haptics(prototype: str, spread: float, added: Sequence[Term], seed: int) -> Answers:
+def run_haptics(
+    prototype: str, spread: float, added: Sequence[Term], seed: int
+) -> tuple[Answer, ...]:
     """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
     axes = axes_of(PROTOTYPES[prototype], DOF, seed, spread)
     methods = {
@@ -128,7 +110,7 @@ def run_haptics(prototype: str, spread: float, added: Sequence[Term], seed: int)
         "ours": _of_model(fitted(DOF, axes, seed, added), axes),
         "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
     }
-    return Answers(tuple(_answer(name, way, axes, seed) for name, way in methods.items()))
+    return tuple(_answer(name, way, axes, seed) for name, way in methods.items())
 
 
 def _answer(method: str, estimate: Estimate, axes: Axes, seed: int) -> Answer:
@@ -210,16 +192,3 @@ def _of_model(model: Model, axes: Axes) -> Estimate:
 def _low(run: Recording, low_pass: LowPass) -> FloatArray:
     angle = run[f"{DOF}_angle_rad"]
     return CausalFilter(run.sample_rate_hz, low_pass).step(angle[:, None])[:, 0]
-
-
-def _read(held: Any) -> Answers:
-    return Answers(
-        tuple(
-            Answer(**{**one, "materials": _all(one["materials"]), "places": _all(one["places"])})
-            for one in held["answers"]
-        )
-    )
-
-
-def _all(told: list[dict[str, Any]]) -> tuple[Stiffness, ...]:
-    return tuple(Stiffness(s["name"], s["true_n_rad"], tuple(s["grasps_n_rad"])) for s in told)

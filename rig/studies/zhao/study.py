@@ -4,11 +4,10 @@ The diagnosis looks at one grasper of each family of hidden friction, which is n
 names is added on all the others of that family.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from estimation.effects import effect
@@ -17,7 +16,7 @@ from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES
 from rig.grasper.plant import PROTOTYPES
 from rig.studies.families import arm_of
-from rig.studies.seeds import kept_outcomes
+from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.zhao.methods import (
     Axes,
     Lacking,
@@ -79,13 +78,6 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Grasper:
-    """All degrees of freedom of one grasper, in the order of `DOFS`."""
-
-    cells: tuple[Cell, ...]
-
-
-@dataclass(frozen=True)
 class Looked:
     """The stored result of the diagnosis of one degree of freedom."""
 
@@ -101,11 +93,11 @@ def look(prototype: str, spread: float, number: int) -> Looked:
     return Looked(found.findings, tuple(_plain(term) for term in found.terms))
 
 
-def one_grasper(prototype: str, spread: float, added: Added, number: int) -> Grasper:
-    """Measure all degrees of freedom of one grasper."""
+def one_grasper(prototype: str, spread: float, added: Added, number: int) -> tuple[Cell, ...]:
+    """Measure all degrees of freedom of one grasper, in the order of `DOFS`."""
     seed, family = arm_of(number, FAMILIES)
     axes = {dof: axes_of(PROTOTYPES[prototype], dof, seed, spread, family) for dof in DOFS}
-    return Grasper(tuple(measure(dof, axes[dof], seed, added[family, dof].terms) for dof in DOFS))
+    return tuple(measure(dof, axes[dof], seed, added[family, dof].terms) for dof in DOFS)
 
 
 def measure(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Cell:
@@ -122,57 +114,27 @@ def measure(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Cell:
     return Cell(seed, steep, *(outcome(dof, tests, way, arm_m) for way in ways))
 
 
-def run_study(
-    prototype: str,
-    seeds: int,
-    spread: float,
-    state: Path,
-    *,
-    workers: int = 1,
-    on_step: Callable[[], None] = lambda: None,
-) -> Study:
+def run_study(prototype: str, seeds: int, spread: float, keeper: Keeper) -> Study:
     """Run the three experiments on graspers of one make.
 
     Args:
         prototype: `third`, `journal` or `ball`.
         seeds: Graspers of each family of hidden friction, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
-        state: Folder where each is kept as it is done.
-        workers: Processes at once.
-        on_step: Called after each of three diagnoses a family and each grasper.
+        keeper: Keeps each of three diagnoses a family, and each grasper.
     """
     name = f"{SCHEMA} {prototype} {spread:g}"
-    looked = kept_outcomes(
-        partial(look, prototype, spread), _looked, len(FAMILIES) * len(DOFS), state,
-        f"{name} diagnosis", workers=workers, on_seed=on_step,
-    )  # fmt: skip
+    every = len(FAMILIES) * len(DOFS)
+    diagnosed = partial(look, prototype, spread)
+    looked = kept_outcomes(Looked, diagnosed, every, f"{name} diagnosis", keeper)
     lacked = {
         (family, dof): Lacking(found.findings, tuple(_term(term) for term in found.terms))
         for (family, dof), found in zip(product(FAMILIES, DOFS), looked, strict=True)
     }
-    graspers = kept_outcomes(
-        partial(one_grasper, prototype, spread, lacked), _grasper, seeds * len(FAMILIES), state,
-        name, workers=workers, on_seed=on_step,
-    )  # fmt: skip
-    cells = {dof: [g.cells[k] for g in graspers] for k, dof in enumerate(DOFS)}
+    one = partial(one_grasper, prototype, spread, lacked)
+    graspers = kept_outcomes(tuple[Cell, ...], one, seeds * len(FAMILIES), name, keeper)
+    cells = {dof: [grasper[k] for grasper in graspers] for k, dof in enumerate(DOFS)}
     return Study(PROTOTYPES[prototype].name, spread, cells, lacked)
-
-
-def _looked(held: Any) -> Looked:
-    findings = tuple((family, verdict) for family, verdict in held["findings"])
-    return Looked(findings, tuple(held["terms"]))
-
-
-def _grasper(held: Any) -> Grasper:
-    return Grasper(tuple(_cell(cell) for cell in held["cells"]))
-
-
-def _cell(held: Any) -> Cell:
-    methods = {
-        name: Outcome(tuple(held[name]["errors_n"]), held[name]["delay_ms"])
-        for name in ("paper", "ours", "undeclared")
-    }
-    return Cell(held["seed"], held["slope"], **methods)
 
 
 def _plain(term: Term) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """What the search over causes finds, and what it never reads."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -106,25 +106,62 @@ def test_the_test_runs_do_not_reach_the_choice(found: Found) -> None:
     assert [c.candidate.name for c in again.causes] == [c.candidate.name for c in found.causes]
 
 
-@settings(max_examples=10, deadline=None)
-@given(
+@dataclass(frozen=True)
+class Copy:
+    """A channel that no equation declares, made of an equation's target."""
+
+    name: str
+    delay: int
+    scale: float
+    integrated: bool
+    filtered: bool
+    noise: float
+
+
+COPIES = st.builds(
+    Copy,
     name=st.sampled_from(
-        ["bearing_angle_rad", "hidden_n_m", "other_a", "room_k", "extra_position_m"]
+        [
+            "bearing_angle_rad",
+            "jaw_angle_rad",
+            "spindle_angle_rad",
+            "distal_torque_n_m",
+            "hidden_n_m",
+            "other_a",
+            "winding_temperature_k",
+            "extra_position_m",
+        ]
     ),
     delay=st.integers(0, 40),
     scale=st.floats(-5, 5).filter(lambda x: abs(x) > 0.1),
     integrated=st.booleans(),
+    filtered=st.booleans(),
     noise=st.floats(0, 0.1),
 )
-def test_no_candidate_reads_a_channel_that_no_equation_declares(
-    name: str, delay: int, scale: float, integrated: bool, noise: float
-) -> None:
-    random = np.random.default_rng(delay)
+
+
+@settings(max_examples=10, deadline=None)
+@given(copy=COPIES)
+def test_no_candidate_reads_a_channel_that_no_equation_declares(copy: Copy) -> None:
+    _assert_not_read(copy)
+
+
+@pytest.mark.long
+@settings(max_examples=500, deadline=None)
+@given(copy=COPIES)
+def test_no_candidate_reads_any_of_500_copies_of_a_target(copy: Copy) -> None:
+    _assert_not_read(copy)
+
+
+def _assert_not_read(copy: Copy) -> None:
+    random = np.random.default_rng(copy.delay)
     runs = []
     for run in recordings(runs=6):
-        target = np.roll(run["proximal_torque_n_m"], delay)
-        copy = scale * (np.cumsum(target) / 250 if integrated else target)
-        runs.append(run.with_columns(**{name: copy + random.normal(0, noise, len(copy))}))
+        values = np.roll(run["proximal_torque_n_m"], copy.delay)
+        values = np.cumsum(values) / 250 if copy.integrated else values
+        values = np.convolve(values, np.ones(9) / 9, "same") if copy.filtered else values
+        noisy = copy.scale * values + random.normal(0, copy.noise, len(values))
+        runs.append(run.with_columns(**{copy.name: noisy}))
     layout = lay_out([motor()], runs, [r.name for r in runs])
     add_instruments(layout, [r.name for r in runs])
     read = {
@@ -133,7 +170,7 @@ def test_no_candidate_reads_a_channel_that_no_equation_declares(
         for source in sources_at(layout, place)
         for _, channel in source.channels
     }
-    assert name not in read
+    assert copy.name not in read
 
 
 def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> None:

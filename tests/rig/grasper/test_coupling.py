@@ -11,18 +11,13 @@ from hypothesis.extra import numpy as hnp
 
 from rig.grasper.coupling import Coupling, GrasperError, Limits
 from rig.grasper.dvrk import TOOLS, dvrk_coupling
-from rig.grasper.three_dof import (
-    Drive,
-    coupled_grasper,
-    planetary_grasper,
-)
+from rig.grasper.three_dof import Drive, planetary_grasper
 from rig.grasper.wrist import CablePath, Planetary
 
 PATH = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
 GRASPERS = [
     planetary_grasper(PATH),
     planetary_grasper(replace(PATH, d2_m=0.003)),
-    coupled_grasper(0.005, 0.004),
     *(dvrk_coupling(model) for tool in TOOLS for model in tool.models),
 ]
 graspers = st.sampled_from(GRASPERS)

@@ -99,10 +99,8 @@ def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.csv"]
 
 
-@pytest.mark.parametrize(("name", "start"), [("p.html", b"<!DOCTYPE html>"), ("p.png", b"\x89PNG")])
-def test_plots_are_a_page_or_a_picture(tmp_path, name, start):
+def test_plots_are_a_page(tmp_path):
     table = csv(tmp_path / "bench.csv", time_s=TIME, motor_angle_rad=WAVE)
-    assert main(["import", str(table), "--preview", "--plots", str(tmp_path / name)]) == 0
-    content = (tmp_path / name).read_bytes()
-    assert content.startswith(start)
-    assert name.endswith("png") or b"motor_angle_rad" in content
+    page = tmp_path / "p.html"
+    assert main(["import", str(table), "--preview", "--plots", str(page)]) == 0
+    assert "motor angle" in page.read_text()

@@ -1,0 +1,146 @@
+"""`rig model`: which model estimates for a rig, and the choice of another one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.help import GroupedHelp
+from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.output.console import JsonFlag, emit_json, results
+
+if TYPE_CHECKING:
+    from rig.configuration.config import Config
+
+model_app = typer.Typer(
+    name="model",
+    help="Show and choose the model that estimates for a rig.",
+    cls=GroupedHelp,
+    invoke_without_command=True,
+    rich_markup_mode=None,
+)
+
+
+@model_app.callback()
+def show(
+    context: typer.Context,
+    config: ConfigOption = None,
+    sim: SimFlag = False,
+    json: JsonFlag = False,
+) -> None:
+    """Show the model in use for the rig, and those that `rig model use` takes by name."""
+    if context.invoked_subcommand is not None:
+        return
+    from rig.configuration.chosen import choose_rig
+    from rig.configuration.model_in_use import choices, model_in_use
+
+    settings = choose_rig(config, sim)
+    chosen = model_in_use(settings.name)
+    past = [choice for choice in choices() if choice.rig == settings.name]
+    if json:
+        emit_json({"rig": settings.name, "model": settings.model_path, "known": _by_name()})
+        return
+    screen = results(json)
+    how = f"chosen {past[-1].at[:16]} from {past[-1].source}" if chosen else "as configured"
+    screen.print(f"{settings.name}: {_name(settings)} ({how})", soft_wrap=True)
+    if settings.model_path is not None:
+        screen.print(f"  {_described(settings.model_path)}")
+    screen.print(f"By name: {', '.join(_by_name())}. Any other by its file: rig model use FILE.")
+
+
+@model_app.command()
+def use(
+    model: Annotated[str, typer.Argument(help="Fitted model: a file, or a name of `rig model`.")],
+    config: ConfigOption = None,
+    sim: SimFlag = False,
+    json: JsonFlag = False,
+) -> None:
+    """Make a fitted model the one that `rig live`, `grip`, `replay` and `view` estimate with.
+
+    A copy is kept, so the file may change or go. `rig replay` and `rig view` take it for recordings
+    of this rig. --model of a command goes before it.
+    """
+    from rig.configuration.chosen import choose_rig
+    from rig.errors import UsageError
+
+    settings = choose_rig(config, sim)
+    file = Path(model)
+    known = _by_name()
+    source = file if file.is_file() else known.get(model)
+    if source is None:
+        raise UsageError(
+            f"There is no model {model!r}: neither a file nor a known name.",
+            f"Known are: {', '.join(known)}.",
+            "Write one with `rig fit LOGS --out FILE` or `rig diagnose LOGS --model-out FILE`.",
+        )
+    _choose(settings, source, json)
+
+
+@model_app.command()
+def reset(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
+    """Go back to the model that the configuration names."""
+    from rig.configuration.chosen import choose_rig
+
+    _choose(choose_rig(config, sim), None, json)
+
+
+def _choose(settings: "Config", source: Path | None, json: bool) -> None:
+    """Choose, and print what is in use now and what it replaced."""
+    from datetime import UTC, datetime
+
+    from rig.configuration.model_in_use import choose
+
+    estimates = [] if source is None else _estimates(source)
+    replaced, was = settings.model_path, _name(settings)
+    choose(settings.name, source, datetime.now(UTC).isoformat(timespec="seconds"))
+    now = settings.model_path
+    if json:
+        emit_json({"model": now, "replaced": replaced, "estimates": estimates})
+        return
+    screen = results(json)
+    screen.print(f"{settings.name}: {_name(settings)} in place of {was}.", soft_wrap=True)
+    if now is not None:
+        screen.print(f"  {_described(now)}")
+
+
+def _estimates(path: Path) -> list[str]:
+    """Return the channels that a fitted model estimates.
+
+    Raises:
+        EstimationError: The file is not a model, or the model is not fitted.
+    """
+    from rig.live.estimator import estimators_of
+
+    return [one.target_channel for one in estimators_of(path, 1000.0)]
+
+
+def _described(path: Path) -> str:
+    """Return the channels of a model and their intervals, in a sentence."""
+    from estimation.channels import unit_of
+    from rig.live.estimator import estimators_of
+
+    parts = []
+    for one in estimators_of(path, 1000.0):
+        wide = one.usual_half_width
+        width = f" +- {wide:.3g} {unit_of(one.target_channel)} (95 %)" if wide else ""
+        parts.append(f"{one.target_channel}{width}")
+    return f"It estimates {', '.join(parts)}."
+
+
+def _name(settings: "Config") -> str:
+    path = settings.model_path
+    return (
+        "no model" if path is None else path.name.removesuffix(path.suffix).removesuffix(".model")
+    )
+
+
+def _by_name() -> dict[str, Path]:
+    """Return the shipped fitted models and the copies that were in use, by name."""
+    from rig.configuration.config import SHIPPED
+    from rig.configuration.model_in_use import choices
+
+    ending = ".model.toml"
+    shipped = {path.name.removesuffix(ending): path for path in SHIPPED.glob(f"*{ending}")}
+    used = [choice.path for choice in choices()]
+    kept = {path.stem: path for path in used if path is not None and path.is_file()}
+    return dict(sorted(shipped.items())) | kept

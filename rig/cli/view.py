@@ -1,0 +1,125 @@
+"""`rig view`: recordings as one page in a browser."""
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.machine_option import MachineOption
+from rig.cli.shipped import complete_recordings
+from rig.output.console import JsonFlag, emit_json, remarks, results
+
+if TYPE_CHECKING:
+    from estimation.campaign import Campaign
+
+
+def view(
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="Recordings: a log, folder or archive of any known format.",
+            autocompletion=complete_recordings,
+        ),
+    ],
+    run: Annotated[
+        list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
+    ] = None,
+    machine: MachineOption = None,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format of PATH; detected by default.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Page to write; by default NAME.view.html.")
+    ] = None,
+    open_: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
+    ] = True,
+    json: JsonFlag = False,
+) -> None:
+    """Show recordings in a browser: every channel over time, run by run.
+
+    The page is one file that needs no network. An estimate is drawn on its sensor, with the
+    residual below.
+    """
+    import webbrowser
+
+    from rig.cli.left_out import say_left_out
+    from rig.machines.recordings import open_recordings
+    from rig.output.provenance import Provenance
+    from rig.output.render import write_report
+    from rig.reports.recordings import page
+
+    whole = open_recordings(path, machine, format_)
+    say_left_out(path, whole)
+    campaign = with_model(chosen_runs(whole, run or []), model)
+    name = path.resolve().name
+    target = out or Path(f"{name}.view.html")
+    write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
+    opened = open_ and not json and webbrowser.open(target.resolve().as_uri())
+    if json:
+        emit_json({"page": target, "runs": campaign.names})
+        return
+    results(json).print(f"{len(campaign)} runs: {target}", soft_wrap=True)
+    if not opened:
+        results(json).print(f"Open it: {target.resolve().as_uri()}", soft_wrap=True)
+
+
+def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
+    """Return the named runs of a campaign; all without a name.
+
+    Raises:
+        DataError: The campaign has no runs.
+        UsageError: It has no run of that name.
+    """
+    from rig.errors import DataError, UsageError
+
+    if not len(campaign):
+        raise DataError("The recordings hold no runs.", "There is nothing to show.")
+    for name in names:
+        if name not in campaign.names:
+            raise UsageError(
+                f"There is no run {name!r}.",
+                f"There are: {', '.join(campaign.names)}.",
+                f"Type --run {campaign.names[0]}",
+            )
+    return campaign.select(names) if names else campaign
+
+
+def with_model(campaign: "Campaign", model: Path | None) -> "Campaign":
+    """Return a campaign whose recordings have a model's estimate.
+
+    Args:
+        campaign: The runs.
+        model: Model file; None for the model in use for each recording's rig, where there is one
+            and it can estimate that recording.
+
+    Raises:
+        EstimationError: The named model cannot estimate a recording.
+    """
+    from dataclasses import replace
+
+    from estimation.campaign import Campaign, Run
+    from estimation.errors import EstimationError
+    from estimation.recording import Recording
+    from rig.configuration.model_in_use import model_in_use
+    from rig.live.estimator import with_estimates
+
+    def load(run: Run) -> Recording:
+        recording = run.load()
+        path = model or model_in_use(recording.rig)
+        if path is None:
+            return recording
+        try:
+            return with_estimates(recording, path)
+        except EstimationError as error:
+            if model is not None:
+                raise
+            remarks().print(f"{run.name} is without an estimate of {path.name}: {error.what}")
+            return recording
+
+    return Campaign(tuple(replace(run, load=partial(load, run)) for run in campaign.runs))

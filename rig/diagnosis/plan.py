@@ -1,0 +1,134 @@
+"""The effects that the runs of a protocol can distinguish, before they are recorded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimation.causes.isolability import NOTHING, Isolable, isolability
+from estimation.causes.verdict import IN_SET, SURE
+from estimation.effects import catalogue
+from rig.diagnosis.subject import declared_models, subject
+from rig.errors import UsageError
+from rig.protocols.protocol import load_protocol
+from rig.simulation.campaign import simulate_reference_campaign
+
+SEED = 1
+"""Seed of the simulated sensors' noise."""
+
+LISTED = 0.05
+"""Probability from which another effect is listed."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The effects that runs can distinguish.
+
+    Attributes:
+        source: Protocol or recordings.
+        runs: Number of runs.
+        effects: The expected conclusion on each effect, the vaguest first.
+    """
+
+    source: str
+    runs: int
+    effects: tuple[Isolable, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain JSON types."""
+        return {
+            "source": self.source,
+            "runs": self.runs,
+            "effects": [
+                {
+                    "equation": one.equation,
+                    "place": one.place,
+                    "family": one.family,
+                    "probability": round(one.share, 4),
+                    "others": {name: round(p, 4) for name, p in listed(one).items()},
+                }
+                for one in self.effects
+            ],
+        }
+
+
+def plan_of(
+    path: Path,
+    model: Path | None = None,
+    balance: str | None = None,
+    machine: Path | None = None,
+    on_part: Callable[[int, int], None] = lambda done, count: None,
+) -> Plan:
+    """Return the effects that the runs of a protocol, or recordings, can distinguish.
+
+    A protocol is played on the simulated reference rig.
+
+    Args:
+        path: Protocol file or its name; or recordings of any machine, for runs like these.
+        model: A model file or the name of a shipped one; see `subject`.
+        balance: Only this equation.
+        machine: Machine file; its runs are recordings.
+        on_part: Called with the number of effects done and of all.
+
+    Raises:
+        UsageError: No such protocol or recordings, or a machine that no simulator plays.
+        EstimationError: An equation cannot be identified on these runs.
+    """
+    if path.is_dir() or (path.exists() and path.suffix != ".toml"):
+        asked = subject(path, model, balance, machine=machine)
+        recordings, models = list(asked.campaign.evidence), asked.models
+    else:
+        load_protocol(str(path))
+        if machine is not None:
+            raise UsageError(
+                f"A protocol cannot be played on the machine of {machine}.",
+                "Only the reference rig is simulated.",
+                "Name recordings of the machine instead: rig diagnose --plan RECORDINGS.",
+            )
+        models = declared_models(model, balance)
+        recordings = list(simulate_reference_campaign(SEED, str(path)).evidence)
+    found = isolability(models, recordings, on_part=on_part)
+    return Plan(str(path), len(recordings), tuple(found))
+
+
+def listed(one: Isolable) -> dict[str, float]:
+    """Return the other effects that are worth a word, with their probabilities."""
+    return {name: p for name, p in one.others.items() if p >= LISTED}
+
+
+def sentences(plan: Plan) -> list[str]:
+    """Return the plan as lines: effects not distinguished, effects not seen, and advice."""
+    vague = [one for one in plan.effects if one.share < SURE and _seen(one)]
+    unseen = [one for one in plan.effects if not _seen(one)]
+    named = [one for one in plan.effects if one.share >= SURE]
+    lines = [
+        f"{plan.source}, {plan.runs} runs. Of each effect, as large as the residual is now:",
+        f"{len(named)} of {len(plan.effects)} would be named; {len(vague)} would be one of several;"
+        f" {len(unseen)} would not be seen.",
+    ]
+    for one in vague:
+        others = ", ".join(f"{name} {p:.2f}" for name, p in listed(one).items())
+        lines.append(f"  {one.equation}: {one.family} {one.share:.2f} or {others} ({one.place})")
+    if unseen:
+        lines.append("Not seen, because the declared terms or the run offsets take its place:")
+        lines += [f"  {one.equation}: {one.family} ({one.place})" for one in unseen]
+    advice = _advice(vague)
+    if advice:
+        lines += ["What distinguishes them:", *advice]
+    return lines
+
+
+def _seen(one: Isolable) -> bool:
+    return one.others.get(NOTHING, 0.0) < 1.0 - IN_SET / 2.0
+
+
+def _advice(vague: list[Isolable]) -> list[str]:
+    """Return the advice for effects that are one of several, an effect a line."""
+    known = catalogue()
+    said = {
+        effect.family: effect.told_apart_by
+        for one in vague
+        for effect in known.values()
+        if effect.family == one.family and effect.told_apart_by
+    }
+    return [f"  {family}: {text}" for family, text in sorted(said.items())]

@@ -1,0 +1,38 @@
+"""The effects that runs can distinguish, before any of them is found."""
+
+from functools import cache
+
+from estimation.causes.isolability import NOTHING, Isolable, isolability
+from estimation.recording import Recording
+from tests.estimation.causes.synthetic import motor, recordings
+
+
+def _at_one_load(runs: list[Recording]) -> list[Recording]:
+    """Return the runs of one of the three loads."""
+    return [run for k, run in enumerate(runs) if k % 3 == 0]
+
+
+@cache
+def _effects(one_load: bool) -> dict[tuple[str, str], Isolable]:
+    runs = recordings(runs=18 if one_load else 6)
+    found = isolability([motor()], _at_one_load(runs) if one_load else runs)
+    return {(one.place, one.family): one for one in found}
+
+
+def test_probabilities_of_an_effect_its_likes_and_nothing_sum_to_one() -> None:
+    for one in _effects(one_load=False).values():
+        assert abs(one.share + sum(one.others.values()) - 1.0) < 1e-6
+
+
+def test_what_the_declared_terms_can_express_is_not_seen() -> None:
+    constant = _effects(one_load=False)["motor", "friction.coulomb_asymmetry"]
+    assert constant.others.get(NOTHING, 0.0) > 0.5
+
+
+def test_a_ripple_with_the_motor_angle_is_distinguished() -> None:
+    assert _effects(one_load=False)["motor", "ripple.motor"].share > 0.5
+
+
+def test_several_loads_make_the_saturation_of_a_motor_easier_to_name() -> None:
+    one, several = (_effects(k)["actuator motor_current_a", "motor.saturation"] for k in (1, 0))
+    assert several.share > one.share

@@ -1,0 +1,145 @@
+"""The model in use: chosen once, and then that of the live display, replays, pages and exports."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import model_file
+from estimation.fitting import fit
+from rig.cli.main import main
+from rig.configuration.config import SHIPPED, load_config
+from rig.importers.registry import open_campaign
+from rig.live.estimator import estimators_of
+from rig.live.session_blocks import session_blocks
+from rig.live.until import until
+from rig.log.convert import write_recording
+from rig.log.reader import read_log
+from tests.estimation.synthetic import run
+from tests.rig.simulated import simulated, transport
+
+pytestmark = pytest.mark.integration
+
+GRIP = "distal_torque_n_m"
+SHIPPED_MODEL = SHIPPED / "simulated_grip.model.toml"
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def model(path: Path) -> Path:
+    return Path(path.write_text(SHIPPED_MODEL.read_text()) and path)
+
+
+def answered(capsys, *words):
+    assert main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_model_is_used_by_every_session_of_its_rig_until_taken_back(home, capsys):
+    assert load_config().model_path == SHIPPED_MODEL
+    used = answered(capsys, "model", "use", str(model(home / "mine.toml")))
+    assert used["replaced"] == str(SHIPPED_MODEL)
+    assert used["estimates"] == [GRIP]
+    (home / "mine.toml").unlink()  # a copy is in use
+    assert load_config().model_path.read_text() == SHIPPED_MODEL.read_text()
+    assert load_config(Path("grasper")).model_path.stem.startswith("simulated_grasper")
+    again = answered(capsys, "model", "use", str(model(home / "other.toml")))
+    assert again["replaced"] == str(used["model"])
+    assert answered(capsys, "model")["model"] == again["model"]
+    assert answered(capsys, "model", "use", Path(used["model"]).stem)["model"] == used["model"]
+    assert answered(capsys, "model", "reset")["replaced"] == used["model"]
+    assert load_config().model_path == SHIPPED_MODEL
+
+
+def test_only_a_fitted_model_is_used(home, capsys):
+    assert main(["model", "use", "gripp"]) == 2
+    assert "simulated_grip" in capsys.readouterr().err
+    model_file.write(model_file.read(Path("motor")), home / "declared.toml")
+    assert main(["model", "use", "declared.toml"]) != 0
+    assert "not fitted" in capsys.readouterr().err
+    assert load_config().model_path == SHIPPED_MODEL
+
+
+def test_a_configuration_may_name_an_estimator_file(home):
+    assert simulated().changed(model="mine.npz").model_path == Path("mine.npz")
+
+
+def logs(folder: Path) -> Path:
+    """Two runs of the simulated rig's name, and a fitted model of them, in use."""
+    folder.mkdir()
+    for seed, name in enumerate(("000-a", "001-b")):
+        made = replace(run(name, 0.4, 0.1, seed=seed, seconds=3.0), rig="bench 7")
+        write_recording(folder / f"{name}.mcap", made)
+    return folder
+
+
+@pytest.fixture
+def recorded(home):
+    folder = logs(home / "kk")
+    fitted = fit(model_file.read(Path("motor")), open_campaign(folder))
+    model_file.write(fitted, home / "motor.toml")
+    return folder, fitted
+
+
+def test_exports_have_the_estimate_beside_what_was_measured(recorded, home):
+    folder, fitted = recorded
+    named = f"estimated_{fitted.target}"
+    words = ["--model", str(home / "motor.toml"), "--out"]
+    assert main(["log", "export", str(folder), *words, str(home / "all.csv")]) == 0
+    with (home / "all.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    first = open_campaign(folder).runs[0].recording()
+    (estimator,) = estimators_of(home / "motor.toml", first.sample_rate_hz)
+    expected = estimator.push(first.columns, first.time_s)
+    mine = [float(row[named]) for row in rows if row["run"] == first.name]
+    np.testing.assert_allclose(mine, expected)
+    assert main(["log", "export", str(folder), "--format", "mcap", *words, str(home / "new")]) == 0
+    again = open_campaign(home / "new")
+    assert again.names == ("000-a", "001-b")
+    np.testing.assert_array_equal(again.runs[0].recording().columns[named], expected)
+
+
+def test_a_page_and_a_replay_take_the_model_in_use_for_the_recordings_rig(recorded, home, capsys):
+    folder, fitted = recorded
+    text = (SHIPPED / "simulated.toml").read_text()
+    (home / "rig.toml").write_text(text.replace('"simulated rig"', '"bench 7"'))
+    page = home / "p.html"
+    assert main(["view", str(folder), "--no-open", "-o", str(page)]) == 0
+    assert "estimated" not in page.read_text().split('id="charts">')[1]
+    assert main(["model", "use", "motor.toml", "-c", "rig.toml"]) == 0
+    assert main(["view", str(folder), "--no-open", "-o", str(page)]) == 0
+    assert '"estimated ' in page.read_text().split('id="charts">')[1]
+    capsys.readouterr()
+    assert main(["replay", str(folder), "--speed", "0", "--json"]) == 0
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert frames[10]["channels"][fitted.target]["estimate"] is not None
+
+
+def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path):
+    config = simulated()
+    script = iter(["r", "", "", "r"])
+    blocks = list(
+        until(
+            session_blocks(
+                config,
+                lambda: transport(config),
+                [],
+                estimators_of(SHIPPED_MODEL, 1000.0),
+                lambda: next(script, ""),
+                tmp_path,
+            ),
+            0.5,
+        )
+    )
+    (path,) = tmp_path.glob("*.mcap")
+    rows = read_log(path).topics["/rig/sample"].rows
+    shown = np.concatenate([block.estimates[GRIP] for block in blocks[:3]])
+    np.testing.assert_array_equal(rows[f"estimated_{GRIP}"], shown)

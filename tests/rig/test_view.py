@@ -1,0 +1,86 @@
+"""Recordings as a page: every channel and the estimate over its sensor, in a browser."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from estimation.recording import Flag, Mark, Recording
+from rig.cli.main import main
+from rig.log.convert import write_recording
+from tests.rig.browser import Opened, chromium
+from tests.rig.test_reports import Page
+
+pytestmark = pytest.mark.integration
+
+GRIP = "distal_torque_n_m"
+
+
+def recorded(name, bias=0.0):
+    time_s = np.arange(2000) / 1000
+    torque = 0.05 * np.sin(6 * time_s)
+    columns = {
+        "jaw_angle_rad": np.cos(3 * time_s),
+        GRIP: torque,
+        f"estimated_{GRIP}": torque + bias,
+    }
+    flags = np.zeros(2000, np.uint8)
+    flags[500:520] = Flag.STALE
+    return Recording(name, time_s, columns, flags, {"load_a": 0.2}, marks=(Mark(1.0, "bang"),))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("000-a", "001-b"):
+        write_recording(tmp_path / f"{name}.mcap", recorded(name, bias=0.01))
+    return tmp_path
+
+
+def written(folder, *words):
+    page = folder / "page.html"
+    assert main(["view", str(folder), "--out", str(page), "--no-open", *words]) == 0
+    return page
+
+
+def test_each_run_has_all_channels_the_estimate_on_its_sensor_and_the_residual(folder):
+    text = written(folder).read_text()
+    found = Page(text)
+    assert (found.open, found.references) == ([], ["#evidence"])
+    (chart,) = json.loads(re.search(r'id="charts">(.*?)</script>', text, re.DOTALL)[1])
+    lines = {line["name"]: line for line in chart["choices"]["001-b"]}
+    axis = {name: line.get("yaxis", "y") for name, line in lines.items()}
+    assert axis["distal torque"] == axis["estimated distal torque"] != axis["jaw angle"]
+    residual = lines["distal torque, measured - estimated"]
+    assert residual["y"][0] == pytest.approx(-10.0)  # mN m
+    assert max(lines["flags"]["y"]) == Flag.STALE
+    assert "load_a = 0.2" in text
+    assert "bang at 1 s" in text
+
+
+def test_one_run_alone(folder):
+    text = written(folder, "--run", "000-a").read_text()
+    assert "000-a" in text
+    assert "001-b" not in text
+
+
+def test_the_page_is_named_and_opened_unless_unwanted(folder, capsys, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    page = folder / "page.html"
+    assert main(["view", str(folder), "--out", str(page)]) == 0
+    assert str(page) in capsys.readouterr().out
+    assert opened == [page.as_uri()]
+    assert main(["view", str(folder), "--run", "002"]) == 2
+
+
+def test_the_page_draws_and_changes_run_in_a_browser(folder):
+    with chromium() as browser:
+        opened = Opened(browser, written(folder))
+        assert opened.messages == []
+        assert [r for r in opened.requests if not r.startswith(("file:", "data:", "blob:"))] == []
+        panels = opened.page.locator("#chart-time-recordings .ylines-above").count()
+        assert panels == 4  # angle, torque, residual, flags
+        opened.page.select_option("select", "001-b")
+        assert opened.page.locator("#chart-time-recordings .scatterlayer .trace").count() == 5
+        opened.close()
