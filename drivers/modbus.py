@@ -23,7 +23,7 @@ REPLY_TIMEOUT_S = 0.2
 QUIET_S = 0.05
 """A stopped stream has ended when nothing arrives for this long, s."""
 LONGEST_SILENCE_S = 0.1
-"""Shortest time without a frame after which the numbers of a stream's frames leave a gap, s."""
+"""Shortest time without a frame after which frames are missing from the count of a stream, s."""
 
 
 def crc16(data: bytes) -> int:

@@ -10,6 +10,7 @@
 
 #include "../core/profile_grasper.hpp"
 #include "../proofs/world.hpp"
+#include "app_test.hpp"
 #include "guards_test.hpp"
 
 using proofs::Bytes;
