@@ -97,7 +97,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
     load_a = min(0.2, config.reference_limits.load_command_a)
     config = config.changed(safety={"watchdog_s": WATCHDOG_S})
     late_ms: list[np.ndarray] = []
-    samples, trip = 0, ""
+    samples, lost, trip = 0, 0, ""
     link = Paced(open_logger(config))
     with Session(config, link) as session:
         next(session.rest(0.5))
@@ -111,6 +111,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
                 grasps = start + 0.3 * (1 - np.cos(phase))
                 for reading in session.play(grasps, np.full(phase.size, load_a)):
                     samples += len(reading)
+                    lost = reading.lost
                     if real:  # the process stamps by the clock this program reads, in 32 bits
                         now_us = time.monotonic_ns() // 1000
                         ticks = reading.counts["tick_us"].astype(np.int64)
@@ -119,7 +120,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
             trip = f"{error.what} ({samples / 1000:.0f} s)"
         elapsed_s = time.monotonic() - began_s
         busy_s = time.process_time() - busy_s
-        lost, counters = reading.lost, session.counters
+        counters = session.counters
     told = {name: count for name, count in counters.items() if count and name != "frames"}
     return Soak(
         where,
