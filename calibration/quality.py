@@ -44,9 +44,7 @@ def finite(values: ArrayLike, name: str) -> FloatArray:
 def check_points(count: int, least: int, name: str) -> None:
     """Refuse too few points."""
     if count < least:
-        raise BadDataError(
-            "points", f"{count} {name} are too few.", f"At least {least} are needed."
-        )
+        raise BadDataError("points", f"Too few {name}: {count}.", f"At least {least} are needed.")
 
 
 def check_levels(values: FloatArray, least: int, name: str) -> None:

@@ -17,6 +17,9 @@ from estimation.derived import CAMPAIGN_TIME
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording
 
+SHOWN = 4
+"""Runs that the text of a campaign names."""
+
 
 class CampaignError(EstimationError):
     """Runs do not make a campaign, or a split of it is not possible."""
@@ -37,6 +40,9 @@ class Run:
     load: Callable[[], Recording]
     source: Path | None = None
     excluded: str | None = None
+
+    def __repr__(self) -> str:
+        return f"Run({self.name!r}{', excluded' if self.excluded else ''})"
 
     def recording(self) -> Recording:
         """Read the recording; the handle's reason of exclusion goes with it."""
@@ -107,6 +113,10 @@ class Campaign:
             )
         )
 
+    def __repr__(self) -> str:
+        names = ", ".join(self.names if len(self) <= SHOWN else (*self.names[:SHOWN], "..."))
+        return f"Campaign of {len(self)} runs: {names}"
+
     def __len__(self) -> int:
         return len(self.runs)
 
@@ -124,18 +134,18 @@ class Campaign:
         """The runs that are not excluded."""
         return Campaign(tuple(run for run in self.runs if run.excluded is None))
 
-    def exclude(self, name: str, reason: str) -> "Campaign":
-        """Return a campaign in which one run is excluded, with the reason.
+    def exclude(self, reasons: Mapping[str, str]) -> "Campaign":
+        """Return a campaign in which some runs are excluded, each with its reason.
 
         Raises:
             CampaignError: The campaign has no such run.
         """
-        if name not in self.names:
+        for name in reasons.keys() - set(self.names):
             raise CampaignError(
                 f"The campaign has no run {name!r}.", f"It has: {', '.join(self.names)}."
             )
         return Campaign(
-            tuple(replace(r, excluded=reason) if r.name == name else r for r in self.runs)
+            tuple(replace(r, excluded=reasons.get(r.name, r.excluded)) for r in self.runs)
         )
 
     def select(self, names: Iterable[str]) -> "Campaign":

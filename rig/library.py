@@ -282,6 +282,8 @@ def plot(
 def to_pandas(campaign: Campaign) -> Any:
     """Return all runs that count as one pandas table, a row a sample, with run and conditions.
 
+    Columns are those of `rig log export`; `attrs["units"]` has their units.
+
     Raises:
         MissingExtraError: pandas is not installed.
     """
@@ -289,15 +291,20 @@ def to_pandas(campaign: Campaign) -> Any:
         import pandas as pd
     except ImportError as error:
         raise _missing("pandas") from error
-    parts = [
-        pd.DataFrame({"run": r.name, **dict(r.conditions), "time_s": r.time_s, **dict(r.columns)})
-        for r in campaign.evidence
-    ]
-    return pd.concat(parts, ignore_index=True)
+    from estimation.channels import unit_of
+
+    parts = [pd.DataFrame(_columns(recording)) for recording in campaign.evidence]
+    table = pd.concat(parts, ignore_index=True)
+    channels = {name for recording in campaign.evidence for name in recording.columns}
+    units = {name: unit_of(name) for name in table.columns if name in channels | {"time_s"}}
+    table.attrs["units"] = units
+    return table
 
 
 def to_polars(campaign: Campaign) -> Any:
     """Return all runs that count as one Polars table, a row a sample, with run and conditions.
+
+    Columns are those of `rig log export`.
 
     Raises:
         MissingExtraError: Polars is not installed.
@@ -306,17 +313,17 @@ def to_polars(campaign: Campaign) -> Any:
         import polars as pl
     except ImportError as error:
         raise _missing("Polars") from error
-    parts = [
-        pl.DataFrame(
-            {"time_s": r.time_s, **{n: np.asarray(values) for n, values in r.columns.items()}}
-        ).select(pl.lit(r.name).alias("run"), *_literals(pl, r), pl.all())
-        for r in campaign.evidence
-    ]
+    parts = [pl.DataFrame(_columns(recording)) for recording in campaign.evidence]
     return pl.concat(parts, how="diagonal")
 
 
-def _literals(pl: Any, recording: Recording) -> list[Any]:
-    return [pl.lit(value).alias(name) for name, value in recording.conditions.items()]
+def _columns(recording: Recording) -> dict[str, Any]:
+    """Return the columns of a run's table; run and conditions are one value each."""
+    from rig.importers.tidy import CONDITION, RUN, TIME
+
+    conditions = {f"{CONDITION}{name}": value for name, value in recording.conditions.items()}
+    samples = {name: np.asarray(values) for name, values in recording.columns.items()}
+    return {RUN: recording.name, **conditions, TIME: np.asarray(recording.time_s), **samples}
 
 
 def to_xarray(recording: Recording) -> Any:

@@ -15,9 +15,9 @@ from rich.console import Console
 from estimation.files import write_text_atomic
 from rig.bench.logger import open_logger
 from rig.configuration.config import SHIPPED, load_config
-from rig.live.estimator import estimators_of, half_widths_of
+from rig.live.estimator import HalfWidths, estimators_of
 from rig.live.joint_forces import JOINTS, with_joint_forces
-from rig.live.keys import HELP
+from rig.live.keys import OF_SESSION, in_a_line
 from rig.live.model_status import with_model_status
 from rig.live.session_blocks import session_blocks
 from rig.live.state import LiveState
@@ -38,7 +38,7 @@ def draw() -> str:
     plans = [plan for plan in load_protocol("grasper").any_plans() if "grasp-hold" in plan.name]
     blocks = with_model_status(
         with_joint_forces(session_blocks(config, lambda: open_logger(config), plans, estimators)),
-        [estimator.model for estimator in estimators if estimator.model is not None],
+        estimators,
     )
     state = LiveState(JOINTS)
     held = 0
@@ -53,8 +53,8 @@ def draw() -> str:
         color_system="truecolor",
     )  # fmt: skip
     title = f"rig live: {config.name}"
-    known = half_widths_of(estimators)
-    console.print(View(state.snapshot(), title, lever_m=0.01, footer=HELP, half_widths=known))
+    footer, known = in_a_line(OF_SESSION), HalfWidths(estimators)
+    console.print(View(state.snapshot(), title, lever_m=0.01, footer=footer, half_widths=known))
     svg = console.export_svg(title="rig live -c grasper", unique_id="grasper")
     # the fonts rich names are fetched from the network; any monospaced one will do
     return re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL)

@@ -18,6 +18,7 @@ from rich.console import Console
 
 from estimation.recording import Recording
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
+from rig.live.keys import OF_SESSION, in_a_line
 from rig.live.replay import replay_blocks
 from rig.live.state import LiveState
 from rig.live.view import View
@@ -65,12 +66,16 @@ def with_devices(blocks: Iterator[SampleBlock]) -> Iterator[SampleBlock]:
                 DeviceStatus("teensy", "armed", "simulated, SIM-0001"),
                 DeviceStatus("load motor", "ok"),
                 DeviceStatus("calibration", "ok", "reference+store, 3 records, oldest 12 days"),
-                DeviceStatus("recording", "on", "live.mcap, 5200 samples, 1 marks"),
+                DeviceStatus(
+                    "recording", "on", "live-2026-03-02-101500.mcap, 5200 samples, 1 marks"
+                ),
             ),
             limits=(
-                LimitStatus("motor current", float(block.columns["motor_current_a"][-1]), 0.6, "A"),
                 LimitStatus(
-                    "jaw torque", float(block.columns["distal_torque_n_m"][-1]), 0.3, "N m"
+                    "motor_current_a", float(block.columns["motor_current_a"][-1]), 0.6, "A"
+                ),
+                LimitStatus(
+                    "distal_torque_n_m", float(block.columns["distal_torque_n_m"][-1]), 0.3, "N m"
                 ),
             ),
         )
@@ -90,7 +95,7 @@ def draw() -> str:
         state.snapshot(),
         "rig live, synthetic recording",
         lever_m=0.012,
-        footer="t tare  m mark  r record  q quits",
+        footer=in_a_line(OF_SESSION),
         half_widths={estimator.target_channel: 0.014},
     )
     console.print(view)

@@ -71,8 +71,8 @@ def _moving(steps: Sequence[Step]) -> str:
 
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit, in thousandths or millionths where that reads better."""
-    if unit == "1" or not unit:
-        return f"{value:.4g}"
+    if unit in ("", "1", "counts"):
+        return f"{value:.4g} {unit.removeprefix('1')}".strip()
     size = abs(value)
     factor, prefix = next((p for p in PREFIXES if size >= p[0]), PREFIXES[-1 if size else 0])
     return f"{value / factor:.4g} {prefix}{unit}"

@@ -307,8 +307,8 @@ def _in_words(record: "CalibrationRecord") -> dict[str, Any]:
     from rig.calibrate.shown import parameter_texts
 
     known = {k: v for k, v in _flat(record).items() if not k.startswith("fit.")}
-    known["kind"] = f"{record.kind} ({record.fit.form})"
-    return known | parameter_texts(record) | {"residual rms": record.fit.residual_rms}
+    fit = {"form": record.fit.form, "residual rms": record.fit.residual_rms}
+    return known | parameter_texts(record) | fit
 
 
 def _flat(record: "CalibrationRecord") -> dict[str, Any]:

@@ -133,11 +133,12 @@ def scale_lines(one: "Scale") -> list[str]:
 def zero_line(one: "ZeroMotion") -> str:
     """Return the motion of a zero in words."""
     from rig.calibrate.shown import with_unit
+    from rig.output.table import counted
 
     word = "ALARM" if one.is_wrong else "noted" if one.limit is None else "good"
     limit = "no limit" if one.limit is None else f"limit {with_unit(one.limit, one.unit)}"
     return (
-        f"{word}: zero of {one.channel}, {one.runs} runs: moved by at most"
+        f"{word}: zero of {one.channel}, {counted(one.runs, 'run')}: moved by at most"
         f" {with_unit(one.within_run, one.unit)} within a run ({limit}), by"
         f" {with_unit(one.over_all, one.unit)} over all runs."
     )

@@ -191,7 +191,7 @@ def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextT
             f"{campaign.folder.relative_to(root) / run.file}",
             run.date[:16].replace("T", " "),
             run.instrument or run.rig,
-            run.state,
+            _short(run.state),
             str(run.lost) if run.lost else "",
             _short(_conditions([run])),
             _short(run.notes),

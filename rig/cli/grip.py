@@ -53,6 +53,11 @@ def grip(
                 f"sensor {period.sensor_n_m * 1e3:6.1f} mN m  load {period.load_a:.3f} A",
                 markup=False,
             )
+    if not held:
+        screen.print("The estimate was never within what it was fitted on: no load was asked for.")
+        if json:
+            emit_json({"torque_n_m": torque, "is_reached": False, "periods": []})
+        return 1
     late = held[len(held) // 2 :]
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))

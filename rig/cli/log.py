@@ -7,7 +7,7 @@ import typer
 
 from rig.cli.help import GroupedHelp
 from rig.cli.log_export import export
-from rig.output.console import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:
     from rig.log.check import LogReport
@@ -36,12 +36,16 @@ def info(path: AnyRecording, json: JsonFlag = False) -> None:
     Of recordings of another format: a line for each run.
     """
     from rig.cli.log_runs import is_of_another_format, show_runs
+    from rig.log.check import logs_in
     from rig.log.reader import read_log
 
-    if is_of_another_format(path):
+    if is_of_another_format(path) or (path.is_dir() and not logs_in(path)):
         show_runs(path, json)
         return
-    found = [_described(read_log(item, tolerant=True)) for item in _logs(path)]
+    heads, foreign = _heads(path)
+    found = [_described(read_log(head.path, tolerant=True)) for head in heads]
+    for said in foreign:
+        remarks().print(said)
     if json:
         emit_json({"logs": found})
         return
@@ -65,29 +69,49 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     complete, 1 if samples or runs are missing, 5 if a file is damaged.
     """
     from rig.errors import ExitCode
-    from rig.log.attempts import heads_of, standing
+    from rig.log.attempts import standing
     from rig.log.check import check_log
 
-    heads = heads_of(_logs(path))
+    heads, foreign = _heads(path)
     counted = [log.path for log in standing(heads)]
     superseded = [log.path for log in heads if log.path not in counted]
     reports = [check_log(item) for item in counted]
     missing = _missing_runs(path, {report.run for report in reports})
     code = max((report.verdict.exit_code for report in reports), default=ExitCode.OK)
     code = max(code, ExitCode.FAILED if missing else ExitCode.OK)
+    code = max(code, ExitCode.DATA if foreign else ExitCode.OK)
     if json:
         found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
+        found["no_logs"] = foreign
         emit_json(found | {"exit_code": int(code)})
         return int(code)
     for report in reports:
         _show_report(report)
     screen = results(json=False)
+    for said in foreign:
+        screen.print(f"no log      {said}")
     for item in superseded:
         screen.print(f"superseded  {item}: not counted")
     for name in missing:
         screen.print(f"missing     {name}. Record it: rig record --resume {path}")
     screen.print(_summed_up(reports, len(superseded), len(missing)))
     return int(code)
+
+
+def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
+    """Return the heads of the logs at a path, and the files of a folder that are no logs."""
+    from rig.log.attempts import heads_of
+    from rig.log.scan import NotALogError
+
+    heads, foreign = [], []
+    for item in _logs(path):
+        try:
+            heads += heads_of([item])
+        except NotALogError as error:
+            if item == path:
+                raise
+            foreign.append(error.what)
+    return heads, foreign
 
 
 def _missing_runs(path: Path, there: set[str | None]) -> list[str]:

@@ -92,11 +92,13 @@ def _campaign(path: Path, model: Path | None) -> "Campaign":
 
 
 def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
+    from rig.output.table import counted
+
     if json:
         emit_json({"written": written, "runs": campaign.names})
     else:
         where = written[0] if len(written) == 1 else written[0].parent
-        results(json).print(f"wrote {where}: {len(campaign)} runs")
+        results(json).print(f"wrote {where}: {counted(len(campaign), 'run')}")
 
 
 def _export_campaign(

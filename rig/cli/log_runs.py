@@ -22,7 +22,7 @@ def show_runs(path: Path, json: bool) -> None:
     """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
     from rig.cli.left_out import say_left_out
     from rig.importers.registry import open_campaign
-    from rig.output.table import listed
+    from rig.output.table import counted, listed
 
     campaign = open_campaign(path)
     say_left_out(path, campaign)
@@ -35,7 +35,7 @@ def show_runs(path: Path, json: bool) -> None:
         emit_json({"runs": runs, "channels": list(channels)})
         return
     screen = results(json)
-    screen.print(f"{len(runs)} runs. Channels: {', '.join(channels)}.")
+    screen.print(f"{counted(len(runs), 'run')}. Channels: {', '.join(channels)}.")
     width = max((len(run["name"]) for run in runs), default=0)
     for run in runs:
         flagged = f"; flagged samples: {run['flagged']}" if run["flagged"] else ""

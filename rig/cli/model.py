@@ -7,6 +7,7 @@ import typer
 
 from rig.cli.help import GroupedHelp
 from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.cli.shipped import complete_fitted
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
@@ -38,19 +39,26 @@ def show(
     chosen = model_in_use(settings.name)
     past = [choice for choice in choices() if choice.rig == settings.name]
     if json:
-        emit_json({"rig": settings.name, "model": settings.model_path, "known": _by_name()})
+        emit_json({"rig": settings.name, "model": settings.model_path, "known": fitted_models()})
         return
     screen = results(json)
     how = f"chosen {past[-1].at[:16]} from {past[-1].source}" if chosen else "as configured"
     screen.print(f"{settings.name}: {_name(settings)} ({how})", soft_wrap=True)
     if settings.model_path is not None:
         screen.print(f"  {_described(settings.model_path)}")
-    screen.print(f"By name: {', '.join(_by_name())}. Any other by its file: rig model use FILE.")
+    screen.print(
+        f"By name: {', '.join(fitted_models())}. Any other by its file: rig model use FILE."
+    )
 
 
 @model_app.command()
 def use(
-    model: Annotated[str, typer.Argument(help="Fitted model: a file, or a name of `rig model`.")],
+    model: Annotated[
+        str,
+        typer.Argument(
+            help="Fitted model: a file, or a name of `rig model`.", autocompletion=complete_fitted
+        ),
+    ],
     config: ConfigOption = None,
     sim: SimFlag = False,
     json: JsonFlag = False,
@@ -65,7 +73,7 @@ def use(
 
     settings = choose_rig(config, sim)
     file = Path(model)
-    known = _by_name()
+    known = fitted_models()
     source = file if file.is_file() else known.get(model)
     if source is None:
         raise UsageError(
@@ -134,7 +142,7 @@ def _name(settings: "Config") -> str:
     )
 
 
-def _by_name() -> dict[str, Path]:
+def fitted_models() -> dict[str, Path]:
     """Return the shipped fitted models and the copies that were in use, by name."""
     from rig.configuration.config import SHIPPED
     from rig.configuration.model_in_use import choices

@@ -50,6 +50,7 @@ def record(
     from rig.configuration.check import refuse_problems
     from rig.errors import UsageError
     from rig.machines.choose import machine_of
+    from rig.output.table import counted
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import open_campaign_folder, read_manifest
     from rig.recording.watch import watch_runs
@@ -76,11 +77,13 @@ def record(
         screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
     watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
-    screen.print(f"{plan.name}: {len(todo)} runs on {settings.name} into {folder}")
+    screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
     recorded = _recorded(settings, todo, folder, notes, watch)
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     wrong = f"drifted or not complete: {', '.join(bad)}" if bad else "all complete"
-    results(json).print(f"{len(recorded)} runs recorded, {wrong}. Next: rig log check {folder}")
+    results(json).print(
+        f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
+    )
     if json:
         found = {"folder": folder, "runs": recorded, "look_at": bad}
         emit_json(found if watch is None else {**found, "models": watch.to_json()})

@@ -88,6 +88,13 @@ def complete_effect(incomplete: str) -> list[str]:
     return [name for name in catalogue() if name.startswith(incomplete)]
 
 
+def complete_fitted(incomplete: str) -> list[str]:
+    """Complete a fitted model: a shipped one, a copy that was in use, or a file."""
+    from rig.cli.model import fitted_models
+
+    return _matching(list(fitted_models()), incomplete)
+
+
 def complete_model(incomplete: str) -> list[str]:
     """Complete a declared model: a shipped name or a file."""
     return _matching(model_names(), incomplete)

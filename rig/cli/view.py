@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.left_out import SkipBad, say_left_out
 from rig.cli.machine_option import MachineOption
 from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, remarks, results
@@ -33,6 +34,7 @@ def view(
     format_: Annotated[
         str | None, typer.Option("--format", help="Format of PATH; detected by default.")
     ] = None,
+    skip_bad: SkipBad = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Page to write; by default NAME.view.html.")
     ] = None,
@@ -48,15 +50,16 @@ def view(
     """
     import webbrowser
 
-    from rig.cli.left_out import say_left_out
     from rig.machines.recordings import open_recordings
     from rig.output.provenance import Provenance
     from rig.output.render import write_report
+    from rig.output.table import counted
     from rig.reports.recordings import page
 
-    whole = open_recordings(path, machine, format_)
+    whole = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, whole)
-    campaign = with_model(chosen_runs(whole, run or []), model)
+    shown = whole.evidence if skip_bad else whole
+    campaign = with_model(chosen_runs(shown, run or []), model)
     name = path.resolve().name
     target = out or Path(f"{name}.view.html")
     write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
@@ -64,7 +67,7 @@ def view(
     if json:
         emit_json({"page": target, "runs": campaign.names})
         return
-    results(json).print(f"{len(campaign)} runs: {target}", soft_wrap=True)
+    results(json).print(f"{counted(len(campaign), 'run')}: {target}", soft_wrap=True)
     if not opened:
         results(json).print(f"Open it: {target.resolve().as_uri()}", soft_wrap=True)
 

@@ -38,8 +38,10 @@ class LogImporter:
     def open(self, path: Path) -> Campaign:
         """Open logs as a campaign; samples are read when a run is.
 
+        Of several logs, one that is damaged beyond its unfinished end is a run that cannot be read.
+
         Raises:
-            DataError: No log was found, or one of them is damaged beyond its unfinished end.
+            DataError: No log was found, or none of them can be read.
         """
         paths = _logs(path)
         if not paths:
@@ -47,10 +49,17 @@ class LogImporter:
                 f"There is no log in {path}.",
                 "Looked for files named NAME.mcap and NAME.mcap.part.",
             )
-        read = heads_of(paths)
-        heads = [_sound(log) for log in sorted(standing(read), key=started_ns)]
+        read, bad = [], []
+        for item in paths:
+            try:
+                read += [_sound(log) for log in heads_of([item])]
+            except DataError as error:
+                bad.append(_unreadable(item, error))
+        if not read:
+            bad[0].recording()  # raises
+        heads = sorted(standing(read), key=started_ns)
         several = len({log.path.parent for log in heads}) > 1
-        return Campaign(tuple(_run(log, several) for log in heads))
+        return Campaign((*(_run(log, several) for log in heads), *bad))
 
 
 def _logs(path: Path) -> list[Path]:
@@ -74,6 +83,15 @@ def _sound(log: LogFile) -> LogFile:
     if log.damage and not is_unfinished(log):
         raise damaged(log)
     return log
+
+
+def _unreadable(path: Path, error: DataError) -> Run:
+    """Return the run of a log that cannot be read, which reading it states."""
+
+    def load() -> Recording:
+        raise error
+
+    return Run(f"{path.parent.name}/{path.name}", load=load, source=path)
 
 
 def _run(head: LogFile, several: bool) -> Run:

@@ -196,6 +196,6 @@ def _fault(path: Path, line: int, what: str, expected: str = "a whole MRDLab log
     return DataError(
         f"{path}, line {line}: {what}.",
         f"Expected {expected}. Nothing of the file was imported.",
-        "Restore the file from its source, omit it (fit, diagnose: --skip-bad), or name the format"
-        " with --format if it is another one.",
+        "Restore the file from its source, omit it (fit, diagnose, view: --skip-bad), or name the"
+        " format with --format if it is another one.",
     )

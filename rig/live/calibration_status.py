@@ -8,8 +8,8 @@ from calibration.rules import judge_range
 from calibration.store import active_lines
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus
-from rig.live.text import counted
 from rig.machines.reading import Reading
+from rig.output.table import counted
 
 NAME = "calibration"
 

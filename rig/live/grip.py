@@ -131,10 +131,13 @@ def hold_grip(
     period = _Period()
     for reading in session.follow(controller.setpoints()):
         estimate = estimator.push(reading.columns, reading.time_s)
-        if np.nanmax(np.abs(estimate)) > limits.distal_torque_n_m:
+        if estimator.inside is not None:  # elsewhere it is no estimate
+            estimate = np.where(estimator.inside, estimate, np.nan)
+        most_n_m = float(np.max(np.abs(estimate), where=np.isfinite(estimate), initial=0.0))
+        if most_n_m > limits.distal_torque_n_m:
             session.safe()
             raise SafetyTripError(
-                f"The estimate reached {np.nanmax(np.abs(estimate)):.3g} N m at the jaw.",
+                f"The estimate reached {most_n_m:.3g} N m at the jaw.",
                 f"The limit is {limits.distal_torque_n_m:g}; the rig has been disarmed.",
             )
         ended = period.add(reading, estimate)

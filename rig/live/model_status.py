@@ -12,6 +12,7 @@ from rig.live import text as words
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
 from rig.live.estimator import ModelEstimator
 from rig.live.state import Value
+from rig.output.table import counted
 
 NAME = "estimate"
 STALE_DAYS = 180.0
@@ -58,7 +59,7 @@ class ModelStatus:
         if self._days is None:
             return DeviceStatus(NAME, "ok", "within its fit, which has no date")
         state = "stale" if self._days > STALE_DAYS else "ok"
-        return DeviceStatus(NAME, state, f"fitted {words.counted(round(self._days), 'day')} ago")
+        return DeviceStatus(NAME, state, f"fitted {counted(round(self._days), 'day')} ago")
 
 
 def with_model_status(

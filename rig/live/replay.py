@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.channels import ESTIMATED
 from estimation.recording import Flag, Recording
@@ -33,6 +34,10 @@ class EstimateStream(Protocol):
     @property
     def target_channel(self) -> str:
         """The channel it estimates."""
+
+    @property
+    def inside(self) -> NDArray[np.bool_] | None:
+        """Which of the last samples lay in the fitted range, shape (n,); None if none is known."""
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,), and keep the final state."""

@@ -175,7 +175,7 @@ class LiveState:
         self._window.add(block.time_s, signals)
         self._samples += int(np.isfinite(signals[RECEIVED]).sum())
         self._flagged += np.isfinite(signals[FIRST_FLAG:FIRST_CHANNEL]).sum(axis=1)
-        squared = signals[FIRST_CHANNEL + SQUARED_ERROR]
+        squared = self._squared_error_of(block)
         self._squared_error += float(np.nansum(squared))
         self._error_samples += int(np.isfinite(squared).sum())
         inside = block.inside.get(self.channels[0])
@@ -193,8 +193,15 @@ class LiveState:
         for channel in self.channels:
             estimate = np.where(valid, block.estimates.get(channel, nan), nan)
             sensor = np.where(valid, block.columns.get(channel, nan), nan)
+            estimate = np.where(block.inside.get(channel, valid), estimate, nan)
             rows += [estimate, sensor, (estimate - sensor) ** 2]
         return np.stack(rows)
+
+    def _squared_error_of(self, block: SampleBlock) -> FloatArray:
+        """Return the squared error of the main estimate, outside its range too, shape (n,)."""
+        main, nan = self.channels[0], np.full(len(block), np.nan)
+        error = block.estimates.get(main, nan) - block.columns.get(main, nan)
+        return np.where(block.flags == 0, error**2, nan)
 
     def snapshot(self) -> Snapshot:
         """Return the picture of now."""
@@ -240,6 +247,8 @@ class LiveState:
         row = FIRST_CHANNEL + 3 * index
         window = self._window
         part = window.recent(ERROR_S)
+        has_range = self._last is not None and channel in self._last.inside
+        beyond = "outside what it was fitted on" if has_range else "not a number"
         errors = int(window.count[row + SQUARED_ERROR, part].sum())
         squared = float(window.total[row + SQUARED_ERROR, part].sum())
         return Reading(
@@ -247,7 +256,7 @@ class LiveState:
             unit=unit_of(channel),
             has_estimator=channel in self._estimated,
             estimate=self._value(
-                row + ESTIMATE, "" if channel in self._estimated else "no estimator"
+                row + ESTIMATE, "" if channel in self._estimated else "no estimator", beyond
             ),
             sensor=self._value(row + SENSOR, "" if channel in self._sensed else "no sensor"),
             error_rms=math.sqrt(squared / errors) if errors else None,
@@ -255,7 +264,7 @@ class LiveState:
             sensor_trace=np.stack([window.low[row + SENSOR], window.high[row + SENSOR]]),
         )
 
-    def _value(self, row: int, absent: str) -> Value:
+    def _value(self, row: int, absent: str, otherwise: str = "not a number") -> Value:
         """Return the mean of the last 0.1 s, or why there is none.
 
         A mean over less than half of the samples would stand for the time when all was well, not
@@ -271,7 +280,7 @@ class LiveState:
         if 2 * usable >= rows:
             return Value(float(self._window.total[row, part].sum()) / usable)
         seen = _named(self._window.count[FIRST_FLAG:FIRST_CHANNEL, part].sum(axis=1))
-        return Value(None, ", ".join(seen) or "not a number")
+        return Value(None, ", ".join(seen) or otherwise)
 
 
 def _named(counts: NDArray[np.int64]) -> dict[str, int]:

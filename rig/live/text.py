@@ -97,11 +97,6 @@ def error_rms(reading: Reading) -> str:
     return f"error rms {with_unit(Value(reading.error_rms), reading.unit)} in 5 s"
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number of things in words: `1 day`, `2 days`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 def rate(snapshot: Snapshot) -> str:
     """Return the sample rate in words."""
     if snapshot.sample_rate_hz is None:

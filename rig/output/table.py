@@ -27,6 +27,11 @@ class TextTable:
     note: str = ""
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words: `1 day`, `2 days`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def listed(values: Mapping[str, float | str]) -> str:
     """Return names with their values, such as conditions, in a line."""
     return ", ".join(

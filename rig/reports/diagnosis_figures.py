@@ -29,8 +29,13 @@ def charts(diagnosis: Diagnosis, traces: Traces) -> list[Chart]:
     for name, error in diagnosis.errors.items():
         drawn.append(_by_run(diagnosis, name, error))
         if name in traces.equations:
-            drawn.append(_over_time(name, traces.equations[name]))
+            drawn.append(_over_time(name, traces.equations[name], _sides(error)))
     return drawn
+
+
+def _sides(error: Error) -> tuple[str, ...]:
+    """Return the models to draw: the declared one alone where no finding changes the error."""
+    return SIDES if error.by_run_before != error.by_run_after else SIDES[:1]
 
 
 def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -> Chart:
@@ -99,7 +104,9 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     scale, unit = display(diagnosis.unit[name])
     lines: list[Line] = []
     names = {"before": "declared model", "after": "with the findings"}
-    for side, by_run in (("before", error.by_run_before), ("after", error.by_run_after)):
+    by_side = {"before": error.by_run_before, "after": error.by_run_after}
+    for side in _sides(error):
+        by_run = by_side[side]
         lines.append(
             {
                 "type": "bar",
@@ -129,7 +136,7 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
         f" {scale * error.before:.3g} {unit} overall with the declared model,"
         f" {scale * error.after:.3g} {unit} with the findings."
     )
-    if not diagnosis.findings:
+    if _sides(error) != SIDES:
         judgement = f"The declared model's error is {scale * error.before:.3g} {unit} overall."
     title = f"{name}: error of each held-out test run"
     rows = [
@@ -152,13 +159,13 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     )
 
 
-def _over_time(name: str, shown: EquationTraces) -> Chart:
+def _over_time(name: str, shown: EquationTraces, sides: tuple[str, ...]) -> Chart:
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
     scale, unit = display(shown.model.unit)
     label, _ = words(shown.model.target)
     runs = sorted(shown.runs, key=_error_after)
     middle = runs.pop(len(runs) // 2)
-    choices = {run.run: _signals(run, scale, unit) for run in (middle, *runs)}
+    choices = {run.run: _signals(run, scale, unit, sides) for run in (middle, *runs)}
     layout = {
         "xaxis": {**axis("time, s", "s"), "anchor": "y2"},
         "yaxis": {"title": {"text": f"{label}, {unit}"}, "domain": [0.42, 1]},
@@ -179,19 +186,19 @@ def _error_after(run: RunTrace) -> float:
     return float(np.std(run.after))
 
 
-def _signals(run: RunTrace, scale: float, unit: str) -> list[Line]:
+def _signals(run: RunTrace, scale: float, unit: str, sides: tuple[str, ...]) -> list[Line]:
     gaps = np.diff(run.time_s, prepend=run.time_s[0]) > 3 * np.median(np.diff(run.time_s))
     measured = scale * run.measured
     names = {"measured": "measured", "before": "declared model", "after": "with the findings"}
-    left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in SIDES}
+    left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in sides}
     time_s = thinned(run.time_s)
     lines: list[Line] = [
         line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)
     ]
-    for side in SIDES:
+    for side in sides:
         values = thinned(measured - left[side])
         lines.append(line(time_s, values, names[side], {"role": side}, unit))
-    for side in SIDES:
+    for side in sides:
         residual = thinned(left[side])
         one = line(time_s, residual, f"residual, {names[side]}", {"role": side}, unit)
         lines.append({**one, "yaxis": "y2", "showlegend": False})

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.effects import catalogue
 
-NO_NEXT = "None is proposed: there are no competing hypotheses to distinguish."
+NO_NEXT = "None is proposed: no named hypotheses compete, or none was searched for (--quick)."
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
@@ -90,9 +90,12 @@ def check_of(finding: Finding) -> str:
     if words:
         return (
             f"Find the part of the rig whose behaviour changes with {words}: the residual below"
-            " depends on it. Then record the next experiment."
+            " depends on it."
         )
-    return "Record the next experiment: these runs do not single out a part of the rig."
+    return (
+        "These runs do not single out a part of the rig: record more, at other speeds, loads and"
+        " positions."
+    )
 
 
 def _check(family: str) -> str:

@@ -12,7 +12,7 @@ from estimation.residual import RunResidual, Structure, profile, residuals
 from rig.output import figures
 from rig.output.provenance import Provenance
 from rig.output.render import render
-from rig.output.table import TextTable
+from rig.output.table import TextTable, counted
 from rig.reports.diagnosis_words import display
 
 LIMITS = (
@@ -69,7 +69,7 @@ def parameter_table(model: Model) -> TextTable:
     if evidence is not None:
         scale, unit = display(model.unit)
         note = (
-            f"Fitted on {len(evidence.runs)} runs, {evidence.samples:,} samples. RMSE"
+            f"Fitted on {counted(len(evidence.runs), 'run')}, {evidence.samples:,} samples. RMSE"
             f" {scale * evidence.rmse:.3g} {unit} with each run's mean removed,"
             f" {scale * evidence.rmse_with_means:.3g} {unit} with means. Spread: standard deviation"
             " over a bootstrap of runs; empty at a bound or with one run."

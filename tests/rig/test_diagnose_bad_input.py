@@ -169,3 +169,12 @@ def test_a_reader_that_leaves_early_has_the_files(monkeypatch, tmp_path):
     main([*words, "--json-out", str(out)])
     assert json.loads(out.read_text())["schema"] == "rig.diagnosis/1"
     assert len(ledger.read_text().splitlines()) == 1
+
+
+def test_a_rig_that_lacks_nothing_has_a_page(monkeypatch, tmp_path):
+    monkeypatch.setattr(
+        subject, "open_campaign", lambda *_: Campaign.of(runs(count=9, seconds=2.0))
+    )
+    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--report", str(tmp_path)]
+    assert main([*words, "--ledger", str(tmp_path / "looks.jsonl")]) == 0
+    assert "motor: measured and estimated" in (tmp_path / "diagnosis.html").read_text()

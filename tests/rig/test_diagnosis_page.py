@@ -79,7 +79,7 @@ def test_every_verdict_has_a_page_with_something_to_do(diagnosed, verdict):
     assert Page(written).open == []
     section = written[written.index("What to check</h2>") : written.index("Next experiment")]
     said = {"identified": "cogging", "one_of": "cogging", "nothing_missing": "Nothing"}
-    assert said.get(verdict, "ecord the next experiment") in section
+    assert said.get(verdict, "Find the part of the rig") in section
 
 
 def test_a_page_without_signals_still_has_the_errors(diagnosed):
@@ -216,3 +216,13 @@ def test_a_screen_reader_finds_the_result_the_charts_and_the_controls(opened):
         'button "SVG"',
     ):
         assert part in tree
+
+
+def test_an_equation_that_no_finding_changes_is_drawn_once(diagnosed):
+    whole, shown = diagnosed
+    same = replace(whole.errors["motor"], by_run_after=whole.errors["motor"].by_run_before)
+    written = page(replace(whole, findings=(), errors={"motor": same}), shown, Provenance.now(1))
+    charts = json.loads(re.search(r'id="charts">(.*?)</script>', written, re.DOTALL)[1])
+    drawn = {c["name"]: [*c["lines"], *next(iter(c["choices"].values()), [])] for c in charts}
+    for name in ("errors-motor", "time-motor"):
+        assert {line["meta"]["role"] for line in drawn[name]} <= {"before", "measured", "level"}

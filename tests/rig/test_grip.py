@@ -8,6 +8,7 @@ import pytest
 from rig.bench.session import Session
 from rig.cli.main import main
 from rig.errors import SafetyTripError
+from rig.live.estimator import ModelEstimator
 from rig.live.grip import hold_grip
 from tests.rig.simulated import is_armed, simulated, transport
 
@@ -37,6 +38,7 @@ class Constant:
     """An estimator that says one number."""
 
     target_channel = "distal_torque_n_m"
+    inside = None
 
     def __init__(self, torque_n_m):
         self.torque_n_m = torque_n_m
@@ -68,3 +70,35 @@ def test_a_torque_there_was_no_time_for_is_not_called_held(capsys):
     out, err = capsys.readouterr()
     assert not json.loads(out)["is_reached"]
     assert "longer --duration" in err
+
+
+class ValidOnClosing(ModelEstimator):
+    """The shipped model, which on opening gives a number far off, and knows that it does."""
+
+    def push(self, columns, time_s):
+        estimate = super().push(columns, time_s)
+        self._closes = np.gradient(columns["spindle_angle_rad"]) > 2e-4
+        return np.where(self._closes, estimate, -0.2)
+
+    @property
+    def inside(self):
+        return self._closes
+
+
+def test_the_load_follows_samples_within_the_estimators_range_alone():
+    config = simulated()
+    estimator = ValidOnClosing(config.model_path, 1000.0)
+    with Session(config, transport(config)) as session:
+        held = list(hold_grip(session, estimator, 0.05, 24.0))
+    assert held[-1].estimate_n_m == pytest.approx(0.05, abs=0.005)
+
+
+def test_an_estimator_that_is_never_within_its_range_moves_no_load(capsys, monkeypatch):
+    never = property(lambda self: np.zeros(len(self.last), bool))
+    monkeypatch.setattr(ModelEstimator, "inside", never)
+    push = ModelEstimator.push
+    monkeypatch.setattr(
+        ModelEstimator, "push", lambda self, c, t: setattr(self, "last", t) or push(self, c, t)
+    )
+    assert main(["grip", "--torque", "0.05", "--duration", "8"]) == 1
+    assert "never within" in capsys.readouterr().out

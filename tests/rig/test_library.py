@@ -106,6 +106,27 @@ def test_tables_of_other_libraries_where_asked(campaign):
     assert isinstance(table, pd.DataFrame)
     assert list(table.columns) == ["run", "time_s", "axis_position_m", "drive_force_n"]
     assert len(table) == 6 * TIME_S.size
+    assert table.attrs["units"]["drive_force_n"] == "N"
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_a_table_of_runs_whose_conditions_are_named_as_channels(library):
+    """As every run of the reference rig: the load is a condition and a channel."""
+    pytest.importorskip(library)
+    time_s = np.arange(4.0)
+    run = Recording("a", time_s, {"load_a": time_s}, conditions={"load_a": 0.2, "way": "sine"})
+    table = getattr(rig, f"to_{library}")(Campaign.of([run]))
+    assert list(table.columns) == ["run", "condition_load_a", "condition_way", "time_s", "load_a"]
+    assert list(table["load_a"]) == list(time_s)
+    assert set(table["condition_load_a"]) == {0.2}
+
+
+def test_a_campaign_is_shown_in_a_line(campaign):
+    said = repr(campaign)
+    assert said.startswith("Campaign of 6 runs: ")
+    assert len(said) < 200
+    assert campaign.names[0] in repr(campaign.runs[0])
+    assert len(repr(campaign.runs[0])) < 100
 
 
 def test_a_data_set_has_units(campaign):

@@ -19,3 +19,9 @@ def test_figure_shows_what_the_display_shows_now():
     texts = [part.split("</text>")[0] for part in drawn.split("<text")[1:]]
     stale = [t.split(">", 1)[1] for t in texts if t.split(">", 1)[1] not in kept]
     assert not stale, "run python docs/figures/live_display.py: the figure no longer matches"
+
+
+def test_the_figure_of_the_grasper_can_be_drawn():
+    drawn = words(runpy.run_path(str(FIGURES / "grasper_display.py"))["draw"]())
+    assert "Grasp force, estimate" in drawn
+    assert "? help" in drawn

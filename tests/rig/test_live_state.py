@@ -136,3 +136,14 @@ def test_scale_holds_the_range_and_zero(a, b):
     low, high = round_scale(min(a, b), max(a, b))
     assert low <= min(a, b, 0) <= max(a, b, 0) <= high
     assert low < high
+
+
+def test_an_estimate_outside_its_range_is_no_value():
+    inside = {GRIP: np.arange(1000) < 400}
+    state = state_of(block(0, 1000, estimates={GRIP: np.full(1000, 0.4)}, inside=inside))
+    (reading,) = state.snapshot().readings
+    assert reading.estimate.number is None
+    assert reading.estimate.missing == "outside what it was fitted on"
+    assert reading.sensor.number is not None
+    assert reading.error_rms == pytest.approx(abs(0.4 - reading.sensor.number))
+    assert state.summary("finished").error_samples == 1000

@@ -84,3 +84,13 @@ def test_the_page_draws_and_changes_run_in_a_browser(folder):
         opened.page.select_option("select", "001-b")
         assert opened.page.locator("#chart-time-recordings .scatterlayer .trace").count() == 5
         opened.close()
+
+
+def test_a_run_that_cannot_be_read_may_be_skipped(folder, capsys):
+    damaged = bytearray(write_recording(folder / "002-c.mcap", recorded("002-c")).read_bytes())
+    damaged[len(damaged) // 2] ^= 0xFF
+    (folder / "002-c.mcap").write_bytes(damaged)
+    assert main(["view", str(folder), "--no-open", "-o", str(folder / "p.html")]) != 0
+    text = written(folder, "--skip-bad").read_text()
+    assert "001-b" in text
+    assert "002-c" in capsys.readouterr().err

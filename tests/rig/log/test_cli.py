@@ -12,6 +12,7 @@ import typer
 from estimation.files import OutputError
 from estimation.recording import Recording
 from rig.cli.log import log_app
+from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.errors import ExitCode, UsageError
 from rig.log.convert import write_recording
@@ -20,6 +21,7 @@ from rig.log.streams import COUNTS_STREAM
 from rig.log.writer import LogExistsError, LogWriter
 from rig.protocols.protocol import Protocol
 from rig.recording.campaign import open_campaign_folder
+from tests.rig.log.conftest import write_log
 
 
 @pytest.fixture
@@ -182,3 +184,16 @@ def test_a_campaign_is_exported_as_one_table_with_units_and_conditions(rig, tmp_
         with pytest.raises(OutputError, match="not replaced"):
             rig("export", source, "--format", format_name, "--out", log, "--force", *more)
     assert log.read_bytes() == before
+
+
+def test_a_file_that_is_no_log_is_listed_among_the_logs_of_its_folder(tmp_path, capsys):
+    write_log(tmp_path / "a.mcap")
+    (tmp_path / "z.mcap").write_text("hello")
+    assert main(["log", "check", str(tmp_path)]) == 5
+    said = capsys.readouterr().out
+    assert "complete    " in said
+    assert "no log      " in said
+    assert "z.mcap is not an MCAP file" in said
+    assert main(["log", "info", str(tmp_path)]) == 0
+    assert "z.mcap is not an MCAP file" in capsys.readouterr().err
+    assert main(["log", "check", str(tmp_path / "z.mcap")]) == 5

@@ -11,10 +11,12 @@ from estimation.channels import CHANNELS
 from estimation.recording import Flag, Instrument, Mark, Recording, Stretch
 from rig.errors import DataError
 from rig.importers.log import IMPORTER
+from rig.importers.registry import open_campaign
 from rig.log.convert import recording_from_log, write_recording
 from rig.log.messages import UnflaggedSampleError
 from rig.log.reader import DamagedLogError, read_log
 from rig.log.repair import repair_log
+from tests.rig.log.conftest import write_log
 
 TEXT = st.text(max_size=20)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -224,3 +226,19 @@ def test_a_folder_without_logs_is_not_recognised(tmp_path):
     (tmp_path / "a.mcap").unlink()
     with pytest.raises(DataError, match="no log"):
         IMPORTER.open(tmp_path)
+
+
+def test_one_file_that_is_no_log_does_not_close_the_others(tmp_path):
+    write_log(tmp_path / "a.mcap")
+    (tmp_path / "bad.mcap").write_bytes(b"\x89MCAP0\r\nnothing")
+    campaign = open_campaign(tmp_path)
+    assert len(campaign) == 2
+    good, bad = campaign.runs
+    assert len(good.recording()) > 0
+    with pytest.raises(DataError, match=r"bad\.mcap is not an MCAP file"):
+        bad.recording()
+    kept = open_campaign(tmp_path, skip_bad=True)
+    assert kept.evidence.names == (good.name,)
+    (tmp_path / "a.mcap").unlink()
+    with pytest.raises(DataError, match="not an MCAP file"):
+        open_campaign(tmp_path)
