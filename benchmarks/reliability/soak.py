@@ -50,12 +50,13 @@ class Soak:
 
 
 class Paced:
-    """A transport that keeps the longest pause between two commands."""
+    """A transport that keeps the longest pause between two commands, while it watches."""
 
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._last = _times_ms()
         self.longest_ms = (0.0, 0.0, 0.0)
+        self.watches = False
 
     @property
     def url(self) -> str:
@@ -75,7 +76,8 @@ class Paced:
         """Write, and keep the pause before it."""
         now = _times_ms()
         pause = now[0] - self._last[0], now[1] - self._last[1], now[2] - self._last[2]
-        self.longest_ms = max(self.longest_ms, pause)
+        if self.watches:
+            self.longest_ms = max(self.longest_ms, pause)
         self._last = now
         self._transport.write(data)
 
@@ -101,15 +103,17 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
     link = Paced(open_logger(config))
     with Session(config, link) as session:
         next(session.rest(0.5))
-        link.longest_ms = (0.0, 0.0, 0.0)
         began_s, busy_s = time.monotonic(), time.process_time()
         start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
         phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
         try:
             session.settle()
+            began_s, busy_s = time.monotonic(), time.process_time()
             for _ in range(max(1, blocks)):
+                link.watches = False
                 grasps = start + 0.3 * (1 - np.cos(phase))
                 for reading in session.play(grasps, np.full(phase.size, load_a)):
+                    link.watches = True  # from the first motion of a block on
                     samples += len(reading)
                     lost = reading.lost
                     if real:  # the process stamps by the clock this program reads, in 32 bits

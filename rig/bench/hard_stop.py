@@ -126,7 +126,8 @@ def _follow(logger: TeensyLogger, here: int, step: float, reach: int) -> NDArray
         if first and not (parts[-1]["status"][-1] & STATUS_ARMED):
             break
     samples = np.concatenate(parts)
-    return samples[(samples["status"] & STATUS_ARMED) != 0]
+    armed: NDArray[np.void] = samples[(samples["status"] & STATUS_ARMED) != 0]
+    return armed
 
 
 def _read(logger: TeensyLogger, duration_s: float) -> NDArray[np.void]:
