@@ -117,7 +117,7 @@ def _judged(
         outcome = "right" if kind == "nothing" else "missed"
     elif not all(any(map(is_right, names(c))) for c in changes):
         outcome = "wrong"
-    elif is_right(changes[0].name) and not changes[0].alternatives:
+    elif all(map(is_right, names(changes[0]))):  # a synonym of what was planted is right
         outcome = "named"
     else:
         outcome = "in a set"

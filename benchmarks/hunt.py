@@ -36,10 +36,8 @@ CHUNKS = {"commands": 20_000, "faults": 5_000}
 MOST_EVENTS = 5
 """Events of a sequence that is worth a person's time."""
 KNOWN = {
-    ("all encoders dead",): "friction hides the current that creeps up (docs/decisions/0111); a"
-    " monitor of the encoders' supply is the remedy",
-    ("encoder loses counts", "encoder loses counts"): "motor and spindle lose the same share, and"
-    " the jaw's encoder differs by less than its window",
+    ("all encoders dead",): "friction hides the current that creeps up (docs/decisions/0281); the"
+    " encoders' supply in the emergency stop's loop is the remedy",
 }
 """Events that are known to break a rule, and why they still do."""
 

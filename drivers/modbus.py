@@ -1,13 +1,20 @@
-"""Modbus RTU: messages, and asking one device on a serial line.
+"""Modbus RTU: messages, asking one device on a serial line, and force sensors that stream on one.
 
 Source: Modbus application protocol 1.1b3 and serial line guide 1.02.
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from drivers.counters import DeviceCounters
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.ati_net.protocol import AXES
+from drivers.counters import Arrivals, DeviceCounters
+from drivers.device import Batch, Channel, DeviceIdentity, stop_and_let_go
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.sliding import Check, SlidingFrames
 from drivers.transport.transport import Transport
 
 READ, WRITE = 0x03, 0x10
@@ -15,6 +22,8 @@ TRIES = 3
 REPLY_TIMEOUT_S = 0.2
 QUIET_S = 0.05
 """A stopped stream has ended when nothing arrives for this long, s."""
+LONGEST_SILENCE_S = 0.1
+"""Shortest time without a frame after which frames are missing from the count of a stream, s."""
 
 
 def crc16(data: bytes) -> int:
@@ -194,3 +203,140 @@ class ModbusLine:
             f"It was asked {TRIES} times.",
             self._check,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A sensor's stream between its Modbus answers.
+
+    Attributes:
+        slave: The sensor's address.
+        title: The sensor in messages.
+        check: What a person should check where it does not answer.
+        jam: Bytes that end the stream.
+        begin: Request that begins it.
+        begun: Function and data of the answer to that.
+        frame_size: Bytes of a frame.
+        frame_checks: See `drivers.sliding.SlidingFrames`.
+        agree: Likewise.
+    """
+
+    slave: int
+    title: str
+    check: str
+    jam: bytes
+    begin: bytes
+    begun: tuple[int, bytes]
+    frame_size: int
+    frame_checks: Check
+    agree: int
+
+
+class StreamedSensor:
+    """Three forces and three torques of a sensor that is asked over Modbus, then streams.
+
+    A driver gives `identify` and `decode`, and `prepare` where the stream needs more.
+
+    Args:
+        transport: The way to it; the device closes it.
+        stream: How it streams.
+        rate_hz: Frames a second.
+    """
+
+    def __init__(self, transport: Transport, stream: Stream, rate_hz: float) -> None:
+        self._transport = transport
+        self._stream = stream
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._frames = SlidingFrames(
+            stream.frame_size, stream.frame_checks, self._counters, agree=stream.agree
+        )
+        self._line = ModbusLine(
+            transport,
+            stream.slave,
+            self._counters,
+            title=stream.title,
+            jam=stream.jam,
+            check=stream.check,
+        )
+        self._errors_at_start = 0
+        self._early = b""
+        self._identified = self._closed = False
+
+    @property
+    def tops(self) -> Sequence[float]:
+        """Largest force and torque of each axis, N and N m."""
+        raise NotImplementedError
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Three forces and three torques."""
+        kinds = [("N", "force")] * 3 + [("N m", "torque")] * 3
+        return tuple(
+            Channel(name, unit, self._rate_hz, -top, top, text)
+            for name, (unit, text), top in zip(AXES, kinds, self.tops, strict=True)
+        )
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Counters of the line."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """End the stream and ask who is there."""
+        raise NotImplementedError
+
+    def prepare(self) -> None:
+        """Write what the stream needs."""
+
+    def decode(self, frames: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+        """Return values, shape (n, 6), and the `SampleFlag` bits of each frame, shape (n,)."""
+        raise NotImplementedError
+
+    def start(self) -> None:
+        """Let the stream begin.
+
+        Raises:
+            LinkTimeoutError: Nobody answers.
+            DriverError: The sensor refuses.
+        """
+        if not self._identified:
+            self.identify()
+        self._line.quieten()
+        self.prepare()
+        self._frames.restart()
+        self._errors_at_start = self._counters.crc_errors
+        self._early = self._line.begin_stream(self._stream.begin, self._stream.begun)
+        self._arrivals.restart(self._transport.now_s)
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the frames that have come, stamped with the time of this read.
+
+        Raises:
+            DriverError: Neither `identify` nor `start` has been called.
+        """
+        if not self._identified:
+            raise DriverError(f"The {self._stream.title} is not known.", fix="Call start first.")
+        frames = self._frames.read(self._transport, timeout_s, self._early)
+        self._early = b""
+        values, flags = self.decode(frames)
+        now_s = self._transport.now_s
+        return Batch(
+            {name: values[:, axis] for axis, name in enumerate(AXES)},
+            np.full(len(values), now_s),
+            "host",
+            self._arrivals.number(len(values), now_s),
+            flags,
+            self._counters.crc_errors - self._errors_at_start,
+        )
+
+    def stop(self) -> None:
+        """End the stream."""
+        self._transport.write(self._stream.jam)
+
+    def close(self) -> None:
+        """End the stream where that can still be done, and let go of the line."""
+        if not self._closed:
+            self._closed = True
+            stop_and_let_go(self.stop, self._transport.close)

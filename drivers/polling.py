@@ -67,16 +67,18 @@ class Clocked(Protocol):
 class PolledDevice:
     """A device that is asked for every sample, at a steady rate.
 
-    A driver gives `channels`, `identify`, `idle` and `sample`.
+    A driver gives `channels`, `identify`, `idle` and `sample`, and may give `judge`.
 
     Args:
         way: The way to the device, closed with it.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
+        late_s: How late a question may be and still be asked; later ones are lost.
     """
 
-    def __init__(self, way: Clocked, rate_hz: float) -> None:
+    def __init__(self, way: Clocked, rate_hz: float, late_s: float = 0.0) -> None:
         self._way = way
         self._rate_hz = rate_hz
+        self._late_s = late_s
         self._counters = DeviceCounters()
         self._schedule = PollSchedule(rate_hz, self._counters)
         self._schedule.restart(way.now_s)
@@ -119,6 +121,9 @@ class PolledDevice:
         """
         raise NotImplementedError
 
+    def judge(self) -> None:
+        """Raise what the newest answer, or that there was none, means for the device."""
+
     def start(self) -> None:
         """Number the samples from 0, the first being due now."""
         if not self._identified:
@@ -135,17 +140,18 @@ class PolledDevice:
         if not self._identified:
             raise DriverError("The device is not known.", fix="Call start first.")
         self.idle(max(0.0, min(self.wait_s, timeout_s)))
-        now_s = self._way.now_s
-        if self._schedule.wait_s(now_s) > 0:
+        if self.wait_s > 0:
             return self._batch(None)
-        self._schedule.skip_missed(now_s)
+        self._schedule.skip_missed(self._way.now_s - self._late_s)
+        sample = None
         try:
             sample = self.sample()
         except (LinkTimeoutError, FrameError):
             self._schedule.lose()
-            return self._batch(None)
-        self._schedule.asked += 1
-        self._counters.frames += 1
+        else:
+            self._schedule.asked += 1
+            self._counters.frames += 1
+        self.judge()
         return self._batch(sample)
 
     def stop(self) -> None:
@@ -181,10 +187,13 @@ class PolledDrive(PolledDevice):
         rate_hz: Polling rate.
         title: The drive in messages, such as `moteus 1`.
         own_watch: What a working drive does by itself when nobody asks, one sentence.
+        late_s: See `PolledDevice`.
     """
 
-    def __init__(self, way: Clocked, rate_hz: float, title: str, own_watch: str) -> None:
-        super().__init__(way, rate_hz)
+    def __init__(
+        self, way: Clocked, rate_hz: float, title: str, own_watch: str, late_s: float = 0.0
+    ) -> None:
+        super().__init__(way, rate_hz, late_s)
         self._title = title
         self._own_watch = own_watch
         self._armed = self._may_be_armed = False
@@ -210,7 +219,12 @@ class PolledDrive(PolledDevice):
         if not self._identified:
             raise DriverError(f"The {self._title} is not started.", fix="Call start first.")
         self.disarm()
+        self.put_in_force()
+
+    def put_in_force(self) -> None:
+        """Put the motor of a well drive in force; errors as `arm`."""
         self._may_be_armed = True
+        self.zero()
         self.energise()
         self._armed = True
 

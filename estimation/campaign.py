@@ -134,18 +134,18 @@ class Campaign:
         """The runs that are not excluded."""
         return Campaign(tuple(run for run in self.runs if run.excluded is None))
 
-    def exclude(self, name: str, reason: str) -> "Campaign":
-        """Return a campaign in which one run is excluded, with the reason.
+    def exclude(self, reasons: Mapping[str, str]) -> "Campaign":
+        """Return a campaign in which some runs are excluded, each with its reason.
 
         Raises:
             CampaignError: The campaign has no such run.
         """
-        if name not in self.names:
+        for name in reasons.keys() - set(self.names):
             raise CampaignError(
                 f"The campaign has no run {name!r}.", f"It has: {', '.join(self.names)}."
             )
         return Campaign(
-            tuple(replace(r, excluded=reason) if r.name == name else r for r in self.runs)
+            tuple(replace(r, excluded=reasons.get(r.name, r.excluded)) for r in self.runs)
         )
 
     def select(self, names: Iterable[str]) -> "Campaign":

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import derived
+from estimation import derived, live_channels
 from estimation.channels import unit_of
 from estimation.effects import Effect, Parameter
 from estimation.errors import EstimationError, nearest
@@ -238,7 +238,7 @@ def balance_channels(model: Model, recording: Recording, causal: bool = False) -
 
 
 def _filtered(model: Model, recording: Recording, wanted: Sequence[str], causal: bool) -> Recording:
-    source = derived.causal_channels if causal else derived.zero_phase_channels
+    source = live_channels.causal_channels if causal else derived.zero_phase_channels
     return source(recording, wanted, model.low_pass, signals=model.signals)
 
 

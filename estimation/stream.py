@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimation.derived import CausalChannels
+from estimation.live_channels import CausalChannels
 from estimation.model import Model
 from estimation.recording import FloatArray
 

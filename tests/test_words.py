@@ -73,7 +73,7 @@ def pages() -> list[str]:
     for room in ROOMS:
         found += [p for p in (ROOT / room).rglob("*") if p.suffix in (".py", ".md")]
     names = sorted(p.relative_to(ROOT).as_posix() for p in found)
-    generated = ("CHANGELOG.md", "docs/results/")
+    generated = ("CHANGELOG.md", "docs/results/", "firmware/build/")
     return [name for name in names if not name.startswith(generated)]
 
 

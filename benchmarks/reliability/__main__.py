@@ -222,15 +222,21 @@ def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str,
     speed = s["duration_s"] / s["elapsed_s"]
     if part == "soak":
         return [*rows, (f"{s['where']}: speed", f"{speed:.0f} times real time", "", "")]
-    p50, p99, p999, top = s["latency_ms"]
+    p50, p99, p999, top = s["latency_ms"] or [np.nan] * 4
     told = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
     share = f"{100 * s['processor_ratio']:.1f} % of a core"
     return [
         *rows,
         _row(f"{s['where']}: pace", f"{speed:.3f} times real time", "1", speed > 0.99),
         (f"{s['where']}: latency p50 / p99 / p99.9 / max", told, "", ""),
+        (f"{s['where']}: longest pause between two commands", _pause(s), "", ""),
         _row(f"{s['where']}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
     ]
+
+
+def _pause(s: dict[str, Any]) -> str:
+    longest, computed, waited = s["pause_ms"]
+    return f"{longest:.1f} ms; of it {computed:.1f} ms computing, {waited:.1f} ms without processor"
 
 
 def _fault_rows(f: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:

@@ -55,6 +55,7 @@ ASIDE: dict[str, dict[str, dict[str, float]]] = {
             "current_window_a": 1000.0,
             "frozen_current_a": 1000.0,
             "still_torque_n_m": 1000.0,
+            "still_rise_n_m": 1000.0,
         },
     },
     "overheated": {"plausibility": {"current_window_a": 1000.0}},

@@ -21,7 +21,6 @@ BLOCK = 1000
 TOTAL = 10_000_000
 LEAST = 100_000
 HANGS_S = 60
-SLOW_S = 2.0
 KEPT_FAILURES = 20
 STATE = Path("build/fuzz.json")
 

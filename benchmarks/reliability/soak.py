@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.transport.transport import Transport
 from rig.bench.logger import is_real_time, open_logger
 from rig.bench.session import Session
 from rig.configuration.config import load_config
@@ -30,8 +31,10 @@ class Soak:
         elapsed_s: Real time, s.
         processor_ratio: Processor time of this process over real time.
         latency_ms: Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being
-            read and converted; None where time is virtual.
+            read and converted; None where time is virtual or nothing was read.
         trip: What ended it before its time; empty for nothing.
+        pause_ms: Longest time between two commands of the host; of it, the time this program
+            computed, and the time it waited for a processor.
     """
 
     where: str
@@ -43,6 +46,50 @@ class Soak:
     processor_ratio: float
     latency_ms: tuple[float, ...] | None
     trip: str
+    pause_ms: tuple[float, float, float]
+
+
+class Paced:
+    """A transport that keeps the longest pause between two commands, while it watches."""
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+        self._last = _times_ms()
+        self.longest_ms = (0.0, 0.0, 0.0)
+        self.watches = False
+
+    @property
+    def url(self) -> str:
+        """Where it leads."""
+        return self._transport.url
+
+    @property
+    def now_s(self) -> float:
+        """Its clock."""
+        return self._transport.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        """Read as the transport does."""
+        return self._transport.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        """Write, and keep the pause before it."""
+        now = _times_ms()
+        pause = now[0] - self._last[0], now[1] - self._last[1], now[2] - self._last[2]
+        if self.watches:
+            self.longest_ms = max(self.longest_ms, pause)
+        self._last = now
+        self._transport.write(data)
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._transport.close()
+
+
+def _times_ms() -> tuple[float, float, float]:
+    """Return real time, time computed and time waited for a processor (Linux), ms."""
+    waited_ns = int(Path("/proc/self/schedstat").read_text().split()[1])
+    return 1e3 * time.monotonic(), 1e3 * time.process_time(), 1e-6 * waited_ns
 
 
 def soak(config_name: str, duration_s: float, where: str) -> Soak:
@@ -52,18 +99,23 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
     load_a = min(0.2, config.reference_limits.load_command_a)
     config = config.changed(safety={"watchdog_s": WATCHDOG_S})
     late_ms: list[np.ndarray] = []
-    samples, trip = 0, ""
-    with Session(config, open_logger(config)) as session:
+    samples, lost, trip = 0, 0, ""
+    link = Paced(open_logger(config))
+    with Session(config, link) as session:
         next(session.rest(0.5))
-        session.settle()
         began_s, busy_s = time.monotonic(), time.process_time()
         start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
         phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
         try:
+            session.settle()
+            began_s, busy_s = time.monotonic(), time.process_time()
             for _ in range(max(1, blocks)):
+                link.watches = False
                 grasps = start + 0.3 * (1 - np.cos(phase))
                 for reading in session.play(grasps, np.full(phase.size, load_a)):
+                    link.watches = True  # from the first motion of a block on
                     samples += len(reading)
+                    lost = reading.lost
                     if real:  # the process stamps by the clock this program reads, in 32 bits
                         now_us = time.monotonic_ns() // 1000
                         ticks = reading.counts["tick_us"].astype(np.int64)
@@ -72,7 +124,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
             trip = f"{error.what} ({samples / 1000:.0f} s)"
         elapsed_s = time.monotonic() - began_s
         busy_s = time.process_time() - busy_s
-        lost, counters = reading.lost, session.counters
+        counters = session.counters
     told = {name: count for name, count in counters.items() if count and name != "frames"}
     return Soak(
         where,
@@ -82,6 +134,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
         ", ".join(f"{count} {name}" for name, count in told.items()) or "none",
         elapsed_s,
         busy_s / elapsed_s,
-        tuple(np.percentile(np.concatenate(late_ms), [50, 99, 99.9, 100])) if real else None,
+        tuple(np.percentile(np.concatenate(late_ms), [50, 99, 99.9, 100])) if late_ms else None,
         trip,
+        link.longest_ms,
     )

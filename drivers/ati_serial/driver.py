@@ -1,5 +1,6 @@
 """The driver of a digital F/T: its calibration is read and put in force, then it streams."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -7,19 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.ati_net.protocol import AXES, N_M_PER_UNIT, N_PER_UNIT
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
 from drivers.ati_serial import protocol
-from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.device import DeviceIdentity, SampleFlag
 from drivers.errors import DriverError
-from drivers.modbus import QUIET_S, ModbusLine
+from drivers.modbus import QUIET_S, Stream, StreamedSensor
 from drivers.registry import BaudOption, Driver, RateOption
-from drivers.sliding import SlidingFrames
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
-LONGEST_SILENCE_S = 0.1
 GAUGE_LIMIT = 32767
+_STREAM = Stream(
+    slave=protocol.SLAVE,
+    title="digital F/T",
+    check="Check its supply, the line, 1.25 Mbit/s and even parity.",
+    jam=protocol.JAM,
+    begin=protocol.encode(protocol.STREAM, protocol.START_STREAM),
+    begun=(protocol.STREAM, protocol.SUCCESS),
+    frame_size=protocol.FRAME_SIZE,
+    frame_checks=protocol.frame_checks,
+    agree=5,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +50,7 @@ class Assumptions:
     lock_answers: bool = True
 
 
-class AtiSerial:
+class AtiSerial(StreamedSensor):
     """One sensor on an RS-485 line.
 
     Args:
@@ -65,46 +74,17 @@ class AtiSerial:
     ) -> None:
         if not 1 <= calibration <= 16:
             raise DriverError(f"A digital F/T has calibrations 1 to 16, none {calibration}.")
-        self._transport = transport
+        super().__init__(transport, _STREAM, rate_hz)
         self._number = calibration
-        self._rate_hz = rate_hz
         self._assumed = assumed
         self._calibration: protocol.Calibration | None = None
-        self._matrix = np.zeros((6, 6))
-        self._counters = DeviceCounters()
-        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
-        self._line = ModbusLine(
-            transport,
-            protocol.SLAVE,
-            self._counters,
-            title="digital F/T",
-            jam=protocol.JAM,
-            check="Check its supply, the line, 1.25 Mbit/s and even parity.",
-        )
-        self._frames = SlidingFrames(
-            protocol.FRAME_SIZE, protocol.frame_checks, self._counters, agree=5
-        )
-        self._errors_at_start = 0
-        self._early = b""
-        self._closed = False
+        self._matrix = np.full((6, 6), np.inf)
 
     @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Three forces and three torques; their range is known once the calibration is."""
-        tops = np.full(6, np.inf)
-        if self._calibration is not None:
-            tops = np.abs(self._matrix).sum(axis=1) * (GAUGE_LIMIT + 1)
-        return tuple(
-            Channel(name, unit, self._rate_hz, -top, top, text)
-            for name, (unit, text), top in zip(
-                AXES, [("N", "force")] * 3 + [("N m", "torque")] * 3, tops.tolist(), strict=True
-            )
-        )
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the line."""
-        return self._counters.as_dict()
+    def tops(self) -> Sequence[float]:
+        """Largest values; not known before the calibration is."""
+        tops: list[float] = (np.abs(self._matrix).sum(axis=1) * (GAUGE_LIMIT + 1)).tolist()
+        return tops
 
     def identify(self) -> DeviceIdentity:
         """End the stream and read the calibration.
@@ -140,53 +120,22 @@ class AtiSerial:
         )
         self._matrix = found.matrix * slopes[:, np.newaxis]
         self._calibration = found
+        self._identified = True
         return DeviceIdentity(f"ATI digital F/T {found.part_number}".strip(), found.serial, "")
 
-    def start(self) -> None:
-        """Put the calibration's gains and offsets in force and let the stream begin.
-
-        Raises:
-            LinkTimeoutError: Nobody answers.
-            DriverError: The sensor refuses.
-        """
-        if self._calibration is None:
-            self.identify()
+    def prepare(self) -> None:
+        """Put the calibration's gains and offsets in force."""
         assert self._calibration is not None  # noqa: S101
-        self._line.quieten()
         active = self._calibration.gains + self._calibration.offsets
         self._set_lock(protocol.UNLOCK)
         self._line.write(protocol.ACTIVE_GAINS, active)
         self._set_lock(protocol.LOCK)
-        self._frames.restart()
-        self._errors_at_start = self._counters.crc_errors
-        self._early = self._line.begin_stream(
-            protocol.encode(protocol.STREAM, protocol.START_STREAM),
-            (protocol.STREAM, protocol.SUCCESS),
-        )
-        self._arrivals.restart(self._transport.now_s)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Return the frames that have come, stamped with the time of this read.
-
-        Raises:
-            DriverError: Neither `identify` nor `start` has been called.
-        """
-        if self._calibration is None:
-            raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
-        frames = self._frames.read(self._transport, timeout_s, self._early)
-        self._early = b""
+    def decode(self, frames: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+        """Return values, and which frames are suspect or saturated."""
         gauges, bad = protocol.decode_frames(frames)
         self._counters.device_errors += int(np.count_nonzero(bad))
-        now_s = self._transport.now_s
-        values = gauges @ self._matrix.T
-        return Batch(
-            {name: values[:, axis] for axis, name in enumerate(AXES)},
-            np.full(len(frames), now_s),
-            "host",
-            self._arrivals.number(len(frames), now_s),
-            _flags(gauges, bad),
-            self._counters.crc_errors - self._errors_at_start,
-        )
+        return gauges @ self._matrix.T, _flags(gauges, bad)
 
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
@@ -201,17 +150,6 @@ class AtiSerial:
     def status(self) -> int:
         """Return the status register; only while it does not stream."""
         return int.from_bytes(self._line.read(protocol.STATUS, 1), "big")
-
-    def stop(self) -> None:
-        """End the stream."""
-        self._transport.write(protocol.JAM)
-
-    def close(self) -> None:
-        """End the stream where that can still be done, and let go of the line."""
-        if self._closed:
-            return
-        self._closed = True
-        stop_and_let_go(self.stop, self._transport.close)
 
 
 def _flags(gauges: NDArray[np.int64], bad: NDArray[np.bool_]) -> NDArray[np.uint8]:

@@ -4,10 +4,11 @@ Nothing runs in the background. While the host reads, it sends its heartbeat; wh
 drive notices and takes its power stage out of force by itself.
 """
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from drivers.counters import DeviceCounters
-from drivers.device import Axis, Batch, Channel, DeviceIdentity
+from drivers.device import Axis, Channel, DeviceIdentity
 from drivers.epos4 import protocol
 from drivers.epos4.cycle import Cycle
 from drivers.epos4.faults import DriveFaultError, fault
@@ -15,17 +16,17 @@ from drivers.epos4.identity import identify
 from drivers.epos4.node import HOST_NODE, Node
 from drivers.epos4.power_stage import PowerStage
 from drivers.epos4.protocol import Feedback, Ratings, State
-from drivers.epos4.samples import batch_of, channels_of
+from drivers.epos4.samples import channels_of, flags_of, values_of
 from drivers.epos4.setup import set_up
-from drivers.errors import DisarmUnconfirmedError, DriverError, MissingExtraError
-from drivers.polling import PollSchedule
+from drivers.errors import DisarmUnconfirmedError, DriverError, LinkTimeoutError, MissingExtraError
+from drivers.polling import PolledDrive
 from drivers.transport.can_bus import CanBus
 
 if TYPE_CHECKING:
     from drivers.epos4.canopen_link import CanopenLink
 
 
-class Epos4:
+class Epos4(PolledDrive):
     """One drive on a CAN bus of its own, or one that this host masters.
 
     Args:
@@ -54,22 +55,24 @@ class Epos4:
             raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
         if not 0 <= host_timeout_ms <= 65535:
             raise ValueError(f"a host time-out lies in 0..65535 ms, not {host_timeout_ms}")
+        super().__init__(
+            bus,
+            rate_hz,
+            f"drive, node {node_id} on {bus.url},",
+            f"A working drive stops by itself {host_timeout_ms} ms after the host's last heartbeat."
+            if host_timeout_ms
+            else "",
+            late_s,
+        )
         self._bus = bus
-        self._node_id = node_id
-        self._rate_hz = rate_hz
         self._host_timeout_ms = host_timeout_ms
-        self._late_s = late_s
         self._link = _link(bus, node_id)
-        self._counters = DeviceCounters()
         self._node = Node(self._link, host_timeout_ms, self._counters)
         self._power = PowerStage(self._link, self._node)
         self._cycle = Cycle(self._link, rate_hz, late_s, self._counters)
-        self._schedule = PollSchedule(rate_hz, self._counters)
         self._ratings: Ratings | None = None
-        self._armed = False
-        self._may_be_armed = False
+        self._feedback: Feedback | None = None
         self._target = 0
-        self._closed = False
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -79,7 +82,7 @@ class Epos4:
     @property
     def counters(self) -> dict[str, int]:
         """What happened to this drive's frames, and to the bus itself."""
-        counters = self._counters.as_dict()
+        counters = super().counters
         counters["retries"] += self._link.retries
         counters["timeouts"] += self._link.timeouts
         bus = self._bus.counters
@@ -109,6 +112,7 @@ class Epos4:
             ProtocolMismatchError: It is not maxon's, or has no cyclic torque mode.
         """
         identity, self._ratings = identify(self._link)
+        self._identified = True
         return identity
 
     def start(self) -> None:
@@ -119,12 +123,11 @@ class Epos4:
         Raises:
             ProtocolMismatchError: The drive does not hold what was written.
         """
-        if self._ratings is None:
+        if not self._identified:
             self.identify()
         if not self._node.started:
             self._set_up()
-        self._idle(0.0)
-        self._schedule.restart(self._bus.now_s)
+        super().start()
 
     def arm(self) -> None:
         """Put the power stage in force with a target torque of 0.
@@ -136,11 +139,26 @@ class Epos4:
         if not self._node.started:
             raise DriverError("The drive is not started.", fix="Call start first.")
         self._node.require_well()
-        self._target = 0
-        self._may_be_armed = True
+        self.put_in_force()
+
+    def energise(self) -> None:
+        """Put the power stage in force."""
         self._power.enable()
         self._cycle.drop_late()
-        self._armed = True
+
+    def release(self) -> None:
+        """Voltage off, read back.
+
+        Raises:
+            DriverError: The drive has not said so.
+        """
+        if self._node.started:
+            self._cycle.command(protocol.DISABLE_VOLTAGE, 0)
+        self._power.disable()
+
+    def zero(self) -> None:
+        """Set the target torque to 0."""
+        self._target = 0
 
     def set_torque(self, torque_n_m: float) -> float:
         """Command a motor torque, sent at the next reading and at every one from then on.
@@ -161,8 +179,27 @@ class Epos4:
         """Command a share of the rated torque, as `set_torque`."""
         self.set_torque(ratio * self.ratings.rated_torque_n_m)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Send command and SYNC when due and return what the drive answers, if it does.
+    @property
+    def wait_s(self) -> float:
+        """Time until the next SYNC is due, 0 when it is; none is while the drive is not started."""
+        return super().wait_s if self._node.started else math.inf
+
+    def sample(self) -> tuple[Sequence[float], int]:
+        """Send command and SYNC, and return the drive's answer.
+
+        Raises:
+            LinkTimeoutError: There is none.
+        """
+        if self._node.in_trouble:
+            self._armed = False  # it is not commanded any more
+        self._feedback = self._cycle.exchange(self._target if self._armed else None)
+        if self._feedback is None:
+            self._counters.timeouts += 1
+            raise LinkTimeoutError("The drive does not answer a SYNC.")
+        return values_of(self.ratings, self._feedback, self._target), flags_of(self._feedback)
+
+    def judge(self) -> None:
+        """Look at the drive behind a SYNC.
 
         Raises:
             DriveFaultError: The drive has sent an emergency, or an armed one has left operation;
@@ -170,46 +207,22 @@ class Epos4:
                 comes; every reading raises that.
             LinkTimeoutError: The drive's heartbeat is missing; every reading says so while it is.
         """
-        ratings = self.ratings
-        self._idle(min(self.wait_s, timeout_s))
-        if self.wait_s > 0 or not self._node.started:
-            return self._batch(ratings, None)
-        self._schedule.skip_missed(self._bus.now_s - self._late_s)
-        if self._node.in_trouble:
-            self._armed = False  # it is not commanded any more
-        feedback = self._cycle.exchange(self._target if self._armed else None)
-        if feedback is None:
-            self._schedule.lose()
-            self._counters.timeouts += 1
-        else:
-            self._schedule.asked += 1
-            self._counters.frames += 1
         if self._node.in_trouble:
             self._armed = False
             self._node.require_well()
-        if feedback is None:
+        if self._feedback is None:
             self._node.require_answers()
         else:
-            self._require_operation(feedback)
-        return self._batch(ratings, feedback)
-
-    @property
-    def now_s(self) -> float:
-        """The bus's clock, s."""
-        return self._bus.now_s
-
-    @property
-    def wait_s(self) -> float:
-        """Time until the next SYNC is due, 0 when it is."""
-        return self._schedule.wait_s(self._bus.now_s)
+            self._require_operation(self._feedback)
 
     def idle(self, wait_s: float) -> None:
-        """Serve the bus for a while, the host's heartbeat among it.
+        """Serve the bus for a while; an answer that comes is to a SYNC that was given up.
 
         Raises:
             LinkLostError: The bus is gone.
         """
-        self._idle(wait_s)
+        self._node.idle(wait_s)
+        self._cycle.drop_late()
 
     def clear_fault(self) -> int:
         """Reset a fault whose cause is gone; the power stage stays off.
@@ -237,43 +250,13 @@ class Epos4:
         self._node.forget_error()
         return code
 
-    def disarm(self) -> None:
-        """Take the motor out of force: target torque 0, voltage off, read back.
-
-        Returns only when the drive has said that its power stage is off.
-
-        Raises:
-            DisarmUnconfirmedError: It has not said so; its state is unknown.
-        """
-        self._armed = False
-        self._target = 0
-        try:
-            if self._node.started:
-                self._cycle.command(protocol.DISABLE_VOLTAGE, 0)
-            self._power.disable()
-        except DriverError as error:
-            raise DisarmUnconfirmedError(
-                f"The drive, node {self._node_id} on {self._bus.url}, has not confirmed that its"
-                " power stage is off.",
-                str(error),
-                "Take the motor for live and cut its supply."
-                + (
-                    f" A working drive stops by itself {self._host_timeout_ms} ms after the host's"
-                    " last heartbeat."
-                    if self._host_timeout_ms
-                    else ""
-                ),
-            ) from error
-        self._may_be_armed = False
-
     def stop(self) -> None:
         """Disarm where the drive may be armed, and let it answer no more SYNC.
 
         Raises:
             DisarmUnconfirmedError: The drive's state is unknown.
         """
-        if self._may_be_armed:
-            self.disarm()
+        super().stop()
         if not self._node.started:
             return
         self._node.started = False
@@ -287,24 +270,12 @@ class Epos4:
         Raises:
             DisarmUnconfirmedError: The bus is closed, but the drive's state is unknown.
         """
-        if self._closed:
-            return
-        self._closed = True
         try:
-            self.stop()
+            super().close()
         except DisarmUnconfirmedError:
             raise
         except DriverError:
             pass  # it is gone already, and was not armed
-        finally:
-            self._bus.close()
-
-    # every cycle
-
-    def _idle(self, wait_s: float) -> None:
-        """Let time pass; an answer that comes is to a SYNC that was given up."""
-        self._node.idle(wait_s)
-        self._cycle.drop_late()
 
     def _set_up(self) -> None:
         set_up(self._link, self._node, self._host_timeout_ms)
@@ -326,10 +297,6 @@ class Epos4:
             "Its enable or STO input changed, or somebody else commands it.",
             "Find out why, then arm again.",
         )
-
-    def _batch(self, ratings: Ratings, feedback: Feedback | None) -> Batch:
-        now_s, number = self._bus.now_s, self._schedule.asked - 1
-        return batch_of(ratings, feedback, self._target, now_s, number, self._schedule.lost)
 
 
 def _link(bus: CanBus, node_id: int) -> "CanopenLink":

@@ -1,8 +1,8 @@
-"""What an EPOS4 measures: its channels, and its process data as a batch of at most one sample."""
+"""What an EPOS4 measures: its channels, and its process data as values of them."""
 
 import numpy as np
 
-from drivers.device import Batch, Channel, SampleFlag
+from drivers.device import Channel, SampleFlag
 from drivers.epos4 import protocol
 from drivers.epos4.protocol import Feedback, Ratings, State
 
@@ -25,39 +25,23 @@ def channels_of(ratings: Ratings | None, rate_hz: float) -> tuple[Channel, ...]:
     )
 
 
-def batch_of(
-    ratings: Ratings,
-    feedback: Feedback | None,
-    target_per_mille: int,
-    now_s: float,
-    number: int,
-    lost: int,
-) -> Batch:
-    """Return a batch with the answer to one SYNC, an empty one where there is none.
+def values_of(ratings: Ratings, answer: Feedback, target_per_mille: int) -> tuple[float, ...]:
+    """Return the value of each channel.
 
     Args:
         ratings: The drive's motor data.
-        feedback: The answer.
+        answer: The answer to a SYNC.
         target_per_mille: Torque commanded, thousandths of the rated torque.
-        now_s: When the answer had come, host clock.
-        number: The SYNC's number.
-        lost: SYNCs without an answer so far.
     """
-    count = 0 if feedback is None else 1
-    answer = feedback or Feedback(0, 0, 0)
-    values = {
-        "position_count": float(answer.position_count),
-        "motor_torque_n_m": ratings.torque_n_m(answer.torque_per_mille),
-        "motor_current_a": ratings.current_a(answer.torque_per_mille),
-        "command_torque_n_m": ratings.torque_n_m(target_per_mille),
-    }
-    state = protocol.state_of(answer.statusword)
-    faulty = count and state in (State.FAULT, State.FAULT_REACTION)
-    return Batch(
-        {name: np.full(count, value) for name, value in values.items()},
-        np.full(count, now_s),
-        "host",
-        np.full(count, number, np.int64),
-        np.full(count, SampleFlag.SUSPECT if faulty else 0, np.uint8),
-        lost,
+    return (
+        float(answer.position_count),
+        ratings.torque_n_m(answer.torque_per_mille),
+        ratings.current_a(answer.torque_per_mille),
+        ratings.torque_n_m(target_per_mille),
     )
+
+
+def flags_of(answer: Feedback) -> int:
+    """Return the `SampleFlag` bits of an answer."""
+    faulty = protocol.state_of(answer.statusword) in (State.FAULT, State.FAULT_REACTION)
+    return SampleFlag.SUSPECT if faulty else 0

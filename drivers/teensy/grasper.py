@@ -123,6 +123,7 @@ class GrasperLimits:
         safe_state: `SafeState`; what is held, holds all three motors.
         hold_command_e4: Largest command while holding, 1e-4 of full scale.
         hold_ticks: How long it may hold; then it releases.
+        seek: 0; a grasper is referenced by hand.
     """
 
     axes: tuple[AxisLimits, AxisLimits, AxisLimits] = (AxisLimits(), AxisLimits(), AxisLimits())
@@ -134,6 +135,7 @@ class GrasperLimits:
     safe_state: int = SafeState.RELEASE
     hold_command_e4: int = 0
     hold_ticks: int = TOP
+    seek: int = 0
 
     def as_array(self) -> NDArray[np.int64]:
         """Return the limits in the order of the wire, shape (65,)."""

@@ -171,6 +171,7 @@ CHOICE_NAMES = (
     "safe_state",
     "hold_command_e4",
     "hold_ticks",
+    "seek",
 )
 """How the limits of every profile end: how long each watch lasts, and what a tripped board does."""
 LEAST_LIMITS = ("min_spindle", "min_jaw", "min_motor")
@@ -183,7 +184,7 @@ FIXED_LIMITS = (
 """What a rig is built like: a board that holds such a number takes no other."""
 FREE_LIMITS = (
     *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
-    "safe_state",
+    *("safe_state", "seek"),
 )
 """What a host may choose on any board."""
 PING_DTYPE = layout(*SESSION_FIELDS, "token u8")

@@ -160,6 +160,8 @@ class Limits:
             any other crossing releases whatever is asked for.
         hold_command_e4: Largest command while holding, 1e-4 of full scale.
         hold_ticks: How long it may hold; then it releases.
+        seek: 1 to move without a reference, towards a stop: the controller's limit is then no
+            larger than `hold_command_e4`, and the board has no reference from then on.
     """
 
     max_current: int = TOP
@@ -210,6 +212,7 @@ class Limits:
     safe_state: int = SafeState.RELEASE
     hold_command_e4: int = 0
     hold_ticks: int = TOP
+    seek: int = 0
 
     def as_array(self) -> NDArray[np.int64]:
         """Return the limits in the order of the wire, shape (44,)."""

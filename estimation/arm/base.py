@@ -51,10 +51,7 @@ def base_of(arm: Arm, seed: int = 0) -> Base:
     """
     rng = np.random.default_rng(seed)
     shape = (SAMPLES, len(arm.joints))
-    lower, upper, speed = (
-        np.array([getattr(joint, name) for joint in arm.joints])
-        for name in ("lower", "upper", "speed")
-    )
+    lower, upper, speed = arm.limits
     motion = Motion(
         position=rng.uniform(lower, upper, shape),
         velocity=rng.uniform(-speed, speed, shape),

@@ -16,7 +16,6 @@ from estimation.arm.excitation import (
     Excitation,
     condition,
     fitted,
-    limits_of,
     numbers_of,
 )
 from estimation.arm.tables import Arm
@@ -34,7 +33,7 @@ def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
         first: The start, within the limits.
         evaluations: Condition numbers it may take, gradients by differences included.
     """
-    lower, upper, speed = limits_of(arm)
+    lower, upper, speed = arm.limits
     half = (upper - lower) / 2
     sizes = np.stack([half, speed, ACCELERATION_PER_SPEED * speed])
     time = np.arange(SAMPLED) / (SAMPLED * FUNDAMENTAL_HZ)

@@ -75,21 +75,12 @@ def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
     return np.stack(rows)
 
 
-def limits_of(arm: Arm) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the joints' lower and upper ends and their speeds, shape (joints,) each."""
-    lower, upper, speed = (
-        np.array([getattr(joint, name) for joint in arm.joints])
-        for name in ("lower", "upper", "speed")
-    )
-    return lower, upper, speed
-
-
 def reached(arm: Arm, excitation: Excitation) -> float:
     """Return a bound that holds at every instant of the largest share of any limit used.
 
     Up to 1 no limit of position, velocity or acceleration is passed, whatever the instant.
     """
-    lower, upper, speed = limits_of(arm)
+    lower, upper, speed = arm.limits
     off_centre = np.abs(excitation.middle - (lower + upper) / 2)
     moved = bounds(excitation.sine, excitation.cosine)
     moved[0] += off_centre
@@ -108,7 +99,7 @@ def fitted(arm: Arm, raw: FloatArray) -> Excitation:
     joints = len(arm.joints)
     table = raw.reshape(2 * HARMONICS + 1, joints)
     sine, cosine = table[:HARMONICS], table[HARMONICS:-1]
-    lower, upper, speed = limits_of(arm)
+    lower, upper, speed = arm.limits
     half = (upper - lower) / 2
     off_centre = 0.5 * np.tanh(table[-1]) * half
     limits = np.stack([half - np.abs(off_centre), speed, ACCELERATION_PER_SPEED * speed])
@@ -121,7 +112,7 @@ def numbers_of(arm: Arm, excitation: Excitation) -> FloatArray:
 
     A middle more than a quarter of the range off the centre comes nearer to it.
     """
-    lower, upper, _ = limits_of(arm)
+    lower, upper, _ = arm.limits
     off_centre = (excitation.middle - (lower + upper) / 2) / (0.25 * (upper - lower))
     share = np.arctanh(np.clip(off_centre, -0.99, 0.99))
     raw: FloatArray = np.concatenate([excitation.sine, excitation.cosine, share[None]]).ravel()

@@ -8,6 +8,10 @@ from dataclasses import dataclass, replace
 from math import pi, radians
 from typing import Literal
 
+import numpy as np
+
+from estimation.recording import FloatArray
+
 Link = Literal["full", "first moments", "thin"]
 """All ten parameters; the first moments only, of a link whose mass is negligible; mass and first
 moment along the own x axis only, of a thin bar."""
@@ -154,6 +158,13 @@ class Arm:
         """Return the arm with a tool at its end: its tip is the tool's, and it carries the tool."""
         mounted = replace(self, name=f"{self.name}, with {tool.name}", tip=tool.tip)
         return mounted.with_payload(*tool.masses)
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The joints' lower and upper ends and their speeds, shape (joints,) each."""
+        table = np.array([(joint.lower, joint.upper, joint.speed) for joint in self.joints])
+        lower, upper, speed = table.T.copy()
+        return lower, upper, speed
 
     @property
     def bodies(self) -> tuple[Body, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import signal
 from scipy.linalg import lapack
 
-from estimation.arm.kinematics import TIP, ArmError, built, pinocchio
+from estimation.arm.kinematics import TIP, ArmError, built, pinocchio, tip_pose
 from estimation.arm.recursion import LINK
 from estimation.arm.regressor import SIGN_WIDTH, names
 from estimation.arm.tables import Arm
@@ -98,6 +98,21 @@ def most_likely(
 
 def _likely() -> FloatArray:
     return np.diag(np.repeat([LIKELY_FORCE_N**-2, LIKELY_MOMENT_N_M**-2], 3))
+
+
+def in_tip_frame(arm: Arm, wrench: FloatArray, position: FloatArray) -> FloatArray:
+    """Return spatial wrenches about the tip in the tip's frame, shape (n, 6).
+
+    Args:
+        arm: The arm.
+        wrench: In the base frame about its origin, shape (n, 6).
+        position: Joint positions, shape (n, joints).
+    """
+    poses = np.array([tip_pose(arm, q) for q in position])
+    force = wrench[:, :3]
+    moment = wrench[:, 3:] - np.cross(poses[:, :3, 3], force)
+    turned = [np.einsum("nji,nj->ni", poses[:, :3, :3], each) for each in (force, moment)]
+    return np.hstack(turned)
 
 
 WINDOW, DEGREE = 61, 3  # Samples of the live window, odd, and degree of its polynomial

@@ -39,11 +39,13 @@ class Claim:
         cause: The named effect or smooth function.
         acts: Whether it acts in each run; in all when None.
         choices: Forms that share the prior probability of a cause, times the points of its grid.
+        given: Whether the runs in which it acts were not chosen: those of one campaign.
     """
 
     cause: Source | Function
     acts: tuple[bool, ...] | None = None
     choices: int = 1
+    given: bool = False
 
     @property
     def name(self) -> tuple[str, str, tuple[str, ...]]:
@@ -106,7 +108,12 @@ def candidates(joint: Joint) -> list[Group]:
         itertools.chain(sources_at(train, place), functions_at(train, place))
         for place in places_of(train)
     )
-    pool = groups_of(joint, map(Claim, causes))
+    return pool_of(joint, map(Claim, causes))
+
+
+def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
+    """Return claims laid out, each with the number of choices that it is one of."""
+    train, pool = joint.layout, groups_of(joint, claims)
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     count = Counter(_form(c) for group in pool for c in group.candidates)
@@ -173,7 +180,7 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (width, _unit(one.cause), one.acts is None, shaken is None)
+            key = (width, _unit(one.cause), one.acts is None, one.given, shaken is None)
             held = waiting.setdefault(key, [])
             held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
@@ -207,7 +214,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     columns = _stacked(joint, [raw[1] for raw in held])
     shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
     laid = joint.projection.laid(columns, shaken, _unit(first.cause))
-    if first.acts is not None:
+    if first.acts is not None and not first.given:
         # what starts between runs also shifts their means, by its own offset
         laid = laid.without_means()
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
@@ -223,6 +230,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
                 one.cause,
                 one.acts,
                 one.choices,
+                one.given,
                 laid=laid.only(slice(c, c + 1)),
                 precision=precision[c],
             )

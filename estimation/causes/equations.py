@@ -23,7 +23,8 @@ from estimation.derived import (
 from estimation.effects import Proportional
 from estimation.errors import EstimationError
 from estimation.filters import LowPass
-from estimation.fitting import OFFSET, fit
+from estimation.fit_problem import OFFSET
+from estimation.fitting import fit
 from estimation.model import Model, Term, balance_channels
 from estimation.noise import white_noise
 from estimation.predicted import with_prediction

@@ -201,6 +201,25 @@ class Joint:
             self._fits[key] = LeftOut(left, runs, fold, inverses, base)
         return self._fits[key]
 
+    def fitted_on(self, counts: FloatArray) -> FloatArray:
+        """Return the base's parameters with each run counted so many times, shape (base,)."""
+        gram = np.einsum("r,rij->ij", counts, self._run_grams)
+        gram[range(self.size), range(self.size)] += self._prior
+        return np.asarray(inverse(gram[:-1, :-1]) @ gram[:-1, -1])
+
+    def parameter(self, base: FloatArray, equation: str, column: int | None) -> float:
+        """Return one declared parameter, with what was taken off the columns of causes.
+
+        Args:
+            base: Parameters of the base, shape (base,).
+            equation: Its equation.
+            column: Its declared column; None for the offset.
+        """
+        if column is not None:
+            return float(self.whole(base)[self._equations_at[equation].start + column])
+        offsets = self._declared_size - len(self._equations_at)
+        return float(base[offsets + list(self._equations_at).index(equation)])
+
     def with_effect(self, laid: Laid, amplitudes: FloatArray) -> "Joint":
         """Return the regression as if the base were true but for one effect.
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from estimation.campaign import Campaign
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
-from estimation.fitting import OFFSET, FitError, FitRun, fit, prepared
+from estimation.fit_problem import OFFSET, FitError, FitRun, prepared
+from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term
 from estimation.predicted import without_unused
 from estimation.recording import FloatArray, Recording

@@ -1,6 +1,6 @@
 """The search over hypotheses: sets of causes, scored together, extended one cause at a time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,10 +94,25 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     first = ranking.next_to([])
     if not first or first[0].score < 0.0:
         return Found([], [], joint, first, late)
-    chains = [_chain(ranking, start) for start in _starts(first)]
-    causes = max(chains, key=lambda chain: sum(c.score for c in chain))
-    causes, conditional = _settled(ranking, causes)
+    causes, conditional = hypothesis(ranking, _starts(first))
     return Found(causes, conditional, joint, first, late)
+
+
+def hypothesis(
+    ranking: "Ranking", starts: Sequence[Scored]
+) -> tuple[list[Scored], list[Sequence[Scored]]]:
+    """Return the best set of causes, and all that compete in the place of each.
+
+    Args:
+        ranking: The candidates.
+        starts: Causes with which a set may begin.
+    """
+    chains = [_chain(ranking, start) for start in starts]
+    return _settled(ranking, max(chains, key=lambda chain: sum(c.score for c in chain)))
+
+
+Rank = Callable[[Joint, Sequence[Group], Folds], list[Scored]]
+"""Regression, candidates and folds to the best candidate of each name, best first."""
 
 
 class Ranking:
@@ -107,17 +122,21 @@ class Ranking:
         joint: The regression without causes.
         pool: The candidates, with their products with it.
         folds: What is left out.
+        rank: Ranks the candidates next to a regression's base, the best of each name.
     """
 
-    def __init__(self, joint: Joint, pool: Sequence[Group], folds: Folds) -> None:
+    def __init__(
+        self, joint: Joint, pool: Sequence[Group], folds: Folds, rank: "Rank | None" = None
+    ) -> None:
         self.joint, self.folds, self.pool = joint, folds, pool
+        self._rank = rank or _ranked
         self._known: dict[frozenset[int], list[Scored]] = {}
 
     def next_to(self, causes: Sequence[Scored]) -> list[Scored]:
-        """Return the best of each name: on the grid, refined, relaxed, and on some of the runs."""
+        """Return the best of each name next to causes."""
         key = frozenset(id(c.candidate) for c in causes)
         if key not in self._known:
-            self._known[key] = _ranked(self._with(causes), self.pool, self.folds)
+            self._known[key] = self._rank(self._with(causes), self.pool, self.folds)
         return self._known[key]
 
     def _with(self, causes: Sequence[Scored]) -> Joint:
@@ -234,7 +253,8 @@ def _in_readings(
     The residual may be that reading's noise. Who reads the same quantity through another sensor
     then shares the task with it and halves the noise, with nothing to do with a cause: the factor
     of the reading becomes smaller, by as much as the noise is less seen. And who reads the target
-    itself has no use for the declared terms; a cause comes in addition to them. Shape (n,).
+    itself has no use for the declared terms; a cause comes in addition to them. A cause that reads
+    nothing but that reading does neither. Shape (n,).
     """
     replaces = np.zeros(len(candidates), dtype=np.bool_)
     for name, change in outcome.changes.items():
@@ -243,7 +263,7 @@ def _in_readings(
         unit = np.where(other, np.maximum(1.0, np.maximum(change, 1e-3) ** -2.0), 1.0)
         for family in outcome.errors:
             family[name, "within"][:] *= unit
-        replaces |= (change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE)
+        replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
     return replaces
 
 
@@ -268,8 +288,9 @@ def _price(candidate: Candidate, joint: Joint) -> float:
     samples = numbers.samples_a_run * len(joint.runs)
     more = 0 if isinstance(cause, Function) else len(cause.parts) - 1
     changes = isinstance(cause, Function) and "time" in cause.variables
-    rare = candidate.is_function + (changes or candidate.acts is not None)
-    if candidate.acts is not None:
+    chosen = candidate.acts is not None and not candidate.given
+    rare = candidate.is_function + (changes or chosen)
+    if candidate.acts is not None and chosen:
         count, acting = len(candidate.acts), sum(candidate.acts)
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
@@ -281,6 +302,7 @@ def _price(candidate: Candidate, joint: Joint) -> float:
 
 
 def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    """Return the best of each name: on the grid, refined, relaxed, and on some of the runs."""
     everything = assessed(joint, pool, folds)
     best = best_of_each(everything)
     near = [c for s in best[:REFINED] for c in _neighbours(s.candidate)]

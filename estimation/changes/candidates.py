@@ -1,125 +1,99 @@
-"""What may have changed: a declared parameter, a sensor's gain or zero, or an effect that came."""
+"""What may have changed: a declared parameter, a sensor's gain, or an effect that came or went."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.candidates import Claim
+from estimation.causes.equations import Layout
 from estimation.causes.places import Place, places_of
 from estimation.causes.sources import Source, sources_at
-from estimation.changes.regression import Columns, declared_columns
-from estimation.fitting import OFFSET
-from estimation.recording import FloatArray
+from estimation.effects.effect import Parameter, Proportional
+from estimation.fit_problem import OFFSET
+from estimation.model import Term
+
+
+class SensorGain(Proportional):
+    """A reading that is wrong by a constant factor."""
+
+    id = "sensor.gain"
+    roles = {"reading": "proximal_torque_n_m"}  # noqa: RUF012 - the class attribute of effects
+    amplitudes = (Parameter("gain", "1", "change of the reading's factor"),)
 
 
 @dataclass(frozen=True)
-class Moved:
-    """A declared parameter of one equation that may have moved."""
+class Moved(Source):
+    """A parameter that may have moved: of a declared term, or a sensor's gain.
 
-    equation: str
-    family: str
-    parameter: str
-    unit: str
-    column: int
+    Attributes:
+        key: What a report calls it.
+        column: Number of its equation's declared column; None of an offset or a sensor's gain.
+    """
 
-    @property
-    def key(self) -> str:
-        """What a report calls it."""
-        return f"{self.family} {self.parameter} of {self.equation}"
-
-    def columns(self, run: RunSignals, layout: Layout) -> Columns:
-        """Return its column; an offset is one at every sample."""
-        if self.column < 0:
-            return {self.equation: np.ones((len(run.used[self.equation]), 1))}
-        equation = layout.equations[self.equation]
-        return {self.equation: declared_columns(equation, run)[:, [self.column]]}
-
-
-@dataclass(frozen=True)
-class SensorMoved:
-    """A sensor's gain that may have moved: its error enters every equation that reads it."""
-
-    place: Place
-    channel: str
-
-    family = "sensor.gain"
-    parameter = "gain"
-    unit = "1"
-
-    @property
-    def equation(self) -> str:
-        """Equation it is reported under."""
-        return self.place.home
-
-    @property
-    def key(self) -> str:
-        """What a report calls it."""
-        return f"gain of {self.place.name}"
-
-    def columns(self, run: RunSignals, layout: Layout) -> Columns:
-        """Return the error of the reading in every equation."""
-        made: dict[str, FloatArray] = {}
-        for entry in self.place.enters:
-            values = run.on_grid(self.channel)
-            for _ in range(entry.order):
-                values = np.gradient(values, run.grid / run.rate_hz)
-            used = entry.gain * values[run.used[entry.equation], None]
-            made[entry.equation] = made.get(entry.equation, 0.0) + used
-        return made
-
-
-@dataclass(frozen=True)
-class Came:
-    """An effect of the catalogue that one of the campaigns may have and the other has not."""
-
-    source: Source
-
-    @property
-    def equation(self) -> str:
-        """Equation it is reported under."""
-        return self.source.place.home
+    key: str = ""
+    column: int | None = None
 
     @property
     def family(self) -> str:
-        """The effect's family."""
-        return self.source.family
+        """A parameter of one equation is a name of its own."""
+        return self.key
 
     @property
-    def key(self) -> str:
-        """What a report calls it."""
-        return f"{self.family} at {self.source.place.name}"
+    def is_bounded(self) -> bool:
+        """A parameter moves either way."""
+        return False
 
-    def columns(self, run: RunSignals, layout: Layout) -> Columns | None:
-        """Return the effect's columns in every equation; None where one is not finite."""
-        return self.source.columns(run)
-
-    def may_have(self, amplitudes: FloatArray) -> bool:
-        """Whether amplitudes have the effect's sign."""
-        if len(self.source.parts) > 1:
-            return True
-        bound = self.source.effect.amplitudes[self.source.parts[0]]
-        return not (amplitudes[0] < 0.0 <= bound.lower)
+    @property
+    def side(self) -> int:
+        """The sign of its term is in how it enters."""
+        return 1
 
 
-Candidate = Moved | SensorMoved | Came
+def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
+    """Yield everything that may have changed, each acting in the runs of one campaign.
 
-
-def candidates(layout: Layout) -> Iterator[Candidate]:
-    """Yield everything that may have changed."""
-    for name, equation in layout.equations.items():
+    Args:
+        layout: The runs of both campaigns.
+        is_b: Whether each is of the second campaign.
+    """
+    later, earlier = (tuple(b is side for b in is_b) for side in (True, False))
+    for equation in layout.equations.values():
         column = 0
-        for term in equation.terms:
-            for parameter in term.effect.amplitudes:
-                unit = term.unit(parameter, equation.target)
-                yield Moved(name, term.effect.id, parameter.name, unit, column)
-                column += 1
-        if any(term.effect.id == OFFSET for term in equation.model.terms):
-            yield Moved(name, OFFSET, "offset", equation.model.unit, -1)
+        for term in equation.model.terms:
+            if term.effect.id == OFFSET:
+                yield Claim(_moved(layout, equation.name, term, 0, None), later, given=True)
+                continue
+            for k in range(len(term.effect.amplitudes)):
+                found = _moved(layout, equation.name, term, k, column + k)
+                yield Claim(found, later, given=True)
+            column += len(term.effect.amplitudes) + len(term.effect.shape)
     for place in places_of(layout):
         if place.kind in ("torque sensor", "angle sensor"):
-            yield SensorMoved(place, place.roles["reading"][0])
-        yield from (Came(s) for s in sources_at(layout, place) if _takes_part(s))
+            yield Claim(_gain(place), later, given=True)
+        for source in sources_at(layout, place):
+            if _takes_part(source):
+                yield Claim(source, later, given=True)
+                yield Claim(source, earlier, given=True)
+
+
+def _moved(layout: Layout, equation: str, term: Term, amplitude: int, column: int | None) -> Moved:
+    own = next(p for p in places_of(layout) if p.name == equation)
+    enters = tuple(replace(e, gain=float(term.sign)) for e in own.enters if e.equation == equation)
+    place = replace(own, name=f"terms of {equation}", enters=enters)
+    effect = term.effect
+    return Moved(
+        place,
+        effect,
+        tuple((role, term.channels[role]) for role in effect.roles),
+        tuple(term.numbers(effect.shape)),
+        (amplitude,),
+        key=f"{effect.id} {effect.amplitudes[amplitude].name} of {equation}",
+        column=column,
+    )
+
+
+def _gain(place: Place) -> Moved:
+    reading = (("reading", place.roles["reading"][0]),)
+    return Moved(place, SensorGain(), reading, (), (0,), key=f"gain of {place.name}")
 
 
 def _takes_part(source: Source) -> bool:
@@ -134,14 +108,3 @@ def _takes_part(source: Source) -> bool:
         if parameter.name == "width"
     ]
     return not clocks and not source.effect.id.startswith("change.") and 0.0 not in widths
-
-
-def columns_of(candidate: Candidate, layout: Layout) -> Sequence[Columns] | None:
-    """Return a candidate's columns in every run; None where one is not finite."""
-    out = []
-    for run in layout.runs:
-        columns = candidate.columns(run, layout)
-        if columns is None:
-            return None
-        out.append(columns)
-    return out

@@ -4,22 +4,41 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
+from estimation.causes.candidates import Claim, Group, laid_out, pool_of, skews, with_skews
 from estimation.causes.equations import Layout, lay_out
-from estimation.changes.candidates import Came, SensorMoved
-from estimation.changes.regression import Regression, solved
-from estimation.changes.search import SURE, Gained, Step, impossible, laid_out, search
+from estimation.causes.folds import Folds, folds_of
+from estimation.causes.instruments import add_instruments
+from estimation.causes.joint import Joint
+from estimation.causes.numbers import Numbers
+from estimation.causes.search import (
+    Ranking,
+    Scored,
+    assessed,
+    best_of_each,
+    hypothesis,
+    probabilities,
+)
+from estimation.causes.sources import Source
+from estimation.changes.candidates import Moved, SensorGain, claims
+from estimation.channels import unit_of
 from estimation.errors import EstimationError
+from estimation.fit_problem import OFFSET
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
+from estimation.units import evaluate
 
-SCHEMA = "rig.diff/1"
+SCHEMA = "rig.diff/2"
 
 LEAST_RUNS = 4
-"""Runs of each campaign: of fewer, 5 % of the choices of runs are less than one."""
+"""Runs of each campaign: of fewer, a change and a difference between runs are alike."""
 
-IN_SET = 0.95
-"""Share that a set of names covers."""
+SURE, IN_SET = 0.9, 0.95
+"""Probability from which a single name is given, and that a set of names covers."""
+
+REPLICATES = 200
+"""Resampled sets of runs, for intervals."""
 
 A, B, ON = "A:", "B:", "C:"
 
@@ -39,9 +58,7 @@ class Change:
         equation: Equation it is reported under.
         family: The effect.
         alternatives: Other names that explain it about as well.
-        confidence: Weight of this name among all that explain about as much, over resampled sets of
-            runs.
-        p: Probability of a change this large where nothing changed, over all candidates.
+        confidence: Probability of this name next to the other changes, that of no change included.
         parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
         ci95: Parameter to the 95 % interval of that, over runs.
         unit: Parameter to its unit.
@@ -54,7 +71,6 @@ class Change:
     family: str
     alternatives: tuple[str, ...]
     confidence: float
-    p: float
     parameters: Mapping[str, float]
     ci95: Mapping[str, tuple[float, float]]
     unit: Mapping[str, str]
@@ -132,16 +148,31 @@ def compare(
     named = [*_named(a, A), *_named(b, B)]
     train = [r.name for r in named]
     layout = lay_out(models, [*named, *_named(on, ON)], train)
+    add_instruments(layout, train)
     fitted = layout.select(train)
-    is_b = np.array([float(run.name.startswith(B)) for run in fitted.runs])
-    conditions = {r.name: _stratum(r) for r in named}
-    regression = Regression(fitted)
-    steps = search(regression, is_b, [conditions[run.name] for run in fitted.runs], seed)
+    is_b = [run.name.startswith(B) for run in fitted.runs]
+    plain = Joint(fitted)
+    late = skews(plain)
+    joint = with_skews(plain, late)
+    pool = pool_of(joint, claims(fitted, is_b))
+    with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
+        ranking = Ranking(joint, pool, folds_of(fitted), _ranked)
+        first = ranking.next_to([])
+        causes, ranked = list[Scored](), list[Sequence[Scored]]()
+        if first and first[0].score > 0.0:
+            causes, ranked = hypothesis(ranking, first[:1])
+    prior = _prior(pool, joint.numbers)
+    random = np.random.default_rng(seed)
+    found = [
+        _change(one, _shares(names, prior, joint.numbers), joint, causes, random)
+        for one, names in zip(causes, ranked, strict=True)
+    ]
+    changes = {change.name: change for change in reversed(found)}
     return Difference(
-        changes=tuple(_change(step, fitted, is_b) for step in steps),
+        changes=tuple(reversed(changes.values())),
         runs={"a": tuple(r.name for r in a), "b": tuple(r.name for r in b)},
-        predicted=_predicted(layout, steps) if on else {},
-        notes=(*_notes(conditions), *_not_identified(regression, is_b)),
+        predicted=_predicted(layout, late, causes) if on else {},
+        notes=tuple(_notes({r.name: _stratum(r) for r in named})),
         seed=seed,
     )
 
@@ -165,111 +196,147 @@ def _notes(conditions: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _not_identified(regression: Regression, is_b: FloatArray) -> list[str]:
-    return [
-        f"Changes of the equation {equation} are not judged: its {parameter} comes out beyond its"
-        " bounds, so its parameters are not identifiable from these runs."
-        for equation, parameter in impossible(regression, is_b).items()
-    ]
+def _ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    return best_of_each(assessed(joint, pool, folds))
 
 
-def _change(step: Step, layout: Layout, is_b: FloatArray) -> Change:
-    best, candidate = step.best, step.best.candidate
-    confidence = step.shares.get(best.family, 0.0)
-    covered, others = confidence, []
-    for name, share in step.shares.items():
-        if name != best.family and covered < IN_SET:
-            others.append(name)
+def _source(one: Scored) -> Source:
+    cause = one.candidate.cause
+    assert isinstance(cause, Source)  # noqa: S101 - no candidate here has an unknown form
+    return cause
+
+
+def _key(one: Scored) -> str:
+    """Return the name of a change in a report."""
+    source = _source(one)
+    return source.key if isinstance(source, Moved) else f"{source.family} at {source.place.name}"
+
+
+def _prior(pool: Sequence[Group], numbers: Numbers) -> float:
+    """Return the score by which a moved parameter is likelier than an effect that came or went.
+
+    Either kind of change is as likely; the names of one kind share its probability.
+    """
+    names: dict[bool, set[tuple[str, str]]] = {True: set(), False: set()}
+    for group in pool:
+        for one in group.candidates:
+            names[isinstance(one.cause, Moved)].add((one.cause.place.name, one.cause.family))
+    return float(np.log(max(1, len(names[False])) / max(1, len(names[True]))) / numbers.sharpness)
+
+
+def _shares(ranked: Sequence[Scored], prior: float, numbers: Numbers) -> dict[str, float]:
+    """Return the probability of each name, the likeliest first."""
+    more = [prior if isinstance(_source(one), Moved) else 0.0 for one in ranked]
+    scores, gains = np.array([(s.score + m, s.gain) for s, m in zip(ranked, more, strict=True)]).T
+    shares = probabilities(scores, gains, numbers.sharpness)
+    found = {_key(one): float(p) for one, p in zip(ranked, shares, strict=True)}
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+
+def _change(
+    one: Scored,
+    shares: Mapping[str, float],
+    joint: Joint,
+    causes: Sequence[Scored],
+    random: np.random.Generator,
+) -> Change:
+    name = _key(one)
+    covered, others = shares[name], list[str]()
+    for other, share in shares.items():
+        if other != name and covered < (IN_SET if others else SURE) * sum(shares.values()):
+            others.append(other)
             covered += share
-    verdict = "moved"
-    if isinstance(candidate, Came):
-        verdict = "came" if best.in_b else "went"
-    if confidence < SURE:
-        verdict = "one_of"
-    sizes = _sizes(best, step.spread, layout)
+    source, acts = _source(one), one.candidate.acts
+    assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
+    verdict = "moved" if isinstance(source, Moved) else ("came" if acts[-1] else "went")
+    grown, labels = _grown(one, joint, causes), _labels(source, joint.layout)
+    base = grown.fitted_on(np.ones(len(grown.runs)))
+    low, high = np.percentile(_spread(one, grown, random), [2.5, 97.5], axis=0)
+    values = base[-len(labels) :] / one.candidate.size[: len(labels)]
+    before: float | None = None
+    if isinstance(source, Moved):
+        is_gain = isinstance(source.effect, SensorGain)
+        # an offset of all runs and one of some are laid out without what they share
+        shared = float(values[0] * np.mean(acts)) if source.effect.id == OFFSET else 0.0
+        before = (
+            1.0 if is_gain else grown.parameter(base, source.place.home, source.column) - shared
+        )
     return Change(
-        verdict=verdict,
-        name=best.family,
-        equation=candidate.equation,
-        family=candidate.family,
+        verdict=verdict if shares[name] >= SURE else "one_of",
+        name=name,
+        equation=source.place.home,
+        family=source.effect.id if isinstance(source, Moved) else source.family,
         alternatives=tuple(others),
-        confidence=round(confidence, 4),
-        p=step.p,
-        parameters={name: value for name, (value, _, _) in sizes.items()},
-        ci95={name: ends for name, (_, ends, _) in sizes.items()},
-        unit={name: unit for name, (_, _, unit) in sizes.items()},
-        before={name: _before(best, layout, is_b) for name in sizes},
+        confidence=round(shares[name], 4),
+        parameters={label: float(v) for (label, _), v in zip(labels, values, strict=True)},
+        ci95={
+            label: (min(float(a), float(v)), max(float(b), float(v)))
+            for (label, _), a, b, v in zip(labels, low, high, values, strict=True)
+        },
+        unit=dict(labels),
+        before={label: before for label, _ in labels},
     )
 
 
-def _sizes(
-    best: Gained, spread: FloatArray, layout: Layout
-) -> dict[str, tuple[float, tuple[float, float], str]]:
-    """Return each parameter's change, its interval and its unit."""
-    candidate = best.candidate
-    if isinstance(candidate, Came):
-        source = candidate.source
-        equation = layout.equations[source.place.home]
-        names = [source.effect.amplitudes[k] for k in source.parts]
-        channels = dict(source.channels)
-        known = {role: channels[role] for role in source.effect.roles}
-        labels = [(n.name, _unit(n.unit, equation.target, known)) for n in names]
-    else:
-        labels = [(candidate.parameter, candidate.unit)]
-    ends = np.percentile(spread, [2.5, 97.5], axis=0) if len(spread) else np.full((2, 9), np.nan)
-    out = {}
-    for k, (name, unit) in enumerate(labels):
-        value = float(best.amplitudes[k])
-        low, high = float(ends[0, k]), float(ends[1, k])
-        out[name] = (value, (min(low, value), max(high, value)), unit)
-    return out
+def _grown(one: Scored, joint: Joint, causes: Sequence[Scored]) -> Joint:
+    """Return the regression with all changes in its base, this one last."""
+    for cause in (*(c for c in causes if c is not one), one):
+        joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
+    return joint
 
 
-def _unit(expression: str, target: str, channels: Mapping[str, str]) -> str:
-    from estimation.channels import unit_of
-    from estimation.units import evaluate
-
-    symbols = {"target": unit_of(target)} | {r: unit_of(n) for r, n in channels.items()}
-    return evaluate(expression, symbols)
-
-
-def _before(best: Gained, layout: Layout, is_b: FloatArray) -> float | None:
-    """Return a moved parameter's value in A; None of an effect, 1 of a sensor's gain."""
-    candidate = best.candidate
-    if isinstance(candidate, Came):
-        return None
-    if isinstance(candidate, SensorMoved):
-        return 1.0
-    regression = Regression(layout)
-    laid = laid_out(candidate, regression)
-    assert laid is not None  # noqa: S101  a declared column is finite
-    parameters = solved(regression.grown(laid, is_b).gram())
-    column = regression.declared_column(candidate.equation, candidate.column)
-    return float(parameters[column])
+def _spread(one: Scored, grown: Joint, random: np.random.Generator) -> FloatArray:
+    """Return a change's amplitudes, SI, in resampled sets of the runs of each campaign."""
+    size = one.candidate.size
+    sides = [np.flatnonzero(np.array(one.candidate.acts) == side) for side in (True, False)]
+    spread = []
+    for _ in range(REPLICATES):
+        counts = np.zeros(len(grown.runs))
+        for side in sides:
+            np.add.at(counts, random.choice(side, len(side)), 1.0)
+        spread.append(grown.fitted_on(counts)[-len(size) :] / size)
+    return np.array(spread)
 
 
-def _predicted(layout: Layout, steps: Sequence[Step]) -> dict[str, Predicted]:
+def _labels(source: Source, layout: Layout) -> list[tuple[str, str]]:
+    """Return name and unit of each amplitude."""
+    target = layout.equations[source.place.home].target
+    symbols = {"target": unit_of(target)} | {r: unit_of(n) for r, n in source.channels}
+    chosen = [source.effect.amplitudes[k] for k in source.parts]
+    return [(one.name, evaluate(one.unit, symbols)) for one in chosen]
+
+
+def _predicted(
+    layout: Layout, late: Sequence[Claim], causes: Sequence[Scored]
+) -> dict[str, Predicted]:
     """Return the errors on the third campaign's runs, by four models."""
     names = [run.name for run in layout.runs]
     of = {p: np.array([float(n.startswith(p)) for n in names]) for p in (A, B, ON)}
-    plain = Regression(layout)
-    alone = {p: solved(plain.gram(of[p])) for p in (A, B)}
-    grown = dict.fromkeys((A, B), plain)
-    for step in steps:
-        laid = laid_out(step.best.candidate, plain)
-        assert laid is not None  # noqa: S101  it was laid out in the search
-        side = of[B] if step.best.in_b else of[A]
-        for taken_as in (A, B):
-            acts = side + of[ON] * float((taken_as == B) == step.best.in_b)
-            grown[taken_as] = grown[taken_as].grown(laid, acts)
-    both = {p: solved(grown[p].gram(of[A] + of[B])) for p in (A, B)}
+    plain = with_skews(Joint(layout), late)
+    errors = [_rms(plain, plain.fitted_on(of[side]), of[ON]) for side in (A, B)]
+    for taken_as in (A, B):
+        grown = plain
+        for one in causes:
+            later = bool((one.candidate.acts or ())[-1])
+            own = {A: not later, B: later, ON: (taken_as == B) == later}
+            acts = tuple(own[name[:2]] for name in names)
+            laid = laid_out(plain, replace(Claim(one.candidate.cause), acts=acts, given=True))
+            if laid is not None:
+                grown = grown.with_cause(laid.laid, laid.precision)
+        errors.append(_rms(grown, grown.fitted_on(of[A] + of[B]), of[ON]))
     out = {}
-    for equation, declared in layout.equations.items():
-        out[equation] = Predicted(
-            with_a=plain.rms(equation, alone[A], of[ON]),
-            with_b=plain.rms(equation, alone[B], of[ON]),
-            as_a=grown[A].rms(equation, both[A], of[ON]),
-            as_b=grown[B].rms(equation, both[B], of[ON]),
-            unit=declared.model.unit,
-        )
+    for name, equation in layout.equations.items():
+        with_a, with_b, as_a, as_b = (found[name] for found in errors)
+        out[name] = Predicted(with_a, with_b, as_a, as_b, equation.model.unit)
+    return out
+
+
+def _rms(joint: Joint, base: FloatArray, counts: FloatArray) -> dict[str, float]:
+    """Return the root mean square error of each equation within some runs."""
+    vector = np.append(base, -1.0)
+    out = {}
+    for name in joint.layout.equations:
+        p = (name, "within")
+        squared = np.einsum("i,rij,j->r", vector, joint.gram[p], vector)
+        out[name] = float(np.sqrt(max(squared @ counts, 0.0) / (joint.samples[p] @ counts)))
     return out

@@ -47,6 +47,20 @@ class Parameter:
         return np.geomspace(self.lower, self.upper, self.points)
 
 
+LOSS: Mapping[str, int] = {
+    "motor": -1,
+    "gearbox": -1,
+    "cable": 1,
+    "stretch": -1,
+    "grasp": -1,
+    "joint": 1,
+}
+"""Equations in which friction takes from the motion, with its side in each."""
+
+READING: Mapping[str, int] = dict.fromkeys(LOSS, 1)
+"""The same equations, with the side of what a sensor adds to the target it measures."""
+
+
 class Effect(ABC):
     """One physical effect. The catalogue finds every subclass in a file of this package.
 

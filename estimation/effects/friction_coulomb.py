@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Effect, Parameter
+from estimation.effects.effect import LOSS, Effect, Parameter
 from estimation.recording import FloatArray
 
 
@@ -22,14 +22,7 @@ class CoulombFriction(Effect):
     """
 
     id = "friction.coulomb"
-    balances: ClassVar = {
-        "motor": -1,
-        "gearbox": -1,
-        "cable": 1,
-        "stretch": -1,
-        "grasp": -1,
-        "joint": 1,
-    }
+    balances = LOSS
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)

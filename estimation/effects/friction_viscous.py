@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter, Proportional
+from estimation.effects.effect import LOSS, Parameter, Proportional
 
 
 class ViscousFriction(Proportional):
@@ -17,14 +17,7 @@ class ViscousFriction(Proportional):
     """
 
     id = "friction.viscous"
-    balances: ClassVar = {
-        "motor": -1,
-        "gearbox": -1,
-        "cable": 1,
-        "stretch": -1,
-        "grasp": -1,
-        "joint": 1,
-    }
+    balances = LOSS
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("damping", "target / speed", "loss per unit of speed", lower=0.0),)
     told_apart_by = "a staircase of constant speeds in both directions"

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import LOSS, Parameter, Remembering
 from estimation.recording import FloatArray
 
 
@@ -34,14 +34,7 @@ class Presliding(Remembering):
     """
 
     id = "hysteresis.presliding"
-    balances: ClassVar = {
-        "motor": -1,
-        "gearbox": -1,
-        "cable": 1,
-        "stretch": -1,
-        "grasp": -1,
-        "joint": 1,
-    }
+    balances = LOSS
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (Parameter("friction", "target", "loss in sliding", lower=0.0),)
     shape = (Parameter("reach", "travel", "travel to reach 63 %", 1e-3, 1e1),)

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numba
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import LOSS, Parameter, Remembering
 from estimation.recording import FloatArray
 
 SPREAD = (1.0, 3.0, 9.0)
@@ -36,14 +36,7 @@ class MaxwellSlip(Remembering):
 
     id = "hysteresis.presliding.maxwell"
     family = "hysteresis.presliding"
-    balances: ClassVar = {
-        "motor": -1,
-        "gearbox": -1,
-        "cable": 1,
-        "stretch": -1,
-        "grasp": -1,
-        "joint": 1,
-    }
+    balances = LOSS
     roles: ClassVar = {"travel": "spindle_angle_rad"}
     amplitudes = (
         Parameter("short", "target", "loss of the contact that slides first", lower=0.0),

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import READING, Parameter, Remembering
 from estimation.effects.first_order import AT_REST, behind
 
 
@@ -22,14 +22,7 @@ class SensorLag(Remembering):
     """
 
     id = "sensor.lag"
-    balances: ClassVar = {
-        "motor": 1,
-        "gearbox": 1,
-        "cable": 1,
-        "stretch": 1,
-        "grasp": 1,
-        "joint": 1,
-    }
+    balances = READING
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
     # a late reading has the weight of the reading: 1 for the target, at most 1.5 on the rig
     amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)

@@ -14,12 +14,13 @@ from estimation.bank.interval import COVERAGE, Interval
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
-from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.derived import zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.left_out_runs import INNER_FOLDS, interval_of
 from estimation.estimators.origin import Origin
 from estimation.estimators.run_evidence import RunEvidence
 from estimation.filters import PAPER, LowPass
+from estimation.live_channels import CausalChannels, causal_channels
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
 from estimation.recording import FloatArray, Recording, read_only
 

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
-from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.derived import zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.origin import Origin
 from estimation.filters import PAPER, LowPass
+from estimation.live_channels import CausalChannels, causal_channels
 from estimation.networks import network as files
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, train

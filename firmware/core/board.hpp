@@ -325,14 +325,14 @@ class Board {
         if (!session_.attempt(session)) return kWrongSession;
         if (first_.code != kNoTrip || stopped_) return kTripped;
         if (armed()) return kAlreadyArmed;
-        if ((status_ & kReferenced) == 0) return kNotReferenced;
+        if ((status_ & kReferenced) == 0 && !asked_.seeks()) return kNotReferenced;
         if (fault != kOk) return fault;
         if (profile_.too_hot(asked_)) return kTooHot;
         release();
         profile_.begin(asked_);
         session_.begin(session, sequence);
         watchdog_.heard();
-        status_ = kArmed | kReferenced;
+        status_ = static_cast<std::uint16_t>(asked_.seeks() ? kArmed : kArmed | kReferenced);
         return kOk;
     }
 

@@ -148,6 +148,7 @@ struct ChoiceFields {
     std::int32_t safe_state = 0;
     std::int32_t hold_command_e4 = 0;
     std::int32_t hold_ticks = 0;
+    std::int32_t seek = 0;
 
     // Gives every limit of both, and its sense, to `visit`, in the order of the wire.
     template <class One, class Other, class Visit>
@@ -160,6 +161,7 @@ struct ChoiceFields {
         visit(one.safe_state, other.safe_state, Sense::kFree);
         visit(one.hold_command_e4, other.hold_command_e4, Sense::kMost);
         visit(one.hold_ticks, other.hold_ticks, Sense::kTicks);
+        visit(one.seek, other.seek, Sense::kFree);
     }
 };
 
@@ -273,7 +275,7 @@ constexpr char kContract[] =
     "max_twist i4, max_stretch i4, max_spindle_jump i4, max_jaw_jump i4, torque_e3 i4, "
     "max_still_torque i4, max_still_change i4, max_still_rise i4, jaw_zero i4, max_beyond "
     "i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, dry_ticks i4, watchdog_us "
-    "i4, safe_state i4, hold_command_e4 i4, hold_ticks i4\n"
+    "i4, safe_state i4, hold_command_e4 i4, hold_ticks i4, seek i4\n"
     "18 START: version u1, kind u1, sequence u2\n"
     "19 SETPOINTS: version u1, kind u1, sequence u2, session u4, 100 x (target i4, "
     "load_ma i2)\n"
@@ -294,7 +296,7 @@ constexpr char kContract[] =
     "6 WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST, 9 WRONG_SESSION, 10 OLD_SEQUENCE, "
     "11 TRIPPED, 12 WRONG_TRIP, 13 ALREADY_ARMED, 14 TOO_HOT, 15 BEYOND_BOARD, 16 "
     "TOO_FAST\n";
-constexpr std::size_t kArmSize = 232;  // behind the session
+constexpr std::size_t kArmSize = 236;  // behind the session
 constexpr std::size_t kSetpointSize = 6;
 constexpr std::size_t kMaxSetpoints = 100;
 constexpr std::int64_t kTickUs = 1000;
@@ -335,7 +337,7 @@ constexpr char kContract[] =
     "full_scale_current_3 i4, current_offset_3 i4, max_current_error_3 i4, "
     "current_ticks_3 i4, frozen_current_3 i4, frozen_motion_3 i4, stall_ticks i4, "
     "saturated_ticks i4, stale_ticks i4, dry_ticks i4, watchdog_us i4, safe_state i4, "
-    "hold_command_e4 i4, hold_ticks i4\n"
+    "hold_command_e4 i4, hold_ticks i4, seek i4\n"
     "18 START: version u1, kind u1, sequence u2\n"
     "19 SETPOINTS: version u1, kind u1, sequence u2, session u4, 50 x (target_1 i4, "
     "target_2 i4, target_3 i4)\n"
@@ -356,7 +358,7 @@ constexpr char kContract[] =
     "6 WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST, 9 WRONG_SESSION, 10 OLD_SEQUENCE, "
     "11 TRIPPED, 12 WRONG_TRIP, 13 ALREADY_ARMED, 14 TOO_HOT, 15 BEYOND_BOARD, 16 "
     "TOO_FAST\n";
-constexpr std::size_t kArmSize = 380;  // behind the session
+constexpr std::size_t kArmSize = 384;  // behind the session
 constexpr std::size_t kSetpointSize = 12;
 constexpr std::size_t kMaxSetpoints = 50;
 constexpr std::int64_t kTickUs = 500;

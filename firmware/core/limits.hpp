@@ -57,7 +57,7 @@ inline bool choice_is_valid(const ChoiceFields& choice) {
     return sizes_are_valid(choice) && kMinWatchdogUs <= choice.watchdog_us &&
            choice.watchdog_us <= kMaxWatchdogUs &&
            (choice.safe_state == 0 || choice.safe_state == kHold) &&
-           choice.hold_command_e4 <= 10000;
+           choice.hold_command_e4 <= 10000 && (choice.seek == 0 || choice.seek == 1);
 }
 
 }  // namespace rig

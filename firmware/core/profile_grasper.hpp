@@ -42,8 +42,9 @@ class GrasperProfile {
             for (AxisFields& axis : axes) rig::read(reader, axis);
             rig::read(reader, choice);
         }
+        bool seeks() const { return choice.seek != 0; }  // no grasper does
         bool valid() const {
-            bool valid = choice_is_valid(choice);
+            bool valid = choice_is_valid(choice) && !seeks();
             for (std::size_t k = 0; k < kMotors; ++k) {
                 valid = valid && gains[k].valid() && sizes_are_valid(axes[k]) &&
                         axes[k].min_motor <= axes[k].max_motor;

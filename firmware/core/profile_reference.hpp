@@ -37,8 +37,11 @@ class ReferenceProfile {
         }
         bool valid() const {
             return gains.valid() && sizes_are_valid(limits) && choice_is_valid(limits.choice) &&
-                   limits.min_spindle <= limits.max_spindle && limits.min_jaw <= limits.max_jaw;
+                   limits.min_spindle <= limits.max_spindle && limits.min_jaw <= limits.max_jaw &&
+                   (!seeks() || gains.limit <= limits.choice.hold_command_e4);
         }
+        // Whether it is to find its zeros by moving gently against a stop.
+        bool seeks() const { return limits.choice.seek != 0; }
         bool within(const Settings& own) const {
             return gains.within(own.gains) && rig::within(limits, own.limits);
         }

@@ -98,6 +98,18 @@ class Plant {
     double current_ = 0;
 };
 
+// Gives every frame that a board has sent to `visit`.
+template <class Visit>
+void drain(TestBoard& board, rig::FrameReceiver& frames, Visit visit) {
+    std::uint8_t bytes[4096];
+    std::size_t count;
+    while ((count = board.transmit(bytes, sizeof bytes)) > 0) {
+        for (std::size_t k = 0; k < count; ++k) {
+            if (frames.take(bytes[k])) visit(frames.payload(), frames.size());
+        }
+    }
+}
+
 // A board with a plant, everything a host can send it, and the rules that no host and no fault may break.
 class World {
   public:
@@ -128,7 +140,7 @@ class World {
     std::int32_t spindle() const { return seen_[kSpindle]; }
 
     // Frames.
-    Bytes header(rig::Kind kind, std::uint16_t sequence) const {
+    static Bytes header(rig::Kind kind, std::uint16_t sequence) {
         Bytes payload;
         put(payload, rig::kVersion, 1);
         put(payload, kind, 1);
@@ -141,8 +153,8 @@ class World {
         payload.insert(payload.end(), settings_.begin(), settings_.end());
         return payload;
     }
-    Bytes setpoints(std::uint16_t sequence, std::uint32_t session,
-                    const std::vector<std::int32_t>& targets, int load_ma) const {
+    static Bytes setpoints(std::uint16_t sequence, std::uint32_t session,
+                           const std::vector<std::int32_t>& targets, int load_ma) {
         Bytes payload = header(rig::kSetpoints, sequence);
         put(payload, session, 4);
         for (std::int32_t target : targets) {
@@ -151,7 +163,7 @@ class World {
         }
         return payload;
     }
-    Bytes ping(std::uint16_t sequence, std::uint32_t session) const {
+    static Bytes ping(std::uint16_t sequence, std::uint32_t session) {
         Bytes payload = header(rig::kPing, sequence);
         put(payload, session, 4);
         put(payload, 0, 8);
@@ -305,13 +317,7 @@ class World {
 
     // Reads what the board sent: its state, its offers and the targets it follows.
     void answers() {
-        std::uint8_t bytes[4096];
-        std::size_t count;
-        while ((count = board_.transmit(bytes, sizeof bytes)) > 0) {
-            for (std::size_t k = 0; k < count; ++k) {
-                if (from_board_.take(bytes[k])) read(from_board_.payload(), from_board_.size());
-            }
-        }
+        drain(board_, from_board_, [this](const std::uint8_t* payload, std::size_t size) { read(payload, size); });
     }
     void read(const std::uint8_t* payload, std::size_t size) {
         rig::Reader reader(payload + rig::kHeaderSize);

@@ -10,9 +10,11 @@
 
 #include "../core/profile_grasper.hpp"
 #include "../proofs/world.hpp"
+#include "app_test.hpp"
 #include "guards_test.hpp"
 
 using proofs::Bytes;
+using proofs::World;
 
 TEST_CASE("published check values") {
     const std::uint8_t digits[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
@@ -82,58 +84,44 @@ class Desk {
   public:
     explicit Desk(const rig::ReferenceFields& limits) {
         board.booted(1, true);
-        settings_.resize(rig::ReferenceProfile::kArmSize);
-        const auto number = [&](std::size_t at, std::uint64_t value, int size) {
-            for (int k = 0; k < size; ++k) settings_[at + k] = static_cast<std::uint8_t>(value >> 8 * k);
-        };
-        const double full = 10000;
-        std::uint64_t bits;
-        std::memcpy(&bits, &full, sizeof bits);
-        number(4 * 8, bits, 8);
-        std::size_t at = 5 * 8;
+        const double gains[5] = {0, 0, 0, 0, 10000};
+        for (double gain : gains) {
+            std::uint64_t bits;
+            std::memcpy(&bits, &gain, sizeof bits);
+            proofs::put(settings_, bits, 8);
+        }
         rig::ReferenceFields::each(limits, limits, [&](std::int32_t limit, std::int32_t, rig::Sense) {
-            number(at, static_cast<std::uint32_t>(limit), 4);
-            at += 4;
+            proofs::put(settings_, static_cast<std::uint32_t>(limit), 4);
         });
         send(rig::kHello, {});
         send(rig::kStart, {});
     }
 
-    rig::Board<rig::ReferenceProfile, 4096> board{"DESK"};
+    proofs::TestBoard board{"DESK"};
     rig::ReferenceProfile::Inputs inputs;
     Bytes answer;  // the newest
     Bytes sample;  // the newest
     int samples = 0;
 
     void send(rig::Kind kind, const Bytes& body) {
-        Bytes payload = {rig::kVersion, static_cast<std::uint8_t>(kind), ++number_, 0};
+        Bytes payload = World::header(kind, ++number_);
         payload.insert(payload.end(), body.begin(), body.end());
-        const Bytes wire = proofs::wire_of(payload);
-        board.receive<rig::NoLock>(wire.data(), wire.size());
-        take();
-        if (kind == rig::kHello) session_ = Bytes(answer.end() - 4, answer.end());
+        send(payload);
+        if (kind == rig::kHello) session_ = rig::Reader(&*(answer.end() - 4)).u32();
     }
     rig::Result result() const { return static_cast<rig::Result>(answer[5]); }
     void arm() {
         send(rig::kHello, {});
-        Bytes body = session_;
+        Bytes body;
+        proofs::put(body, session_, 4);
         body.insert(body.end(), settings_.begin(), settings_.end());
         send(rig::kArm, body);
     }
     // A block of setpoints: targets, no load.
     void setpoints(const std::vector<std::int32_t>& targets) {
-        Bytes body = session_;
-        for (std::int32_t target : targets) {
-            proofs::put(body, static_cast<std::uint32_t>(target), 4);
-            proofs::put(body, 0, 2);
-        }
-        send(rig::kSetpoints, body);
+        send(World::setpoints(++number_, session_, targets, 0));
     }
-    void ping() {
-        Bytes body = session_;
-        proofs::put(body, 0, 8);
-        send(rig::kPing, body);
-    }
+    void ping() { send(World::ping(++number_, session_)); }
     void run(int ticks) {
         for (int k = 0; k < ticks; ++k) {
             now_us_ += 1000;
@@ -144,24 +132,24 @@ class Desk {
     }
 
   private:
+    void send(const Bytes& payload) {
+        const Bytes wire = proofs::wire_of(payload);
+        board.receive<rig::NoLock>(wire.data(), wire.size());
+        take();
+    }
     void take() {
-        std::uint8_t bytes[4096];
-        std::size_t count;
-        while ((count = board.transmit(bytes, sizeof bytes)) > 0) {
-            for (std::size_t k = 0; k < count; ++k) {
-                if (!frames_.take(bytes[k])) continue;
-                const Bytes payload(frames_.payload(), frames_.payload() + frames_.size());
-                const bool is_sample = payload[1] == rig::kSample;
-                samples += is_sample;
-                (is_sample ? sample : answer) = payload;
-            }
-        }
+        proofs::drain(board, frames_, [this](const std::uint8_t* payload, std::size_t size) {
+            const bool is_sample = payload[1] == rig::kSample;
+            samples += is_sample;
+            (is_sample ? sample : answer).assign(payload, payload + size);
+        });
     }
 
     rig::FrameReceiver frames_;
-    Bytes settings_, session_;
+    Bytes settings_;
+    std::uint32_t session_ = 0;
     std::uint32_t now_us_ = 0;
-    std::uint8_t number_ = 0;
+    std::uint16_t number_ = 0;
 };
 
 rig::ReferenceFields widest() {

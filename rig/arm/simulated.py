@@ -97,7 +97,8 @@ def draw_arm(rng: np.random.Generator, family: str = OWN) -> SimulatedArm:
     """Draw an arm, whose hidden torque is of a family of `rig.arm.hidden`."""
     values = np.array([_plausible(name) for name in names(PSM)])
     values = values * np.exp(SEED_SPREAD * rng.normal(size=len(values)))
-    reach = np.array([joint.upper - joint.lower for joint in PSM.joints])
+    lower, upper, _ = PSM.limits
+    reach = upper - lower
     motion = smooth_motion(rng, 20.0, top_hz=0.5, share=1.0)
     declared = np.std(regressor(PSM, motion) @ values, axis=0)
     scale = HIDDEN_SHARE * declared
@@ -171,10 +172,7 @@ def _fourier(
     frequencies_hz: FloatArray,
     share: float | FloatArray = 1.0,
 ) -> Motion:
-    lower, upper, speed = (
-        np.array([getattr(joint, name) for joint in PSM.joints])
-        for name in ("lower", "upper", "speed")
-    )
+    lower, upper, speed = PSM.limits
     pulse = 2 * np.pi * frequencies_hz
     size = rng.normal(size=(len(pulse), 6)) / np.sqrt(frequencies_hz)[:, None]
     phase = np.outer(time, pulse)[:, :, None] + rng.uniform(0, 2 * np.pi, (len(pulse), 6))

@@ -5,6 +5,7 @@ trajectory. Whatever ends the session (the end, an error, Ctrl-C, SIGTERM, a los
 logger is disarmed first, and the disarming is confirmed by the logger itself.
 """
 
+import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -259,6 +260,9 @@ class Session:
         if self._watch is not None:
             self.safe()  # the motion before this one is over
         gains = self.machine.gains(self.config)
+        if is_real_time(self.config):
+            gc.collect()
+            gc.freeze()  # collecting all that was imported takes longer than a board waits
         self._arm(gains, board)
         self._watch = HostWatch(gains, board, self.machine)
         queued = played = 0
@@ -408,5 +412,6 @@ class Session:
 
     def _close(self) -> None:
         """Let go of the link; whether the rig was disarmed has been settled before."""
+        gc.unfreeze()
         with suppress(DriverError):
             self._logger.close()

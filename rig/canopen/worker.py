@@ -6,6 +6,7 @@ Bytes of the logger's protocol go to and fro over the socket FD; a line of JSON 
 reports that it is ready, and each error.
 """
 
+import gc
 import json
 import signal
 import socket
@@ -41,6 +42,8 @@ def main() -> int:
     try:
         with _opened(config) as logger:
             logger.run(PERIOD_S)  # what is compiled the first time is compiled before anybody waits
+            gc.collect()
+            gc.freeze()  # a full collection of all that was imported would be a late SYNC
             _say({"ready": True})
             _serve(logger, host)
     except DriverError as error:

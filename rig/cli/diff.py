@@ -31,8 +31,7 @@ def diff(
     """Find what changed between two campaigns of one machine, with intervals over runs.
 
     Two dates, two instruments, before and after a repair: which declared parameters moved, which
-    effects came or went. A change is stated where the best candidate explains more than in 95 % of
-    random choices of runs.
+    effects came or went. A change is stated where it predicts runs left out better than none does.
     """
     from rig.diagnosis.compared import compared
     from rig.diagnosis.subject import subject

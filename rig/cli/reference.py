@@ -1,5 +1,6 @@
 """`rig reference`: give the encoders of a restarted board their zeros."""
 
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -11,6 +12,19 @@ AtOption = Annotated[
     list[float] | None,
     typer.Option("--at", help="Angle of the mark, rad; once for each setpoint. If none: 0."),
 ]
+
+
+class Stop(StrEnum):
+    """A mechanical stop of the spindle."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+
+
+StopOption = Annotated[
+    Stop | None,
+    typer.Option(help="Drive gently against this stop first; --at is where it stands then."),
+]
 YesFlag = Annotated[bool, typer.Option("--yes", help="The rig stands at its mark; do not ask.")]
 
 
@@ -18,12 +32,14 @@ def reference(
     config: ConfigOption = None,
     sim: SimFlag = False,
     at: AtOption = None,
+    hard_stop: StopOption = None,
     yes: YesFlag = False,
     json: JsonFlag = False,
 ) -> int:
     """Give the encoders their zeros, after every restart of the board.
 
     Turn the rig by hand to its mark first. The board refuses while it is armed or a shaft turns.
+    With --hard-stop the motor turns it, with no more than the command that holds: keep clear.
     """
     from rig.bench.referencing import reference_board, require_place
     from rig.machines.choose import machine_of
@@ -33,9 +49,19 @@ def reference(
     here_rad = at or [0.0] * len(names)
     require_place(settings, here_rad)
     place = ", ".join(f"{name} = {angle:g}" for name, angle in zip(names, here_rad, strict=True))
+    if hard_stop is not None:
+        from rig.bench.hard_stop import drive_to_stop
+
+        if not yes:
+            typer.confirm("The motor will turn. Is the jaw empty and clear?", abort=True, err=True)
+        turned_rad = drive_to_stop(settings, hard_stop is Stop.CLOSED)
+        results(json).print(
+            f"It turned {turned_rad:+.3f} rad to the {hard_stop} stop.", markup=False
+        )
     if not yes:
+        how = "The motor is off" if hard_stop else "Turn the rig by hand to it and let go"
         typer.confirm(
-            f"Turn the rig by hand to {place} and let go. Does it stand there?",
+            f"The place is {place}. {how}. Does it stand there?",
             abort=True,
             err=True,
         )

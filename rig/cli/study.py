@@ -1,7 +1,7 @@
 """`rig study`: make a paper's results again."""
 
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +13,11 @@ from rig.cli.study_machines import machine_studies
 from rig.output.console import JsonFlag, emit_json, progress, results, show_result
 
 if TYPE_CHECKING:
+    from estimation.campaign import Campaign
     from rig.studies.oneill.kinds import KindRow
-    from rig.studies.oneill.networks import NetworkStudy
+    from rig.studies.oneill.networks import NetworkStudy, Training
+    from rig.studies.oneill.source import Source
     from rig.studies.oneill.states import StateStudy
-    from rig.studies.oneill.study import Source
 
 study_app = typer.Typer(
     name="study",
@@ -76,22 +77,27 @@ def oneill(
     """
     from rig.output.render import write_report
     from rig.studies.oneill import page as shown
-    from rig.studies.oneill.study import open_reference, run_study
+    from rig.studies.oneill.source import open_reference
+    from rig.studies.oneill.study import run_study
 
     source = _simulated(seed) if data is None else open_reference(data)
     with progress() as bar:
         task = bar.add_task("runs", total=len(source.campaign))
         result = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
+    campaign = source.campaign.exclude(result.study.left_out)
     deep = None
     if networks:
-        left_out = result.study.left_out
-        training = Training(minutes, every, workers, state)
-        deep = _train(source, left_out, data, training, seed)
+        from rig.studies.oneill.networks import Training
+
+        kept = state or Path.home() / ".cache" / "rig" / "oneill"
+        limit = float("inf") if minutes is None else minutes
+        training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
+        deep = _train(campaign, data, training)
     physical: StateStudy | None = None
     drawn: list[tuple[str, Path]] = []
     if states:
-        physical, drawn = _fit_states(source, result.study.left_out, data, seed, figures)
-    every_kind = _fit_kinds(source, result.study.left_out, seed) if kinds else ()
+        physical, drawn = _fit_states(campaign, data, seed, figures)
+    every_kind = _fit_kinds(campaign, seed) if kinds else ()
     more = shown.More(deep, physical, every_kind)
     lines = [
         *shown.lead(result.study, more),
@@ -117,46 +123,24 @@ def oneill(
         emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
 
 
-@dataclass(frozen=True)
-class Training:
-    """How long, on what and where networks are trained; see the command's options."""
-
-    minutes: float | None
-    every: int
-    workers: int
-    state: Path | None
-
-
-def _train(
-    source: "Source", left_out: dict[str, str], data: Path | None, training: Training, seed: int
-) -> "NetworkStudy":
+def _train(campaign: "Campaign", data: Path | None, training: "Training") -> "NetworkStudy":
     from rig.studies.oneill.data import network_tables
     from rig.studies.oneill.networks import run_networks
 
     with progress() as bar:
         task = bar.add_task("closing samples", total=None)
-        tables, notes = network_tables(
-            source.campaign, left_out, data, on_run=lambda name: bar.advance(task)
-        )
+        tables, notes = network_tables(campaign, data, on_run=lambda name: bar.advance(task))
         trained = bar.add_task("networks", total=None)
         return run_networks(
             tables,
-            training.state or Path.home() / ".cache" / "rig" / "oneill",
-            every=training.every,
-            seed=seed,
-            workers=training.workers,
-            minutes=float("inf") if training.minutes is None else training.minutes,
-            notes=notes,
+            training,
+            notes,
             on_network=lambda done, total: bar.update(trained, completed=done, total=total),
         )
 
 
 def _fit_states(
-    source: "Source",
-    left_out: dict[str, str],
-    data: Path | None,
-    seed: int,
-    figures: Path | None,
+    campaign: "Campaign", data: Path | None, seed: int, figures: Path | None
 ) -> tuple["StateStudy", list[tuple[str, Path]]]:
     from rig.studies.oneill.figures import write
     from rig.studies.oneill.shown import Shown
@@ -168,8 +152,7 @@ def _fit_states(
         task = bar.add_task("closing samples", total=None)
         fitted = bar.add_task("estimates from states", total=None)
         study = run_states(
-            source.campaign,
-            left_out,
+            campaign,
             data,
             seed=seed,
             on_run=lambda name: bar.advance(task),
@@ -179,14 +162,13 @@ def _fit_states(
     return study, write(figures, kept) if figures is not None else []
 
 
-def _fit_kinds(source: "Source", left_out: dict[str, str], seed: int) -> "tuple[KindRow, ...]":
+def _fit_kinds(campaign: "Campaign", seed: int) -> "tuple[KindRow, ...]":
     from rig.studies.oneill.kinds import run_kinds
 
     with progress() as bar:
         task = bar.add_task("kinds of estimators", total=None)
         return run_kinds(
-            source.campaign,
-            left_out,
+            campaign,
             seed,
             on_fit=lambda done, total: bar.update(task, completed=done, total=total),
         )
@@ -281,7 +263,7 @@ def instruments(
     from rig.importers.registry import open_campaign
     from rig.studies.instruments import page as shown
     from rig.studies.instruments.study import run_instruments
-    from rig.studies.oneill.study import part_of
+    from rig.studies.oneill.source import part_of
 
     others = other or ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
     with progress() as bar:
@@ -313,7 +295,7 @@ def intervals(
     from rig.importers.registry import open_campaign
     from rig.studies.instruments import intervals_page as shown
     from rig.studies.instruments.intervals import run_intervals
-    from rig.studies.oneill.study import part_of
+    from rig.studies.oneill.source import part_of
 
     names = instrument or ["Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
     campaigns = {name: open_campaign(part_of(data, name)) for name in names}
@@ -329,7 +311,7 @@ def intervals(
 
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
-    from rig.studies.oneill.study import Source
+    from rig.studies.oneill.source import Source
 
     return Source(
         simulate_reference_campaign(seed),

@@ -35,8 +35,8 @@ class PlausibilitySection(BaseModel):
         torque_constant_n_m_a: Torque at the spindle a motor current, at rest.
         still_torque_n_m: Largest torque of a motor at rest that the torque sensor does not find:
             its friction. Beyond it the encoders are dead.
-        still_change_n_m: Farthest the proximal torque may change while no encoder counts: less than
-            what turns the motor against the gearhead's stiffness.
+        still_change_n_m: Farthest the proximal torque may change while no encoder counts; more
+            where the gearhead is so stiff that it turns the spindle by less than two counts.
         still_rise_n_m: Farthest the motor's torque may rise, while no encoder counts, above the
             friction it overcame in its last motion.
         beyond_rad: Farthest beyond its travel limit the spindle may be as the jaw's encoder shows.

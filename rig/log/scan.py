@@ -111,14 +111,12 @@ class Skeleton:
     Schemas and channels stand at the start and in the summary: where the two differ, both are kept.
     """
 
-    profile: str = ""
     library: str = ""
     schemas: dict[int, list[Schema]] = field(default_factory=dict)
     channels: dict[int, list[Channel]] = field(default_factory=dict)
     chunks: list[ChunkRef] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
-    statistics: Statistics | None = None
     finished: bool = False
     damage: list[Damage] = field(default_factory=list)
 
@@ -281,7 +279,7 @@ def _take(
         case Indexed() if skeleton.chunks:
             skeleton.chunks[-1].indexed[record.channel] = record.messages
         case Header():
-            skeleton.profile, skeleton.library = record.profile, record.library
+            skeleton.library = record.library
         case Schema():
             _keep(skeleton, skeleton.schemas, record, position)
         case Channel():
@@ -290,8 +288,6 @@ def _take(
             skeleton.metadata.append((record.name, record.metadata))
         case Attachment():
             _take_attachment(skeleton, record, position, buffer)
-        case Statistics():
-            skeleton.statistics = record
         case DataEnd(data_section_crc=crc) if checksums and crc:
             if zlib.crc32(buffer[:position]) != crc:
                 what = "the file's data section does not match its checksum"

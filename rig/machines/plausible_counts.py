@@ -10,6 +10,9 @@ from rig.configuration.plausibility import PlausibilitySection
 JUMP_SPEEDS = 4
 """A motor's count that goes so many times its fastest way in one tick has jumped."""
 
+SEEN_COUNTS = 2
+"""Counts of the spindle that are a motion and not the edge of one count."""
+
 
 def loop_limits(
     believed: PlausibilitySection,
@@ -80,7 +83,9 @@ def pair_limits(believed: PlausibilitySection, calibrations: CalibrationSet) -> 
         made = believed.torque_constant_n_m_a * current.slope / proximal.slope
         limits["torque_e3"] = round(1e3 * made)
         limits["max_still_torque"] = round(abs(believed.still_torque_n_m / proximal.slope))
-        limits["max_still_change"] = round(abs(believed.still_change_n_m / proximal.slope))
+        seen_n_m = believed.gear_stiffness_n_m_rad * SEEN_COUNTS * abs(spindle.slope)
+        change_n_m = max(believed.still_change_n_m, seen_n_m)  # a stiff gearhead turns nothing
+        limits["max_still_change"] = round(abs(change_n_m / proximal.slope))
         limits["max_still_rise"] = round(abs(believed.still_rise_n_m / proximal.slope))
     if jaw is not None and distal is not None and believed.jaw_ratio:
         limits["jaw_per_turn"] = round(2 * math.pi * believed.jaw_ratio / jaw.slope)

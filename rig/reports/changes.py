@@ -17,7 +17,7 @@ def lines(found: Difference) -> Iterator[str]:
 
 
 def _sentence(change: Change) -> str:
-    sure = f"confidence {100 * change.confidence:.0f} %, p {change.p:.2g}"
+    sure = f"confidence {100 * change.confidence:.0f} %"
     if change.verdict == "one_of":
         others = ", ".join(change.alternatives)
         names = f"{change.name}, {others}"
@@ -49,10 +49,9 @@ def change_table(found: Difference) -> TextTable:
                     f"{value:+.4g}",
                     f"{low:+.4g} to {high:+.4g}",
                     change.unit[name],
-                    f"{change.p:.2g}",
                 )
             )
-    heads = ("change", "parameter", "in A", "A to B", "95 %", "unit", "p")
+    heads = ("change", "parameter", "in A", "A to B", "95 %", "unit")
     return TextTable("What changed", heads, rows)
 
 

@@ -100,11 +100,11 @@ def test_leave_one_condition_out_needs_the_condition_and_two_levels():
 
 
 def test_an_excluded_run_is_kept_with_its_reason_but_is_no_evidence():
-    campaign = Campaign.of([run("a"), run("b")]).exclude("b", "the cable slipped")
+    campaign = Campaign.of([run("a"), run("b")]).exclude({"b": "the cable slipped"})
     assert [r.excluded for r in campaign] == [None, "the cable slipped"]
     assert campaign.evidence.names == ("a",)
     with pytest.raises(CampaignError, match="no run 'z'"):
-        campaign.exclude("z", "?")
+        campaign.exclude({"z": "?"})
 
 
 def test_concatenation_leaves_out_flagged_samples_and_excluded_runs():

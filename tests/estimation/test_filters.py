@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimation.derived import CausalChannels, causal_channels, zero_phase_channels
+from estimation.derived import zero_phase_channels
 from estimation.filters import (
     CausalFilter,
     FilterError,
@@ -15,6 +15,7 @@ from estimation.filters import (
     holoborodko_derivative,
     zero_phase,
 )
+from estimation.live_channels import CausalChannels, causal_channels
 from estimation.recording import Flag, Recording, Stretch
 
 RATE_HZ = 1000.0

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from estimation.derived import CausalChannels, causal_channels
 from estimation.kalman import steady_filter, tracker
+from estimation.live_channels import CausalChannels, causal_channels
 from tests.estimation.synthetic import run
 
 NAMES = ("motor_velocity_rad_s", "motor_acceleration_rad_s2", "motor_angle_rad")

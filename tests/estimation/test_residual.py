@@ -1,5 +1,6 @@
 """Screening a residual for structure."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def test_what_differs_between_runs_is_seen_only_when_it_is_no_nuisance():
     )
     found = {}
     for declared in (True, False):
-        model = fit(read(Path("motor")), runs, run_offsets=declared, bootstrap=0)
+        model = fit(replace(read(Path("motor")), run_offsets=declared), runs, bootstrap=0)
         assert model.run_offsets is declared
         found[declared] = largest_structure(model, runs)[0]
     assert not found[True].stands_out

@@ -36,7 +36,7 @@ def test_a_change_is_stated_in_words_and_as_json(tmp_path, capsys):
     assert main(words) == 0
     printed = capsys.readouterr()
     answer = json.loads(printed.out)
-    assert answer["schema"] == "rig.diff/1"
+    assert answer["schema"] == "rig.diff/2"
     (change,) = answer["changes"]
     assert change["verdict"] == "moved"
     assert change["parameters"]["damping"] == pytest.approx(1.5, rel=0.1)

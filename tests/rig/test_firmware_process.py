@@ -1,5 +1,6 @@
 """The firmware as a process on a pseudo-terminal, in real time; asserted is its own clock."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -128,3 +129,15 @@ def test_a_signal_to_the_whole_group_ends_the_program_after_the_board_is_safe(
     assert "not confirm" not in told
     assert "SafetyTripError" not in told
     assert told.startswith(("KeyboardInterrupt", "SystemExit", "Terminated")), told
+
+
+def test_a_motion_in_real_time_is_not_held_up_by_a_collection_of_all_objects(library: Path) -> None:
+    config = load_config(Path("pty"))
+    before = gc.get_freeze_count()
+    with Session(config, open_logger(config)) as session:
+        next(session.rest(0.1))
+        still = np.full(50, session.spindle_angle_rad)
+        for _ in session.play(still, np.zeros(50)):
+            looked_at = len(gc.get_objects())
+    assert looked_at < len(gc.get_objects()) / 10
+    assert gc.get_freeze_count() == before

@@ -1,5 +1,6 @@
 """`rig reference` on the firmware core: a restarted board arms only after it."""
 
+import dataclasses
 from io import StringIO
 from pathlib import Path
 
@@ -8,11 +9,15 @@ import pytest
 
 from drivers.errors import CommandRefusedError
 from drivers.teensy.core import BoardStart, FirmwareBoard
+from drivers.teensy.protocol import STATUS_REFERENCED, Kind, Result
+from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
-from rig.bench import referencing
+from rig.bench import hard_stop, referencing
 from rig.bench.session import Session
 from rig.cli.main import main
 from rig.simulation.bench import SimulatedBench
+from rig.simulation.places import JAW_ANGLE, SPINDLE_ANGLE
+from tests.drivers.raw_host import RawHost
 from tests.rig.simulated import simulated
 
 STILL = (np.full(50, 0.3), np.zeros(50))
@@ -66,3 +71,51 @@ def test_a_place_that_does_not_fit_the_rig_is_refused(
 ) -> None:
     assert main(["reference", "--yes", *words]) == 2
     assert message in capsys.readouterr().err
+
+
+def driven(restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
+    """Run the command with a hard stop against the board."""
+    monkeypatch.setattr(
+        hard_stop, "open_logger", lambda config: SimulatedTransport(restarted, "sim://")
+    )
+    return main(["reference", "--sim", "--yes", *words])
+
+
+@pytest.mark.parametrize("stop", ["closed", "open"])
+def test_a_gentle_drive_finds_the_same_stop_from_two_places(
+    library: Path, monkeypatch: pytest.MonkeyPatch, stop: str
+) -> None:
+    found_rad = []
+    for start_count in (900, 300):
+        bench = SimulatedBench(start_count=start_count)
+        board = FirmwareBoard(bench, BoardStart(boot=9, simulated=False), library)
+        monkeypatch.setattr(
+            referencing, "open_logger", lambda config, b=board: SimulatedTransport(b, "sim://")
+        )
+        assert driven(board, monkeypatch, "--hard-stop", stop, "--at", "0") == 0
+        found_rad.append(bench.state[SPINDLE_ANGLE])
+        assert not board.in_force
+    assert abs(found_rad[0] - found_rad[1]) < 0.02
+    stands = -0.05 if stop == "open" else 1.45
+    assert abs(bench.state[JAW_ANGLE] - stands) < 0.05
+
+
+def test_a_shaft_that_does_not_turn_is_no_stop(
+    restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert driven(restarted, monkeypatch, "--hard-stop", "closed") == 0
+    assert driven(restarted, monkeypatch, "--hard-stop", "closed") == 2
+    assert "did not turn" in capsys.readouterr().err
+
+
+def test_a_board_without_reference_moves_only_gently(library: Path) -> None:
+    board = FirmwareBoard(SimulatedBench(), BoardStart(simulated=False), library)
+    host = RawHost(board, gains=np.array([20.0, 0.2, 4.0, 0.3, 600.0]))
+    host.command(Kind.START)
+    host.run(1500)
+    gentle = dataclasses.replace(Limits(), hold_command_e4=600)
+    assert host.arm(gentle) is Result.NOT_REFERENCED
+    assert host.arm(dataclasses.replace(gentle, hold_command_e4=599, seek=1)) is Result.BAD_VALUE
+    assert host.arm(dataclasses.replace(gentle, seek=1)) is Result.OK
+    host.run(5)
+    assert not host.samples()["status"][-1] & STATUS_REFERENCED

@@ -21,7 +21,8 @@ from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports.diagnosis_words import meaning, sizes_of
 from rig.reports.first_look import first_look
 from rig.studies.oneill.page import page
-from rig.studies.oneill.study import Source, run_study
+from rig.studies.oneill.source import Source
+from rig.studies.oneill.study import run_study
 from tests.estimation.synthetic import campaign
 from tests.rig.browser import chromium
 

@@ -12,8 +12,9 @@ from estimation.recording import Flag, Stretch
 from rig.cli.study import study_app
 from rig.errors import DataError
 from rig.studies.oneill import page as shown
-from rig.studies.oneill import study
-from rig.studies.oneill.study import Result, Source, open_reference, run_study
+from rig.studies.oneill import source as data
+from rig.studies.oneill.source import Source, open_reference
+from rig.studies.oneill.study import Result, run_study
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.long
@@ -90,7 +91,7 @@ def test_the_reference_part_is_picked_and_said(tmp_path, monkeypatch):
         opened.append(path)
         return named(["00", "01"])
 
-    monkeypatch.setattr(study, "open_campaign", opener)
+    monkeypatch.setattr(data, "open_campaign", opener)
     (tmp_path / "Tool_4_Maryland_L_4").mkdir()
     (tmp_path / "Tool_5_Maryland_L_2").mkdir()
     (tmp_path / "mrdlab-Tool_4_Maryland_L_4.tar.xz").touch()
@@ -111,7 +112,7 @@ def command_line() -> typer.Typer:
 
 def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        study, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
+        data, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
     )
     words = ["study", "oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
     words += ["--report", str(tmp_path / "r"), "--out", str(tmp_path / "d" / "oneill.md")]

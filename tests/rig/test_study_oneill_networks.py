@@ -15,11 +15,12 @@ from rig.cli.study import study_app
 from rig.errors import DataError
 from rig.studies.oneill import networks as study
 from rig.studies.oneill import networks_page as shown
-from rig.studies.oneill import study as linear
+from rig.studies.oneill import source as data
 from rig.studies.oneill.closing_table import CAUSAL, closing_table, held_out_masks
-from rig.studies.oneill.networks import CHANNELS, NetworkStudy, jobs, run_networks
+from rig.studies.oneill.network_jobs import CHANNELS, jobs
+from rig.studies.oneill.networks import NetworkStudy, Training, run_networks
 from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
-from rig.studies.oneill.study import Source
+from rig.studies.oneill.source import Source, open_reference
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.long
@@ -87,7 +88,7 @@ def test_every_row_of_the_papers_tables_has_a_job():
 def deep(table, tmp_path_factory) -> NetworkStudy:
     if not has_torch():
         pytest.skip("torch is not installed (extra learn)")
-    folder = tmp_path_factory.mktemp("state")
+    training = Training(tmp_path_factory.mktemp("state"), QUICK, every=40)
     whole = study.jobs
 
     def few(poses):
@@ -100,21 +101,23 @@ def deep(table, tmp_path_factory) -> NetworkStudy:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "jobs", few)
-        partial = run_networks({"neutral": table}, folder, settings=QUICK, every=40, minutes=0)
+        partial = run_networks({"neutral": table}, replace(training, minutes=0))
         assert partial.rows == ()
         assert partial.not_run
         assert any("Not run" in note for note in shown.notes(partial))
         calls: list[tuple[int, int]] = []
         found = run_networks(
-            {"neutral": table}, folder, settings=QUICK, every=40,
+            {"neutral": table},
+            training,
             on_network=lambda done, total: calls.append((done, total)),
-        )  # fmt: skip
+        )
         assert calls[-1][0] == calls[-1][1] > 0
         calls.clear()
         again = run_networks(
-            {"neutral": table}, folder, settings=QUICK, every=40,
+            {"neutral": table},
+            training,
             on_network=lambda done, total: calls.append((done, total)),
-        )  # fmt: skip
+        )
         assert calls == []  # all kept
         assert again.rows == found.rows
     return found
@@ -134,7 +137,7 @@ def test_rows_are_scored_next_to_the_paper(deep):
 @torch_only
 def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        linear, "open_reference", lambda path: Source(with_jaw(), "analytic rig", measured=False)
+        data, "open_reference", lambda path: Source(with_jaw(), "analytic rig", measured=False)
     )
     app = typer.Typer()
     app.add_typer(study_app)
@@ -152,8 +155,8 @@ def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
 @torch_only
 @pytest.mark.measured
 def test_physical_states_lower_the_error_on_a_fold_of_measured_runs(measured_data):
-    source = linear.open_reference(measured_data)
-    table = closing_table(source.campaign.exclude("07", "runaway of the motor"), CHANNELS)
+    source = open_reference(measured_data)
+    table = closing_table(source.campaign.exclude({"07": "runaway of the motor"}), CHANNELS)
     assert len(table.run) == 304_394
     mask = held_out_masks(table, "run-wise", 5, 0)[0]
     job = next(j for j in jobs(("neutral",)) if j.targets == (PROXIMAL,))

@@ -31,9 +31,7 @@ def study():
                   for e in ("", EFFECT) for t in (PROXIMAL, DISTAL, JAW)]  # fmt: skip
         patch.setattr(oneill_states, "jobs", lambda poses: kinds)
         done: list[tuple[int, int]] = []
-        found = run_states(
-            Campaign.of(runs), {}, None, on_row=lambda k, total: done.append((k, total))
-        )
+        found = run_states(Campaign.of(runs), None, on_row=lambda k, total: done.append((k, total)))
     assert done[-1] == (len(kinds), len(kinds))
     return found
 

@@ -13,7 +13,7 @@ from rig.cli.study import study_app
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 from estimation.arm.tables import PSM
-from estimation.arm.wrench import body_jacobians, spatial_jacobians
+from estimation.arm.wrench import body_jacobians, in_tip_frame, spatial_jacobians
 from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import contact_motion
 from rig.studies.pique.wrench import (
@@ -22,7 +22,6 @@ from rig.studies.pique.wrench import (
     OURS,
     SERIES,
     THESIS,
-    in_tip_frame,
     one_arm,
 )
 
@@ -58,7 +57,7 @@ def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
     rng = np.random.default_rng(3)
     motion = contact_motion(rng, 1.0)
     wrench = rng.normal(size=(len(motion), 6))
-    there = in_tip_frame(wrench, motion.position)
+    there = in_tip_frame(PSM, wrench, motion.position)
     at_base, at_tip = (
         np.einsum("nij,ni->nj", jacobians(PSM, motion.position), each)
         for jacobians, each in ((spatial_jacobians, wrench), (body_jacobians, there))

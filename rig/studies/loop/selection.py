@@ -13,7 +13,8 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.effects import Effect, Parameter
-from estimation.fitting import FitError, FitRun, fit, prepared
+from estimation.fit_problem import FitError, FitRun, prepared
+from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term
 from estimation.recording import FloatArray
 

@@ -13,7 +13,7 @@ import numpy as np
 from estimation.campaign import Campaign
 from estimation.diagnosis.split import Sealed, split
 from estimation.effects import effect
-from estimation.fitting import prepared
+from estimation.fit_problem import prepared
 from estimation.model import Model, Term, estimate
 from estimation.recording import FloatArray, Recording
 from estimation.signals import Samples

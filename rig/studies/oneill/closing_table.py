@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
-from estimation.derived import causal_channels
+from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray
 from rig.errors import DataError
 from rig.studies.oneill import fits

@@ -1,6 +1,6 @@
 """The closing samples behind the network rows: the neutral pose, and the poses of experiment 3."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import numpy as np
 from estimation.campaign import Campaign
 from rig.importers.registry import open_campaign
 from rig.studies.oneill.closing_table import ClosingTable, closing_table
-from rig.studies.oneill.networks import CHANNELS, POSES
+from rig.studies.oneill.network_jobs import CHANNELS, POSES
 from rig.studies.oneill.paper import PAPER_POSE_SAMPLES
 
 POSE_FREQUENCY_HZ = 0.3
@@ -18,7 +18,6 @@ POSE_FREQUENCY_HZ = 0.3
 
 def network_tables(
     neutral: Campaign,
-    left_out: Mapping[str, str],
     folder: Path | None,
     on_run: Callable[[str], None] = lambda name: None,
 ) -> tuple[dict[str, ClosingTable], tuple[str, ...]]:
@@ -26,7 +25,6 @@ def network_tables(
 
     Args:
         neutral: The runs of experiments 1 and 2.
-        left_out: Runs left out of them, with the reason.
         folder: Folder that may hold the folders or archives of experiment 3, or be next to them.
         on_run: Called with each run's name when it has been processed.
 
@@ -34,8 +32,6 @@ def network_tables(
         DataError: A run is damaged, or nothing is left.
         MissingChannelError: A run lacks a channel.
     """
-    for name, reason in left_out.items():
-        neutral = neutral.exclude(name, reason)
     tables = {"neutral": closing_table(neutral, CHANNELS, on_run=on_run)}
     notes = []
     for pose in ("pitch", "roll"):

@@ -5,7 +5,7 @@ without lag and as live. All read the measured current and the encoders.
 """
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -71,7 +71,6 @@ def recipes() -> dict[str, Recipe]:
 
 def run_kinds(
     campaign: Campaign,
-    left_out: Mapping[str, str],
     seed: int = 0,
     on_fit: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[KindRow, ...]:
@@ -79,15 +78,12 @@ def run_kinds(
 
     Args:
         campaign: Raw runs.
-        left_out: Runs left out, with the reason.
         seed: Seed of the folds.
         on_fit: Called with the number of fits done and their total.
 
     Raises:
         MissingChannelError: A run lacks a channel.
     """
-    for name, reason in left_out.items():
-        campaign = campaign.exclude(name, reason)
     kept = campaign.evidence
     folds = kept.folds(min(FOLDS, len(kept)), seed)
     wanted = recipes()

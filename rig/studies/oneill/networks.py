@@ -7,9 +7,9 @@ name made of the data and of all settings; a study that was interrupted goes on 
 import hashlib
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from threading import Thread
@@ -22,73 +22,11 @@ from estimation.networks.training import Settings, require_torch, train
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
 from rig.output.provenance import Provenance
-from rig.studies.oneill.closing_table import CAUSAL, ClosingTable, held_out_masks, mapped
-from rig.studies.oneill.paper import DISTAL, GRIP_ARM_M, JAW, PROXIMAL
+from rig.studies.oneill.closing_table import ClosingTable, held_out_masks, mapped
+from rig.studies.oneill.network_jobs import FOLDS, Job, jobs
+from rig.studies.oneill.paper import DISTAL, GRIP_ARM_M, PROXIMAL
 
 SCHEMA = "rig.study.network/1"
-FOLDS = 5
-BASE = ("spindle_angle_rad", "spindle_velocity_rad_s")
-SURROGATES = {
-    "command": ("motor_command_ratio",),
-    "current": ("motor_current_a",),
-    "gearbox": ("gearbox_differential_rad",),
-    "all": ("motor_command_ratio", "motor_current_a", "gearbox_differential_rad"),
-    "sensor": (PROXIMAL,),
-}
-ACCELERATION, TRAVEL = "motor_acceleration_rad_s2", "motor_travel_rad"
-POSES = {"neutral": (), "pitch": ("wrist_pitch_rad",), "roll": ("wrist_roll_rad",)}
-"""The paper's experiments 1 and 2, and the two halves of experiment 3: inputs each one adds."""
-
-CHANNELS = (
-    *BASE, *SURROGATES["all"], PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL,
-)  # fmt: skip
-STATE_NODES = 12
-ALONE = (PROXIMAL, DISTAL, JAW)
-"""Targets of the networks with physical states, one network each."""
-
-MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
-"""The rows of the paper that the physical states are compared with."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One kind of network under one protocol: a row or two of a table.
-
-    Attributes:
-        pose: Key of `POSES`.
-        way: `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks
-            with physical states, and `causal` for the last of them on channels filtered as live.
-        surrogate: Key of `SURROGATES`.
-        protocol: As for `held_out_masks`.
-        targets: Estimated channels.
-    """
-
-    pose: str
-    way: str
-    surrogate: str
-    protocol: str
-    targets: tuple[str, ...]
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Columns the network reads."""
-        states = {"+ acceleration": (ACCELERATION,), "end-to-end": ()}
-        own = states.get(self.way, (ACCELERATION, TRAVEL))
-        channels = (*BASE, *SURROGATES[self.surrogate], *own)
-        if self.way == "causal":
-            channels = tuple(CAUSAL + name for name in channels)
-        return (*channels, *POSES[self.pose])
-
-    @property
-    def nodes(self) -> int:
-        """Hidden nodes: the paper's 30, fewer with more informative inputs."""
-        return 30 if self.way in ("end-to-end", "staged") else STATE_NODES
-
-    @property
-    def stages(self) -> tuple["Job", "Job"]:
-        """The networks of a staged job: surrogate to torque, and torque to what is wanted."""
-        first = replace(self, way="end-to-end", targets=(PROXIMAL,))
-        return first, replace(self, way="end-to-end", surrogate="sensor")
 
 
 @dataclass(frozen=True)
@@ -141,57 +79,6 @@ class NetworkStudy:
         return None
 
 
-Kind = tuple[str, str, str, tuple[str, ...]]
-"""Pose, way, surrogate and targets of a job."""
-
-
-def jobs(poses: tuple[str, ...]) -> list[Job]:
-    """Return the rows of the study, the most telling ones first."""
-    both = (DISTAL, JAW)
-    paper: list[Kind] = []
-    paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(SURROGATES)[:4]]
-    paper += [("neutral", "end-to-end", s, both) for s in SURROGATES]
-    paper += [("neutral", "staged", s, both) for s in tuple(SURROGATES)[:4]]
-    posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in SURROGATES]
-    ways = {
-        way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in ALONE]
-        for way in ("+ travel", "causal", "+ acceleration")
-    }
-    motor = _motor(paper)
-    rest = [kind for kind in paper if kind not in motor]
-    posed_states = [(p, "+ travel", "command", (t,)) for p in ("pitch", "roll") for t in both]
-    order: list[tuple[str, Sequence[Kind]]] = [
-        ("random", paper),
-        *(("run-wise", _of(s, [*ways["+ travel"], *motor])) for s in ("command", "current")),
-        ("lofo", ways["+ travel"]),
-        ("lopo", ways["+ travel"]),
-        ("run-wise", [*ways["causal"], *ways["+ acceleration"]]),
-        ("lofo", motor),
-        ("lopo", motor),
-        ("random", posed),
-        ("run-wise", _motor(posed)),
-        ("run-wise", [*rest, *posed, *posed_states]),
-        *((p, rest) for p in ("lofo", "lopo")),
-        ("lopo", posed),
-        *((p, ways["causal"]) for p in ("lofo", "lopo")),
-    ]
-    planned = [
-        Job(pose, way, surrogate, protocol, targets)
-        for protocol, kinds in order
-        for pose, way, surrogate, targets in kinds
-        if pose in poses
-    ]
-    return list(dict.fromkeys(planned))
-
-
-def _motor(kinds: Sequence[Kind]) -> list[Kind]:
-    return [kind for kind in kinds if kind[1:3] in MOTOR]
-
-
-def _of(surrogate: str, kinds: Sequence[Kind]) -> list[Kind]:
-    return [kind for kind in kinds if kind[2] == surrogate]
-
-
 @dataclass(frozen=True)
 class Task:
     """One network to train: all a worker needs."""
@@ -205,21 +92,35 @@ class Task:
     settings: Settings
 
 
+@dataclass(frozen=True)
+class Training:
+    """How long, on what and where networks are trained.
+
+    Attributes:
+        state: Folder of the trained networks.
+        settings: Settings of the training; nodes and seed are the study's.
+        every: Train on every n-th closing sample of the neutral pose, and on as many of others.
+        seed: Seed of splits and of first weights.
+        workers: Processes; each trains on one core.
+        minutes: No network is started after this time.
+    """
+
+    state: Path
+    settings: Settings = field(default_factory=Settings)
+    every: int = 8
+    seed: int = 0
+    workers: int = 1
+    minutes: float = float("inf")
+
+
 class Trainer:
     """Trains the networks of jobs and keeps them in a folder."""
 
-    def __init__(
-        self,
-        tables: dict[str, ClosingTable],
-        state: Path,
-        settings: Settings,
-        every: int,
-        seed: int,
-    ) -> None:
-        self.tables, self.state, self.settings = tables, state, settings
-        self.every, self.seed = every, seed
+    def __init__(self, tables: dict[str, ClosingTable], training: Training) -> None:
+        self.tables, self.training = tables, training
         self._places = {
-            pose: state / f"{pose}-{table.digest(table.columns)}" for pose, table in tables.items()
+            pose: training.state / f"{pose}-{table.digest(table.columns)}"
+            for pose, table in tables.items()
         }
         self._masks: dict[tuple[str, str], list[np.ndarray]] = {}
         for pose, table in tables.items():
@@ -228,13 +129,15 @@ class Trainer:
     def step(self, pose: str) -> int:
         """Return which n-th samples of a pose are trained on: about as many for every pose."""
         share = len(self.tables[pose].run) / len(self.tables["neutral"].run)
-        return max(1, round(self.every * share))
+        return max(1, round(self.training.every * share))
 
     def masks(self, job: Job) -> list[np.ndarray]:
         """Return which samples each split of the job tests on."""
         key = (job.pose, job.protocol)
         if key not in self._masks:
-            self._masks[key] = held_out_masks(self.tables[job.pose], job.protocol, FOLDS, self.seed)
+            self._masks[key] = held_out_masks(
+                self.tables[job.pose], job.protocol, FOLDS, self.training.seed
+            )
         return self._masks[key]
 
     def tasks(self, job: Job) -> Iterator[Task]:
@@ -250,18 +153,20 @@ class Trainer:
                         self.tables[part.pose].columns,
                         str(path),
                         np.flatnonzero(~mask)[:: self.step(part.pose)],
-                        replace(self.settings, nodes=part.nodes, seed=self.seed),
+                        replace(self.training.settings, nodes=part.nodes, seed=self.training.seed),
                     )
 
     def path(self, job: Job, fold: int) -> Path:
         """Return where a network is kept: the name changes with all that made it."""
         data = self.tables[job.pose].digest((*job.inputs, *job.targets))
-        settings = replace(self.settings, nodes=job.nodes, seed=self.seed)
+        settings = replace(self.training.settings, nodes=job.nodes, seed=self.training.seed)
         made_of = (
             SCHEMA, data, job.inputs, job.targets, job.protocol, fold,
             self.step(job.pose), FOLDS, sorted(asdict(settings).items()),
         )  # fmt: skip
-        return self.state / f"{hashlib.sha256(repr(made_of).encode()).hexdigest()[:24]}.npz"
+        return (
+            self.training.state / f"{hashlib.sha256(repr(made_of).encode()).hexdigest()[:24]}.npz"
+        )
 
     def rows(self, job: Job) -> list[NetworkRow]:
         """Return the errors of a job whose networks are all trained."""
@@ -312,13 +217,7 @@ def _kept(path: Path) -> tuple[Network, int]:
 
 def run_networks(
     tables: dict[str, ClosingTable],
-    state: Path,
-    *,
-    settings: Settings | None = None,
-    every: int = 8,
-    seed: int = 0,
-    workers: int = 1,
-    minutes: float = float("inf"),
+    training: Training,
     notes: tuple[str, ...] = (),
     on_network: Callable[[int, int], None] = lambda done, total: None,
 ) -> NetworkStudy:
@@ -326,12 +225,7 @@ def run_networks(
 
     Args:
         tables: Closing samples by pose.
-        state: Folder of the trained networks.
-        settings: Settings of the training; nodes and seed are the study's.
-        every: Train on every n-th closing sample of the neutral pose, and on as many of others.
-        seed: Seed of splits and of first weights.
-        workers: Processes; each trains on one core.
-        minutes: No network is started after this time.
+        training: How, and where the trained networks are kept.
         notes: Remarks for the reader.
         on_network: Called with the number of networks trained and their total.
 
@@ -340,11 +234,11 @@ def run_networks(
         NetworkError: A kept network is damaged.
     """
     require_torch()
-    settings = settings or Settings()
-    trainer = Trainer(tables, state, settings, every, seed)
+    trainer = Trainer(tables, training)
     planned = [job for job in jobs(tuple(tables)) if trainer.masks(job)]
     waiting = {task.path: task for job in planned for task in trainer.tasks(job)}
-    _train_all(list(waiting.values()), workers, time.monotonic() + 60 * minutes, on_network)
+    until_s = time.monotonic() + 60 * training.minutes
+    _train_all(list(waiting.values()), training.workers, until_s, on_network)
     rows: list[NetworkRow] = []
     not_run = []
     for job in planned:
@@ -360,9 +254,9 @@ def run_networks(
         samples={pose: len(table.run) for pose, table in tables.items()},
         peak_torque_n_m=float(np.max(_column(neutral, DISTAL))),
         every={pose: trainer.step(pose) for pose in tables},
-        settings=settings,
+        settings=training.settings,
         notes=notes,
-        provenance=Provenance.now(seed),
+        provenance=Provenance.now(training.seed),
     )
 
 

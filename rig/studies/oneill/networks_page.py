@@ -5,7 +5,8 @@ from collections import Counter
 import numpy as np
 
 from rig.output.table import TextTable
-from rig.studies.oneill.networks import FOLDS, STATE_NODES, NetworkRow, NetworkStudy
+from rig.studies.oneill.network_jobs import FOLDS, STATE_NODES
+from rig.studies.oneill.networks import NetworkRow, NetworkStudy
 from rig.studies.oneill.paper import (
     DISTAL,
     GRIP_ARM_M,

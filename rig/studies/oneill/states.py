@@ -14,7 +14,6 @@ import numpy as np
 from estimation.bank.states import EFFECTS, Bank
 from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
-from estimation.derived import causal_channels
 from estimation.estimators.bank import (
     EVERY,
     BankEstimator,
@@ -23,6 +22,7 @@ from estimation.estimators.bank import (
     rows_of,
 )
 from estimation.estimators.run_evidence import RunEvidence
+from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray, Recording
 from rig.studies.oneill.data import pose_runs
 from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
@@ -93,7 +93,6 @@ def jobs(poses: Sequence[str]) -> list[StateJob]:
 
 def run_states(
     neutral: Campaign,
-    left_out: Mapping[str, str],
     folder: Path | None,
     *,
     seed: int = 0,
@@ -105,7 +104,6 @@ def run_states(
 
     Args:
         neutral: Runs of experiments 1 and 2.
-        left_out: Runs left out of them, with the reason.
         folder: Folder that may hold the parts of experiment 3, or be next to them.
         seed: Seed of the folds.
         on_run: Called with each run's name when it has been processed.
@@ -115,8 +113,6 @@ def run_states(
     Raises:
         MissingChannelError: A run lacks a channel.
     """
-    for name, reason in left_out.items():
-        neutral = neutral.exclude(name, reason)
     campaigns = {"neutral": neutral}
     for pose in ("pitch", "roll"):
         found = pose_runs(folder, pose)

@@ -8,7 +8,6 @@ exactly. So the paper's errors are printed next to ours, and are not expected to
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -20,13 +19,10 @@ from estimation.recording import Recording
 from estimation.scores import Score, rmse
 from estimation.units import evaluate
 from rig.errors import DataError
-from rig.importers.registry import open_campaign
 from rig.output.provenance import Provenance
 from rig.studies.oneill import fits
 from rig.studies.oneill.fits import LinearFit
-
-INSTRUMENT = "Tool_4_Maryland_L_4"
-"""Folder of the measured data that the paper's first two experiments were made of."""
+from rig.studies.oneill.source import Source
 
 PAPER_SAMPLES = 260_581
 PUBLIC_SAMPLES = 308_117
@@ -145,58 +141,6 @@ class Result:
     line: LinearFit
 
 
-@dataclass(frozen=True)
-class Source:
-    """Data for the study.
-
-    Attributes:
-        campaign: The runs.
-        name: What the data is, for the reader.
-        measured: Whether it was measured on the paper's instrument.
-        notes: Remarks for the reader.
-    """
-
-    campaign: Campaign
-    name: str
-    measured: bool
-    notes: tuple[str, ...] = ()
-
-
-def open_reference(path: Path) -> Source:
-    """Open the paper's part of the measured data.
-
-    Args:
-        path: The folder or archive of Tool_4_Maryland_L_4, or a folder or archive that holds it
-            among others; any other recordings are taken as they are.
-
-    Raises:
-        UsageError: There is nothing at the path.
-        DataError: Nothing there can be read.
-    """
-    place = part_of(path, INSTRUMENT)
-    notes = [f"{path.name} holds several parts; {place.name} was taken."] if place != path else []
-    campaign = open_campaign(place)
-    own = [name for name in campaign.names if f"{INSTRUMENT}/" in name]
-    if own and len(own) < len(campaign):
-        notes.append(f"{len(own)} of {len(campaign)} runs are of {INSTRUMENT} and were taken.")
-        campaign = campaign.select(own)
-    measured = bool(own) or INSTRUMENT in place.name
-    if not measured:
-        notes.append(f"Not the paper's instrument ({INSTRUMENT}): its numbers do not apply.")
-    return Source(campaign, place.name, measured, tuple(notes))
-
-
-def part_of(path: Path, instrument: str) -> Path:
-    """Return the folder or archive of an instrument below a path, or the path itself."""
-    if path.is_file() or path.name == instrument:
-        return path
-    parts = sorted(
-        (p for p in path.rglob(f"*{instrument}*") if p.name.split(".")[0].endswith(instrument)),
-        key=lambda p: (p.is_file(), len(p.parts), p),
-    )
-    return parts[0] if parts else path
-
-
 def run_study(
     source: Source,
     *,
@@ -282,9 +226,7 @@ def without_flagged(closing: Campaign) -> tuple[Campaign, dict[str, str]]:
         elif not run.valid.all():
             reasons = "; ".join(s.reason for s in flagged) or "flagged samples"
             left_out[run.name] = reasons
-    for name, reason in left_out.items():
-        closing = closing.exclude(name, reason)
-    kept = closing.evidence
+    kept = closing.exclude(left_out).evidence
     if len(kept) < 2 or sum(len(run) for run in kept) == 0:
         raise DataError(
             f"{len(kept)} of {len(closing)} runs can be used: too few to hold runs out.",

@@ -18,13 +18,13 @@ from scipy.spatial.transform import Rotation
 from estimation.arm.base import base_of
 from estimation.arm.effects import ArmEffect, of_joints
 from estimation.arm.identification import fit, nrmsd_percent, smoothed, thesis_weights
-from estimation.arm.kinematics import tip_pose
 from estimation.arm.motion import FINE, LOW_PASS, Motion, motion_of
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM
 from estimation.arm.wrench import (
     body_jacobians,
     by_pseudo_inverse,
+    in_tip_frame,
     most_likely,
     spatial_jacobians,
 )
@@ -167,7 +167,7 @@ def one_arm(number: int) -> Arm:
                     wrench = by_pseudo_inverse(jacobians, external)
                 else:
                     wrench = most_likely(jacobians, external, left).value
-                seen = sensor if table == CONTACT else in_tip_frame(sensor, touch.position)
+                seen = sensor if table == CONTACT else in_tip_frame(PSM, sensor, touch.position)
                 both.append(nrmsd_percent(wrench, filtered(seen)))
             errors[table][method] = tuple(map(float, [*both[0][:3], *both[1][3:]]))
     return Arm(family, errors, tuple(effect.name for effect in effects))
@@ -201,20 +201,6 @@ def _touched(
     motion = contact_motion(rng, 60.0)
     wrench = pin(rng, motion, largest_n, torsion_n_m)
     return simulate(arm, motion, rng, wrench), ati(passed_on(motion, wrench), rng)
-
-
-def in_tip_frame(wrench: FloatArray, position: FloatArray) -> FloatArray:
-    """Return spatial wrenches about the tip in the tip's frame, shape (n, 6).
-
-    Args:
-        wrench: In the base frame about its origin, shape (n, 6).
-        position: Joint positions, shape (n, joints).
-    """
-    poses = np.array([tip_pose(PSM, q) for q in position])
-    force = wrench[:, :3]
-    moment = wrench[:, 3:] - np.cross(poses[:, :3, 3], force)
-    turned = [np.einsum("nji,nj->ni", poses[:, :3, :3], each) for each in (force, moment)]
-    return np.hstack(turned)
 
 
 def _filtered(values: FloatArray) -> FloatArray:

@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.arm.kinematics import tip_pose
-from estimation.arm.motion import Motion
 from estimation.arm.tables import PSM
-from estimation.arm.wrench import body_jacobians, by_pseudo_inverse, most_likely
+from estimation.arm.wrench import body_jacobians, by_pseudo_inverse, in_tip_frame, most_likely
 from estimation.recording import FloatArray
 from rig.arm.simulated import contact
 from rig.studies.zhang.free import NETWORKS, OURS, SETTLE, Cells
@@ -123,7 +121,7 @@ def in_contact(learnt: Learnt, rng: np.random.Generator) -> tuple[Cells, Cells]:
     run = simulate(psm, grasp.motion, rng, wrench=spatial, grip_n_m=-grasp.arm_m * force, lead=lead)
     sensed, touching = grasp.sensed(force, rng)[lead:], grasp.touching[lead:]
     jacobians = body_jacobians(PSM, run.position[:, :GRIPPER])
-    truth = at_tip(grasp.motion, spatial)[lead:]
+    truth = in_tip_frame(PSM, spatial, grasp.motion.position[:, :GRIPPER])[lead:]
     holding = grasp.scored[lead:] & (touching == 0)
     scored = touching > 0
     cells: Cells = {}
@@ -140,14 +138,3 @@ def in_contact(learnt: Learnt, rng: np.random.Generator) -> tuple[Cells, Cells]:
         grip_error = float(np.sqrt(np.mean((grips[method] - sensed)[scored] ** 2)))
         cells[f"contact | wrench, grasp | {method}"] = (*map(float, error), grip_error)
     return cells, _traces("contact", pushes, scored) | _traces("held", grips, scored)
-
-
-def at_tip(motion: Motion, spatial: FloatArray) -> FloatArray:
-    """Return spatial wrenches along a motion as wrenches at the tip, in its frame; (n, 6)."""
-    wrenches = np.empty_like(spatial)
-    for k, q in enumerate(motion.position[:, :GRIPPER]):
-        pose = tip_pose(PSM, q)
-        turn, tip = pose[:3, :3], pose[:3, 3]
-        force, moment = spatial[k, :3], spatial[k, 3:]
-        wrenches[k] = [*(turn.T @ force), *(turn.T @ (moment - np.cross(tip, force)))]
-    return wrenches

@@ -237,5 +237,6 @@ def _declared(values: FloatArray, motion: Motion) -> FloatArray:
 
 
 def _slips() -> FloatArray:
-    slips: FloatArray = SLIP_SHARE * np.array([joint.upper - joint.lower for joint in PSM.joints])
+    lower, upper, _ = PSM.limits
+    slips: FloatArray = SLIP_SHARE * (upper - lower)
     return slips

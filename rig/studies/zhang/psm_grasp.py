@@ -107,7 +107,7 @@ def contact_path(rng: np.random.Generator) -> Grasp:
     The tip is free for the first 10 s.
     """
     seconds = 40.0
-    middle = np.array([(joint.lower + joint.upper) / 2 for joint in PSM.joints])
+    middle = _middle()
     path = middle + CONTACT_SHARE * (random_path(rng, seconds) - middle)
     path[:, 2] += CONTACT_DEPTH_M
     touching = np.clip(np.arange(len(path)) / RATE_HZ - 10.0, 0, 1)
@@ -144,7 +144,9 @@ def _random_pose(rng: np.random.Generator) -> FloatArray:
 
 
 def _middle() -> FloatArray:
-    return np.array([(joint.lower + joint.upper) / 2 for joint in PSM.joints])
+    lower, upper, _ = PSM.limits
+    middle: FloatArray = (lower + upper) / 2
+    return middle
 
 
 def _ease(start: FloatArray, stop: FloatArray, samples: int) -> FloatArray:

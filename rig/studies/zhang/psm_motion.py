@@ -26,10 +26,7 @@ SPEED_SHARE = 0.6
 
 def random_path(rng: np.random.Generator, seconds: float) -> FloatArray:
     """Return a path of the six joints over their limits, shape (n, 6)."""
-    lower, upper, speed = (
-        np.array([getattr(joint, name) for joint in PSM.joints])
-        for name in ("lower", "upper", "speed")
-    )
+    lower, upper, speed = PSM.limits
     raw = _smooth_random(rng, seconds, len(lower))
     fastest = np.abs(np.gradient(raw, 1 / RATE_HZ, axis=0)).max(axis=0)
     size = np.minimum(SHARE * (upper - lower) / 2, SPEED_SHARE * speed / fastest)

@@ -1,0 +1,151 @@
+"""A model laid out for fitting: its runs, its columns, and amplitudes by least squares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.campaign import Campaign
+from estimation.derived import CAMPAIGN_TIME
+from estimation.effects import Parameter, Remembering
+from estimation.errors import EstimationError
+from estimation.model import Model, Term, balance_channels, settled
+from estimation.recording import FloatArray, Recording
+from estimation.within_bounds import solve_within
+
+OFFSET = "sensor.offset"
+
+
+class FitError(EstimationError):
+    """The model's parameters are not identifiable from the campaign."""
+
+
+@dataclass(frozen=True)
+class FitRun:
+    """A run's filtered channels, whole for effects with memory, and the samples of the fit."""
+
+    whole: Recording
+    places: NDArray[np.intp]
+    thin: Recording
+
+    def columns(self, term: Term, shape: Sequence[float]) -> FloatArray:
+        """Return an effect's columns at the samples of the fit."""
+        if isinstance(term.effect, Remembering):
+            return np.asarray(term.columns(self.whole, shape)[self.places])
+        return term.columns(self.thin, shape)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A model laid out for fitting: its runs and which columns are which."""
+
+    model: Model
+    runs: list[FitRun]
+    free: NDArray[np.intp]  # columns that least squares solves for
+    offset: int | None  # column of the model's own offset when run offsets replace it
+    names: list[str]  # of all columns
+    signs: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    kept: dict[tuple[int, int], tuple[list[float], FloatArray]] = field(default_factory=dict)
+    """Each run's and term's last shape and columns: a search moves one term's shape at a time."""
+
+    @property
+    def shape_parameters(self) -> list[Parameter]:
+        """Shape parameters of all terms, in order."""
+        return [p for term in self.model.terms for p in term.effect.shape]
+
+    def columns(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
+        """Return all signed columns of a run, shape (n, columns)."""
+        blocks = []
+        rest = list(shape)
+        for place, term in enumerate(self.model.terms):
+            own, rest = rest[: len(term.effect.shape)], rest[len(term.effect.shape) :]
+            last = self.kept.get((id(run), place))
+            if last is None or last[0] != own:
+                last = self.kept[id(run), place] = own, run.columns(term, own)
+            blocks.append(last[1])
+        return np.column_stack(blocks) * self.signs
+
+    def gram(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
+        """Return the cross-products of free columns and target of one run."""
+        table = np.column_stack(
+            [self.columns(run, shape)[:, self.free], run.thin[self.model.target]]
+        )
+        if self.model.run_offsets:
+            table -= table.mean(axis=0)
+        product: FloatArray = table.T @ table
+        return product
+
+
+def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list[FitRun]:
+    """Read the runs and find every n-th valid sample of them that a fit counts.
+
+    Args:
+        model: The model.
+        campaign: The runs.
+        every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
+
+    Raises:
+        FitError: No valid sample.
+        MissingChannelError: A run lacks a channel of the model.
+    """
+    runs = []
+    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+    for recording in timed.evidence:
+        step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
+        whole = balance_channels(model, recording)
+        places = settled(model, whole, step)
+        if places.size:
+            runs.append(FitRun(whole, places, whole.at(places)))
+    if not runs:
+        raise FitError(
+            f"No valid samples to fit model {model.name!r}.",
+            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded; static samples"
+            " do not count where friction is fitted.",
+            "Record runs in which the rig moves.",
+        )
+    return runs
+
+
+def problem_of(model: Model, runs: list[FitRun]) -> Problem:
+    """Return a model laid out on prepared runs."""
+    parameters = [(term, p) for term in model.terms for p in term.effect.amplitudes]
+    names = [f"{term.effect.id}.{p.name}" for term, p in parameters]
+    offset = names.index(f"{OFFSET}.offset") if f"{OFFSET}.offset" in names else None
+    replaced = offset if model.run_offsets else None
+    free = np.array([k for k in range(len(names)) if k != replaced], dtype=np.intp)
+    return Problem(
+        model=model,
+        runs=runs,
+        free=free,
+        offset=replaced,
+        names=names,
+        signs=np.array([float(term.sign) for term, _ in parameters]),
+        lower=np.array([p.lower for _, p in parameters])[free],
+        upper=np.array([p.upper for _, p in parameters])[free],
+    )
+
+
+def solve(problem: Problem, gram: FloatArray) -> FloatArray:
+    """Return the amplitudes of the free columns within their bounds."""
+    if problem.free.size == 0:
+        return np.empty(0)
+    scale = np.sqrt(np.maximum(np.diag(gram)[:-1], np.finfo(float).tiny))
+    normal = gram[:-1, :-1] / np.outer(scale, scale)
+    _check_independent(problem, normal, np.diag(gram)[:-1])
+    return solve_within(gram[:-1, :-1], gram[:-1, -1], problem.lower, problem.upper)
+
+
+def _check_independent(problem: Problem, normal: FloatArray, power: FloatArray) -> None:
+    values, vectors = np.linalg.eigh(normal)
+    if np.all(power > 0) and values[0] > 1e-10:
+        return
+    guilty = np.abs(vectors[:, 0]) > 0.1 if np.all(power > 0) else power <= 0
+    named = ", ".join(problem.names[k] for k in problem.free[guilty])
+    raise FitError(
+        f"{named} cannot be identified from these runs.",
+        "The columns are constant or proportional to one another in every run.",
+        "Take an effect out of the model, or record runs that excite it.",
+    )

@@ -1,0 +1,93 @@
+"""The search for shape parameters: variable projection on a grid, then a bounded descent."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy import optimize
+
+from estimation.effects import Parameter
+from estimation.fit_problem import FitError, Problem, solve
+from estimation.recording import FloatArray
+
+MOST_DESCENTS = 20
+
+
+def scaled(parameter: Parameter, value: float) -> float:
+    """Return a shape parameter's value on the scale it is searched on."""
+    return value if parameter.linear else float(np.log(value))
+
+
+def unscaled(parameter: Parameter, value: float) -> float:
+    """Return a shape parameter's value from the scale it is searched on."""
+    return float(value) if parameter.linear else float(np.exp(value))
+
+
+def _error_share(problem: Problem, shape: Sequence[float]) -> float:
+    """Return the residual power of the best amplitudes, relative to the target's power."""
+    gram = np.sum([problem.gram(run, shape) for run in problem.runs], axis=0)
+    vector = np.append(solve(problem, gram), -1.0)
+    return float(vector @ gram @ vector / max(gram[-1, -1], np.finfo(float).tiny))
+
+
+def search_shape(problem: Problem, everywhere: bool = True) -> list[float]:
+    """Return the shape parameters: a grid along each, twice round, then a bounded descent.
+
+    Unless everywhere, the descent alone, from the known values.
+    """
+    parameters = problem.shape_parameters
+    if not parameters:
+        return []
+    bounds = [(scaled(p, p.lower), scaled(p, p.upper)) for p in parameters]
+    known = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
+    point = [
+        float(np.clip(scaled(p, start.value), *bound)) if start else float(np.mean(bound))
+        for start, bound, p in zip(known, bounds, parameters, strict=True)
+    ]
+
+    def values(candidate: Sequence[float] | FloatArray) -> list[float]:
+        return [unscaled(p, x) for p, x in zip(parameters, candidate, strict=True)]
+
+    def error(candidate: Sequence[float] | FloatArray) -> float:
+        try:
+            return _error_share(problem, values(candidate))
+        except FitError:  # a shape with collinear columns, such as a width far too wide
+            return 1.0
+
+    grids = [[scaled(p, float(x)) for x in p.grid()] for p in parameters]
+    rounds = (2 if len(parameters) > 1 else 1) if everywhere else 0
+    for _ in range(rounds):
+        for k, grid in enumerate(grids):
+            tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
+            point = min([point, *tried], key=error)
+    reach = [grid[1] - grid[0] for grid in grids]
+    return values(_descended(error, point, reach, bounds))
+
+
+def _descended(
+    error: Callable[[Sequence[float] | FloatArray], float],
+    point: list[float],
+    reach: Sequence[float],
+    bounds: Sequence[tuple[float, float]],
+) -> list[float]:
+    """Return the minimum near the best point of the grid.
+
+    A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
+    each descent moves by at most one step of the grid; it restarts from its end while that improves
+    the result, since a valley of two shapes is curved.
+    """
+    point = [min(max(x, low), high) for x, (low, high) in zip(point, bounds, strict=True)]
+    left = error(point)
+    for _ in range(MOST_DESCENTS):
+        near = [
+            (max(low, x - step), min(high, x + step))
+            for x, step, (low, high) in zip(point, reach, bounds, strict=True)
+        ]
+        best = optimize.minimize(
+            error, point, method="Powell", bounds=near, options={"xtol": 1e-4, "ftol": 1e-10}
+        )
+        gained, left = left - best.fun, min(left, best.fun)
+        if gained > 0:
+            point = [float(x) for x in best.x]
+        if gained <= 1e-5 * left:
+            break
+    return point

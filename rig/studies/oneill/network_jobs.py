@@ -1,0 +1,136 @@
+"""What networks are trained on the data of O'Neill et al. 2018: the paper's rows, and states."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rig.studies.oneill.closing_table import CAUSAL
+from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
+
+FOLDS = 5
+
+
+BASE = ("spindle_angle_rad", "spindle_velocity_rad_s")
+
+
+SURROGATES = {
+    "command": ("motor_command_ratio",),
+    "current": ("motor_current_a",),
+    "gearbox": ("gearbox_differential_rad",),
+    "all": ("motor_command_ratio", "motor_current_a", "gearbox_differential_rad"),
+    "sensor": (PROXIMAL,),
+}
+
+
+ACCELERATION, TRAVEL = "motor_acceleration_rad_s2", "motor_travel_rad"
+
+
+POSES = {"neutral": (), "pitch": ("wrist_pitch_rad",), "roll": ("wrist_roll_rad",)}
+"""The paper's experiments 1 and 2, and the two halves of experiment 3: inputs each one adds."""
+
+
+CHANNELS = (
+    *BASE, *SURROGATES["all"], PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL,
+)  # fmt: skip
+
+
+STATE_NODES = 12
+
+
+ALONE = (PROXIMAL, DISTAL, JAW)
+"""Targets of the networks with physical states, one network each."""
+
+
+MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
+"""The rows of the paper that the physical states are compared with."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One kind of network under one protocol: a row or two of a table.
+
+    Attributes:
+        pose: Key of `POSES`.
+        way: `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks
+            with physical states, and `causal` for the last of them on channels filtered as live.
+        surrogate: Key of `SURROGATES`.
+        protocol: As for `held_out_masks`.
+        targets: Estimated channels.
+    """
+
+    pose: str
+    way: str
+    surrogate: str
+    protocol: str
+    targets: tuple[str, ...]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Columns the network reads."""
+        states = {"+ acceleration": (ACCELERATION,), "end-to-end": ()}
+        own = states.get(self.way, (ACCELERATION, TRAVEL))
+        channels = (*BASE, *SURROGATES[self.surrogate], *own)
+        if self.way == "causal":
+            channels = tuple(CAUSAL + name for name in channels)
+        return (*channels, *POSES[self.pose])
+
+    @property
+    def nodes(self) -> int:
+        """Hidden nodes: the paper's 30, fewer with more informative inputs."""
+        return 30 if self.way in ("end-to-end", "staged") else STATE_NODES
+
+    @property
+    def stages(self) -> tuple["Job", "Job"]:
+        """The networks of a staged job: surrogate to torque, and torque to what is wanted."""
+        first = replace(self, way="end-to-end", targets=(PROXIMAL,))
+        return first, replace(self, way="end-to-end", surrogate="sensor")
+
+
+Kind = tuple[str, str, str, tuple[str, ...]]
+"""Pose, way, surrogate and targets of a job."""
+
+
+def jobs(poses: tuple[str, ...]) -> list[Job]:
+    """Return the rows of the study, the most telling ones first."""
+    both = (DISTAL, JAW)
+    paper: list[Kind] = []
+    paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(SURROGATES)[:4]]
+    paper += [("neutral", "end-to-end", s, both) for s in SURROGATES]
+    paper += [("neutral", "staged", s, both) for s in tuple(SURROGATES)[:4]]
+    posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in SURROGATES]
+    ways = {
+        way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in ALONE]
+        for way in ("+ travel", "causal", "+ acceleration")
+    }
+    motor = _motor(paper)
+    rest = [kind for kind in paper if kind not in motor]
+    posed_states = [(p, "+ travel", "command", (t,)) for p in ("pitch", "roll") for t in both]
+    order: list[tuple[str, Sequence[Kind]]] = [
+        ("random", paper),
+        *(("run-wise", _of(s, [*ways["+ travel"], *motor])) for s in ("command", "current")),
+        ("lofo", ways["+ travel"]),
+        ("lopo", ways["+ travel"]),
+        ("run-wise", [*ways["causal"], *ways["+ acceleration"]]),
+        ("lofo", motor),
+        ("lopo", motor),
+        ("random", posed),
+        ("run-wise", _motor(posed)),
+        ("run-wise", [*rest, *posed, *posed_states]),
+        *((p, rest) for p in ("lofo", "lopo")),
+        ("lopo", posed),
+        *((p, ways["causal"]) for p in ("lofo", "lopo")),
+    ]
+    planned = [
+        Job(pose, way, surrogate, protocol, targets)
+        for protocol, kinds in order
+        for pose, way, surrogate, targets in kinds
+        if pose in poses
+    ]
+    return list(dict.fromkeys(planned))
+
+
+def _motor(kinds: Sequence[Kind]) -> list[Kind]:
+    return [kind for kind in kinds if kind[1:3] in MOTOR]
+
+
+def _of(surrogate: str, kinds: Sequence[Kind]) -> list[Kind]:
+    return [kind for kind in kinds if kind[2] == surrogate]
