@@ -90,7 +90,7 @@ def campaigns(
 def _named(
     whole: Sequence["IndexedCampaign"], terms: list[str], root: Path
 ) -> "list[IndexedCampaign]":
-    """Return the campaigns whose folders the terms name; none if a term is no folder's name."""
+    """Return the campaigns whose folders the terms name; none unless every term names one."""
     by_name = {str(campaign.folder.relative_to(root)): campaign for campaign in whole}
     return [by_name[term] for term in terms] if all(term in by_name for term in terms) else []
 
