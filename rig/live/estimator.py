@@ -19,6 +19,7 @@ from estimation.signals import reference
 from estimation.stream import Stream
 from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
+from rig.live.replay import within_range
 
 
 class ModelEstimator:
@@ -114,6 +115,8 @@ def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
 def with_estimates(recording: Recording, path: Path) -> Recording:
     """Return a recording with what a file's estimators would have shown live, as `estimated_*`.
 
+    Outside the range of an estimator it is NaN.
+
     Raises:
         EstimationError: As for `estimators_of`; a channel is missing; the recording is of another
             instrument than the estimator.
@@ -122,7 +125,8 @@ def with_estimates(recording: Recording, path: Path) -> Recording:
     for estimator in estimators_of(path, recording.sample_rate_hz):
         require_own(estimator.instrument, recording)
         name = f"{ESTIMATED}{estimator.target_channel}"
-        estimated[name] = estimator.push(recording.columns, recording.time_s)
+        values = estimator.push(recording.columns, recording.time_s)
+        estimated[name] = within_range(estimator, values)
     return replace(recording, columns={**recording.columns, **estimated})
 
 

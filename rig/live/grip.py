@@ -15,7 +15,7 @@ from drivers.teensy.reference import REFERENCE
 from estimation.rest import CLOSING_RAD_S
 from rig.bench.session import Session
 from rig.errors import SafetyTripError, UsageError
-from rig.live.replay import EstimateStream
+from rig.live.replay import EstimateStream, within_range
 from rig.machines.reading import Reading
 from rig.protocols import trajectory
 
@@ -130,9 +130,7 @@ def hold_grip(
     controller = Grip(torque_n_m, session.spindle_angle_rad, most_a, duration_s)
     period = _Period()
     for reading in session.follow(controller.setpoints()):
-        estimate = estimator.push(reading.columns, reading.time_s)
-        if estimator.inside is not None:  # elsewhere it is no estimate
-            estimate = np.where(estimator.inside, estimate, np.nan)
+        estimate = within_range(estimator, estimator.push(reading.columns, reading.time_s))
         most_n_m = float(np.max(np.abs(estimate), where=np.isfinite(estimate), initial=0.0))
         if most_n_m > limits.distal_torque_n_m:
             session.safe()

@@ -163,6 +163,13 @@ class Pace:
                 self._speed *= 2.0 if key == "+" else 0.5
 
 
+def within_range(estimator: EstimateStream, estimate: FloatArray) -> FloatArray:
+    """Return the estimate of the last samples, NaN outside the estimator's range, shape (n,)."""
+    if estimator.inside is None:
+        return estimate
+    return np.where(estimator.inside, estimate, np.nan)
+
+
 def lost_samples(recording: Recording) -> FloatArray:
     """Return the samples lost up to each sample, shape (n,).
 

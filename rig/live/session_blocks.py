@@ -14,7 +14,7 @@ from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.calibration_status import CalibrationStatus
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
-from rig.live.replay import EstimateStream
+from rig.live.replay import EstimateStream, within_range
 from rig.machines.machine import MachinePlan
 from rig.machines.reading import Reading
 from rig.recording.recorder import LiveRecorder
@@ -52,7 +52,12 @@ def session_blocks(
         with closing(_Hand(session, keys, LiveRecorder(session, folder, further=[*named]))) as hand:
             for reading in _readings(session, plans, hand):
                 block = _block(session, reading, estimators)
-                estimated = {f"{ESTIMATED}{name}": v for name, v in block.estimates.items()}
+                estimated = {
+                    f"{ESTIMATED}{e.target_channel}": within_range(
+                        e, block.estimates[e.target_channel]
+                    )
+                    for e in estimators
+                }
                 hand.obey(replace(reading, columns={**reading.columns, **estimated}))
                 if hand.leaves:
                     return

@@ -143,3 +143,16 @@ def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path)
     rows = read_log(path).topics["/rig/sample"].rows
     shown = np.concatenate([block.estimates[GRIP] for block in blocks[:3]])
     np.testing.assert_array_equal(rows[f"estimated_{GRIP}"], shown)
+
+
+def test_an_estimate_outside_its_range_is_a_gap(recorded, home, monkeypatch):
+    folder, fitted = recorded
+    outside = property(lambda self: np.arange(3000) >= 1000)
+    monkeypatch.setattr("rig.live.estimator.ModelEstimator.inside", outside)
+    words = ["--model", str(home / "motor.toml"), "--format", "mcap", "--out", str(home / "gaps")]
+    assert main(["log", "export", str(folder), *words]) == 0
+    made = open_campaign(home / "gaps").runs[0].recording()
+    found = made.columns[f"estimated_{fitted.target}"]
+    assert np.isnan(found[:1000]).all()
+    assert np.isfinite(found[1000:]).all()
+    assert main(["view", str(home / "gaps"), "--no-open", "-o", str(home / "g.html")]) == 0
