@@ -8,8 +8,8 @@ from estimation.causes.equations import Layout
 from estimation.causes.places import Place, places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.effects.effect import Parameter, Proportional
+from estimation.fit_problem import OFFSET
 from estimation.model import Term
-from estimation.plant_equations import OFFSET
 
 
 class SensorGain(Proportional):

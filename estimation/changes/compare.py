@@ -24,8 +24,8 @@ from estimation.causes.sources import Source
 from estimation.changes.candidates import Moved, SensorGain, claims
 from estimation.channels import unit_of
 from estimation.errors import EstimationError
+from estimation.fit_problem import OFFSET
 from estimation.model import Model
-from estimation.plant_equations import OFFSET
 from estimation.recording import FloatArray, Recording
 from estimation.units import evaluate
 
