@@ -26,8 +26,9 @@ struct Gains {
         for (double* gain : {&kp, &ki, &kd, &velocity_filter, &limit}) *gain = reader.f64();
     }
 
-    // Whether the largest command is no larger than the board's own.
-    bool within(const Gains& own) const { return limit <= own.limit; }
+    // Whether the largest command is no larger than the board's own, and drives towards the target as its does: a
+    // board whose kp is 0 takes either sign.
+    bool within(const Gains& own) const { return limit <= own.limit && kp * own.kp >= 0; }
 
     // False for NaN too: no such number ever reaches a set-point.
     bool valid() const {

@@ -203,6 +203,74 @@ TEST_CASE("samples are numbered from each start on, and a stopped board sends no
     }
 }
 
+TEST_CASE("a board that is built for one sign of the gain takes no other") {
+    const rig::Gains toward{20, 0, 0, 0.3, 2700}, away{-20, 0, 0, 0.3, 2700}, own{1, 0, 0, 0, 3000}, any{0, 0, 0, 0, 3000};
+    CHECK(toward.within(own));
+    CHECK_FALSE(away.within(own));
+    CHECK(away.within(any));
+}
+
+TEST_CASE("a missing encoder is no rest, and a reference gives the next samples their counts") {
+    Desk desk(widest());
+    desk.run(150);
+    desk.inputs.spindle = rig::kMissing;
+    desk.run(1);
+    desk.inputs.spindle = 0;
+    desk.run(1);
+    Bytes counts;
+    for (std::uint32_t count : {70U, 80U, 90U}) proofs::put(counts, count, 4);
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kNotAtRest);
+    desk.run(150);
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kOk);
+    desk.inputs.proximal = 5;
+    desk.inputs.distal = -6;
+    desk.run(1);
+    rig::Reader reader(desk.sample.data() + 12);
+    for (std::uint32_t count : {70U, 80U, 90U}) CHECK(reader.u32() == count);
+    reader.u32();
+    CHECK(reader.u16() == 5);
+    CHECK(reader.u16() == 65536 - 6);
+}
+
+TEST_CASE("a setpoint at an end of the travel is taken and followed, one beyond it is refused") {
+    rig::ReferenceFields limits = widest();
+    limits.min_spindle = -9;
+    limits.max_spindle = 9;
+    limits.choice.watchdog_us = rig::kMinWatchdogUs;
+    Desk desk(limits);
+    desk.arm();
+    REQUIRE(desk.result() == rig::kOk);
+    for (std::int32_t end : {-9, 9}) {
+        desk.setpoints({end});
+        CHECK(desk.result() == rig::kOk);
+        desk.run(1);
+        CHECK(static_cast<std::int32_t>(word(desk.sample, 24)) == end);
+        desk.setpoints({end < 0 ? end - 1 : end + 1});
+        CHECK(desk.result() == rig::kBadValue);
+    }
+}
+
+TEST_CASE("a rig without one of two encoders compares none with the other") {
+    for (int lacking = 0; lacking < 3; ++lacking) {
+        rig::ReferenceProfile::Settings settings = rig::ReferenceProfile::Settings::widest();
+        rig::ReferenceFields& limits = settings.limits;
+        limits.motor_per_turn = limits.spindle_per_turn = limits.jaw_per_turn = 10;
+        (lacking == 0 ? limits.motor_per_turn : lacking == 1 ? limits.jaw_per_turn : limits.spindle_per_turn) = 0;
+        limits.max_twist = limits.max_stretch = limits.max_beyond = 1;
+        limits.min_spindle = -1000;
+        limits.max_spindle = 1000;
+        rig::ReferenceProfile profile;
+        profile.begin(settings);
+        rig::ReferenceProfile::Inputs inputs;
+        CHECK(profile.check(inputs).code == rig::kNoTrip);
+        (lacking == 0 ? inputs.motor : inputs.jaw) = 500;
+        if (lacking == 2) inputs.motor = -500;
+        for (int tick = 0; tick < 40; ++tick) CHECK(profile.check(inputs).code == rig::kNoTrip);
+    }
+}
+
 TEST_CASE("a motor's heat outlives its session, and a hot motor is not armed until it has cooled") {
     rig::ReferenceFields limits = widest();
     limits.motor.continuous_current = 100;

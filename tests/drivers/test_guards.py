@@ -309,7 +309,7 @@ def test_setpoints_neither_jump_nor_begin_far_from_the_shaft(library: Path) -> N
 
 def test_no_host_raises_a_limit_that_the_board_was_built_with(library: Path) -> None:
     own = dataclasses.replace(TIGHT, watchdog_us=100_000, torque_e3=70, dry_ticks=500)
-    board = FirmwareBoard(PlainBench(), library=library, own=([0, 0, 0, 0, 2700], own))
+    board = FirmwareBoard(PlainBench(), library=library, own=([1, 0, 0, 0, 2700], own))
     within = {"gains": [20.0, 0, 0, 0.5, 2700.0], "limits": own}
     host = RawHost(board, gains=within["gains"])
     for change in (
@@ -323,6 +323,8 @@ def test_no_host_raises_a_limit_that_the_board_was_built_with(library: Path) -> 
     ):
         assert host.arm(dataclasses.replace(own, **change)) is Result.BEYOND_BOARD
     assert RawHost(board).arm(own) is Result.BEYOND_BOARD  # its command is larger
+    away = RawHost(board, gains=np.array([-20.0, 0, 0, 0.5, 2700.0]))
+    assert away.arm(own) is Result.BEYOND_BOARD
     narrower = dataclasses.replace(own, max_current=1000, min_spindle=-100, stall_motion=9)
     assert host.arm(narrower) is Result.OK
 

@@ -9,6 +9,7 @@ namespace rig::wiring {
 
 inline ReferenceProfile::Settings own_limits() {
     ReferenceProfile::Settings own = ReferenceProfile::Settings::widest();
+    own.gains.kp = 1;  // its sign alone: a command that rises with the spindle's count
     own.gains.limit = 3000;  // command, 1e-4 of full scale
     own.limits.max_current = 1000;  // mA
     own.limits.max_load_ma = 1500;
