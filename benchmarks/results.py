@@ -121,6 +121,12 @@ PAGES = (
     ),
     Page("hunt", "python -m benchmarks.hunt", _CORE, 60),
     Page(
+        "isolability",
+        "python -m benchmarks.diagnosis.isolability",
+        f"benchmarks/diagnosis/isolability.py {_DIAGNOSIS}",
+        2,
+    ),
+    Page(
         "intervals",
         "rig study intervals --data {data} --out docs/results/intervals.md",
         "rig/studies/instruments rig/importers estimation/bank estimation/estimators",

@@ -12,6 +12,7 @@ from estimation.errors import EstimationError
 UNIT_BY_SUFFIX: dict[str, str] = {
     "n_m_s_rad": "N m s/rad",
     "n_m_rad": "N m/rad",
+    "rad_n_m": "rad/(N m)",
     "n_m_s": "N m/s",
     "rad_s2": "rad/s^2",
     "m_s2": "m/s^2",

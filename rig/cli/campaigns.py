@@ -44,7 +44,8 @@ def campaigns(
 ) -> None:
     """List recorded campaigns, or search them by words and by values of their conditions.
 
-    The index behind it is made from the logs and follows them by itself.
+    The index behind it is made from the logs and follows them by itself. With --open, --compare or
+    --diagnose, names of folders select these alone.
     """
     from rig.campaigns import search
     from rig.campaigns.index import campaigns as all_campaigns
@@ -62,7 +63,8 @@ def campaigns(
     whole = all_campaigns(
         root, default_index(root), rebuild, lambda folder: working.print(f"reading {folder} ...")
     )
-    found = search.search(whole, terms or [])
+    named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
+    found = named or search.search(whole, terms or [])
     if diagnose:
         _diagnose(_only(found).folder)
         return
@@ -73,7 +75,7 @@ def campaigns(
         emit_json({"campaigns": found})
         return
     screen = results(json)
-    if compare:
+    if compare and found:
         screen.print(to_rich(_side_by_side(found, root)))
         return
     count = sum(len(campaign.runs) for campaign in found)
@@ -83,6 +85,14 @@ def campaigns(
         if len(table.rows) < (count if runs else len(found)):
             screen.print(f"Older ones are not shown; --most shows more than {most} rows.")
     screen.print(f"{len(found)} of {len(whole)} campaigns, {count} runs.")
+
+
+def _named(
+    whole: Sequence["IndexedCampaign"], terms: list[str], root: Path
+) -> "list[IndexedCampaign]":
+    """Return the campaigns whose folders the terms name; none unless every term names one."""
+    by_name = {str(campaign.folder.relative_to(root)): campaign for campaign in whole}
+    return [by_name[term] for term in terms] if all(term in by_name for term in terms) else []
 
 
 def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":

@@ -33,7 +33,6 @@ def fit_states(
 ) -> None:
     """Fit products of physical states, and report the error on runs left out."""
     from estimation.bank.states import LOAD_SCALES, Bank
-    from estimation.channels import unit_of
     from estimation.estimators.bank import BankRecipe
     from estimation.estimators.held_out import held_out_score
     from rig.errors import UsageError
@@ -54,10 +53,7 @@ def fit_states(
     for line in sentence(steps):
         screen.print(line)
     if error is not None:
-        screen.print(
-            f"{target}, closing samples of {len(kept)} runs, each held out once:"
-            f" rmse {error.rmse:.4g} {unit_of(target)}."
-        )
+        screen.print(_held_out_line(target, len(kept), error.rmse))
     if out is not None:
         figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
         with_origin(estimator, campaign, figures).save(out)
@@ -77,7 +73,6 @@ def fit_network(
     json_: bool,
 ) -> None:
     """Train a network with physical states as inputs, and report the error on runs left out."""
-    from estimation.channels import unit_of
     from estimation.cross_validation import closing_score
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
@@ -101,10 +96,7 @@ def fit_network(
     for line in sentence(steps):
         screen.print(line)
     if error is not None:
-        screen.print(
-            f"{target}, closing samples of {len(kept)} runs, each held out once:"
-            f" rmse {error.rmse:.4g} {unit_of(target)}."
-        )
+        screen.print(_held_out_line(target, len(kept), error.rmse))
     if out is not None:
         figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
         with_origin(estimator, campaign, figures).save(out)
@@ -244,3 +236,15 @@ def _told(model: "Model", error: "HeldOutError | None", out: Path | None) -> dic
         "held_out": error,
         "out": out,
     }
+
+
+def _held_out_line(target: str, runs: int, rmse: float) -> str:
+    """Return the error of an estimator on runs that it was not fitted on, in words."""
+    from estimation.channels import unit_of
+    from rig.reports.diagnosis_words import display
+
+    scale, unit = display(unit_of(target))
+    return (
+        f"{target}, closing samples of {runs} runs, each held out once:"
+        f" RMSE {scale * rmse:.3g} {unit}."
+    )

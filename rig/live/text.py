@@ -149,7 +149,8 @@ def summary_lines(summary: Summary, unit: str) -> list[str]:
     if summary.error_rms is not None:
         lines.append(
             f"{name_of(summary.channel)}, estimate against sensor: rms error "
-            f"{with_unit(Value(summary.error_rms), unit)} over {summary.error_samples} samples."
+            f"{with_unit(Value(summary.error_rms), unit)} over {summary.error_samples} samples,"
+            " those at standstill too."
         )
     if summary.inside_rms is not None and summary.inside_samples < summary.error_samples:
         lines.append(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.channels import UnknownUnitError
+from estimation.channels import UnknownUnitError, unit_of
 from estimation.recording import (
     Flag,
     Mark,
@@ -80,3 +80,8 @@ def test_rate_and_duration():
     assert make().duration_s == pytest.approx(0.099)
     with pytest.raises(RecordingError, match="no sample rate"):
         _ = make(1).sample_rate_hz
+
+
+def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():
+    assert unit_of("compliance_rad_n_m") == "rad/(N m)"
+    assert unit_of("stiffness_n_m_rad") == "N m/rad"

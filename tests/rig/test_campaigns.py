@@ -47,6 +47,25 @@ def diagnosed(folder: Path, **other) -> None:
     (folder / "diagnosis" / "diagnosis.json").write_text(json.dumps(DIAGNOSIS | other))
 
 
+def test_folders_are_compared_and_opened_by_their_names(root, capsys, monkeypatch):
+    """`monday` is a word of `monday-2`, too."""
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
+    (root / "monday-2").mkdir()
+    write_log(root / "monday-2" / "a.mcap")
+    for name in ("monday", "monday-2"):
+        diagnosed(root / name)
+        (root / name / "diagnosis" / "diagnosis.html").write_text("<!DOCTYPE html>")
+    words = ["--root", str(root)]
+    assert main(["campaigns", "tuesday", "monday", "--compare", *words]) == 0
+    head = capsys.readouterr().out.splitlines()[1]
+    assert head.index("tuesday") < head.index("monday")
+    assert "monday-2" not in head
+    assert main(["campaigns", "monday", "--open", *words]) == 0
+    assert str(root / "monday" / "diagnosis") in capsys.readouterr().out
+    assert main(["campaigns", "friday", "--compare", *words]) == 0
+    assert "0 of 3 campaigns" in capsys.readouterr().out
+
+
 def test_campaigns_are_listed_with_what_their_logs_state(rig):
     found = rig()
     assert names(found) == ["monday", "tuesday"]
