@@ -60,6 +60,7 @@ EQUIVALENT = {
     "std::int64_t far_ticks_ = 0;": "the first target is within its window, so a tick sets it to 0",
     "std::size_t first_ = 0;": "a queue may begin anywhere in its ring, and an app fills its buffer"
     " before it reads it",
+    "const bool good = length_ > 0": "a frame of one byte has no checksum",
     "std::size_t used_ = 0;": "each arming clears the queue",
     "std::int64_t still_mean_ = 0;": "the first tick sets it",
     "std::int32_t forward = 0;": "each arming sets it, and without a torque it is not read",

@@ -198,6 +198,7 @@ TEST_CASE("a guard trips one count beyond its limit, after the time that the lim
         CHECK(trips(guard, 1, crossing) == kBegins + guard.lasts - 1);
         CHECK(crossing.code == guard.code);
         CHECK(crossing.channel == guard.channel);
+        CHECK(crossing.late_us % Profile::kTickUs == 0);  // since a tick
     }
 }
 
