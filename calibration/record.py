@@ -48,9 +48,11 @@ class Fit:
 
     Attributes:
         form: Meaning of the parameters, such as `line` (slope, zero) or `polynomial` (c0, c1, ...).
-        parameters: Name to value; SI units of the channel over the input's unit.
-        covariance: Of the parameters in that order, shape (p, p); empty where nothing is known,
-            as for numbers copied from a certificate.
+        parameters: Name to value, in the order of the names, which a record's file has too; SI
+            units of the channel over the input's unit.
+        covariance: Of the parameters in the order in which they are given, then in the order of
+            the names, shape (p, p); empty where nothing is known, as for numbers copied from a
+            certificate.
         residual_rms: Root mean square of the residual, the channel's unit; None if not measured.
         points: Number of samples fitted on.
     """
@@ -73,6 +75,14 @@ class Fit:
                 f"The covariance has shape {covariance.shape}.",
                 f"{size} parameters need {size} x {size} finite numbers.",
             )
+        names = list(self.parameters)
+        if names != sorted(names):
+            order = sorted(range(size), key=names.__getitem__)
+            ordered = {names[k]: self.parameters[names[k]] for k in order}
+            object.__setattr__(self, "parameters", ordered)
+            if covariance.size:
+                rows = covariance[np.ix_(order, order)].tolist()
+                object.__setattr__(self, "covariance", tuple(map(tuple, rows)))
 
 
 @dataclass(frozen=True, slots=True)

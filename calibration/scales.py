@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.agreement import LEAST_RUNS, fitted
+from calibration.history import deviation
 from calibration.procedure import Measurement
 from calibration.quality import check_change
 from calibration.record import CalibrationRecord
@@ -122,7 +123,7 @@ def current_scale(runs: Sequence[Recording], record: CalibrationRecord | None) -
     expected, source = None, ""
     if record is not None:
         expected = float(record.fit.parameters["torque_constant_n_m_a"])
-        half += 2.0 * float(np.sqrt(record.fit.covariance[0][0]))
+        half += 2.0 * (deviation(record, "torque_constant_n_m_a") or 0.0)
         source = f"record {record.content_hash} of {record.made_at[:10]}"
     span = _span(np.concatenate([p[CURRENT] for p in parts]))
     return Scale(

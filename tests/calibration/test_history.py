@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from calibration.history import MOST, changes, earlier_ones
+from calibration.history import MOST, changes, deviation, earlier_ones
 from calibration.record import LINE, CalibrationRecord, Fit
+from calibration.store import CalibrationStore
 
 
 def record(day: int, slope: float = 1.0, spread: float = 0.01, **other) -> CalibrationRecord:
@@ -53,3 +54,13 @@ def test_without_an_uncertainty_nothing_is_called_a_drift():
     (change,) = changes(plain, record(2))
     assert change.normalised_error is None
     assert not change.drifted
+
+
+def test_a_stored_record_keeps_the_uncertainty_of_each_parameter(tmp_path):
+    fit = Fit("current", {"slope": 1.0, "friction": 2.0}, ((0.25, 0.1), (0.1, 4.0)))
+    store = CalibrationStore(tmp_path)
+    kept = store.get(store.add(record(1, fit=fit)))
+    assert {name: deviation(kept, name) for name in fit.parameters} == {
+        "slope": 0.5,
+        "friction": 2.0,
+    }
