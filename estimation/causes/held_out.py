@@ -58,6 +58,7 @@ class HeldOut:
     ) -> None:
         self.layout, self.numbers = layout, numbers
         self.joint = with_skews(Joint(layout, numbers), late)
+        self._last: tuple[tuple[Candidate, ...], Joint, Mapping[Part, FloatArray]] | None = None
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
 
     def acts_in(
@@ -97,7 +98,8 @@ class HeldOut:
 
     def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":
         """Return the score of one more cause in each test run, next to the causes before it."""
-        old, new = self._squared(before), self._squared([*before, cause])
+        joint, old = self._next_to(before)
+        new = self._squared(self._with(joint, cause))
         total = np.zeros(len(self.at))
         for p, samples in self.joint.samples.items():
             mean = [e[p] / samples[self.at] for e in (old, new)]
@@ -106,11 +108,17 @@ class HeldOut:
         is_open = frozenset(name for name, acts in self._known(cause).items() if acts is None)
         return Gains(dict(zip(names, total.tolist(), strict=True)), is_open)
 
-    def _squared(self, causes: Sequence[Candidate]) -> Mapping[Part, FloatArray]:
+    def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
+        """Return the regression with causes, and its squared errors; the last one is kept."""
+        if self._last is None or [*map(id, self._last[0])] != [*map(id, causes)]:
+            joint = self.joint
+            for cause in causes:
+                joint = self._with(joint, cause)
+            self._last = tuple(causes), joint, self._squared(joint)
+        return self._last[1:]
+
+    def _squared(self, joint: Joint) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""
-        joint = self.joint
-        for cause in causes:
-            joint = self._with(joint, cause)
         (errors,) = joint.base_errors([[self.at]])
         return {p: values[self.at] for p, values in errors.items()}
 

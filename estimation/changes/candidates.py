@@ -55,18 +55,19 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
         layout: The runs of both campaigns.
         is_b: Whether each is of the second campaign.
     """
+    places = places_of(layout)
     later, earlier = (tuple(b is side for b in is_b) for side in (True, False))
     for equation in layout.equations.values():
         column = 0
         for term in equation.model.terms:
             if term.effect.id == OFFSET:
-                yield Claim(_moved(layout, equation.name, term, 0, None), later, given=True)
+                yield Claim(_moved(places, equation.name, term, 0, None), later, given=True)
                 continue
             for k in range(len(term.effect.amplitudes)):
-                found = _moved(layout, equation.name, term, k, column + k)
+                found = _moved(places, equation.name, term, k, column + k)
                 yield Claim(found, later, given=True)
             column += len(term.effect.amplitudes) + len(term.effect.shape)
-    for place in places_of(layout):
+    for place in places:
         if place.kind in ("torque sensor", "angle sensor"):
             yield Claim(_gain(place), later, given=True)
         for source in sources_at(layout, place):
@@ -75,8 +76,10 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
                 yield Claim(source, earlier, given=True)
 
 
-def _moved(layout: Layout, equation: str, term: Term, amplitude: int, column: int | None) -> Moved:
-    own = next(p for p in places_of(layout) if p.name == equation)
+def _moved(
+    places: Sequence[Place], equation: str, term: Term, amplitude: int, column: int | None
+) -> Moved:
+    own = next(p for p in places if p.name == equation)
     enters = tuple(replace(e, gain=float(term.sign)) for e in own.enters if e.equation == equation)
     place = replace(own, name=f"terms of {equation}", enters=enters)
     effect = term.effect
